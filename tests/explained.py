@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import statemachine as sm
-from statemachine.compare.why import Explanation, explain
+from statemachine.compare.why import Explanation, WhyRequest, explain
 from statemachine.runs.scenarios import Scenario
 
 from .conftest import written
@@ -101,7 +101,7 @@ def explained(
         sm.load(written(folder / f"{side}.xml", text), backend=engine)
         for side, text, engine in zip(("left", "right"), (left, right), engines, strict=True)
     ]
-    return explain(models[0], models[1], more.pop("scenario", SWING), **more)
+    return explain(WhyRequest(models[0], models[1], more.pop("scenario", SWING), **more))
 
 
 def with_changes(text: str, changes: Iterable[tuple[str, str]]) -> str:

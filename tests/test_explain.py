@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.why import Explanation, explain
+from statemachine.compare.why import Explanation, WhyRequest, explain
 from statemachine.compare.why.shapley import shapley
 from statemachine.runs.scenarios import scenario
 
@@ -383,7 +383,7 @@ def test_what_an_engine_leaves_out_is_said(tmp_path: Path) -> None:
 def test_the_robot_of_a_urdf_is_that_of_the_mjcf():
     files = "so101/so101", ROOT / "models/so101/so101.urdf"
     left, right = (sm.load(file, contacts=False) for file in files)
-    found = explain(left, right, scenario("fall"))
+    found = explain(WhyRequest(left, right, scenario("fall")))
     # A URDF knows no integrator, armature or timestep; the links, as far as it has digits, are one.
     assert {each.kind for each in found.shares if abs(each.share or 0.0) > 1e-3} <= {
         "option",

@@ -10,7 +10,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare.matching import match_models
-from statemachine.compare.why import explain
+from statemachine.compare.why import WhyRequest, explain
 from statemachine.compare.why.causes import differences_of
 from statemachine.engines.mujoco.differences import edited
 from statemachine.errors import StateMachineError
@@ -58,7 +58,7 @@ def test_public_robots(path):
     ]
     right = model.with_compiled(edited(raw, edits))
     scenario = SCENARIOS["waves" if "waves" in fits else fits[0]]
-    found = explain(model, right, scenario, seconds=0.2, uncertain=None)
+    found = explain(WhyRequest(model, right, scenario, seconds=0.2, uncertain=None))
     assert {each.name.partition(" of ")[0] for each in found.shares} == {"mass", "damping"}
     assert len(found.shares) == 2
     assert_has(found, brought=0.0)

@@ -12,7 +12,7 @@ import statemachine as sm
 from statemachine.compare import rerun_of
 from statemachine.compare.one_step import RELATIVE, one_step
 from statemachine.compare.stages import STAGES
-from statemachine.compare.why import explain
+from statemachine.compare.why import WhyRequest, explain
 from statemachine.errors import BadInputError
 from statemachine.page import Figures
 from statemachine.report.steps import one_step as page
@@ -113,7 +113,7 @@ def test_the_verdict_names_no_cause_that_why_contradicts() -> None:
     """A link 0.5 % heavier shows first in a step, and damping of three halves moves the arm."""
     hold, one = scenario("hold"), sm.load("so101")
     two = one.replace(damping=1.5 * one.dof_damping, mass=1.005 * one.body_mass)
-    assert explain(one, two, hold, jobs=1).shares[0].name.startswith("damping")
+    assert explain(WhyRequest(one, two, hold, jobs=1)).shares[0].name.startswith("damping")
     found = one_step(rerun_of(hold, one), two, moments=50)
     assert first(found) == "mass matrix"
     assert_in(verdict(found).text, "force: passive, ", "--why")

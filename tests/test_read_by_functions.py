@@ -13,7 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare.models import compare as compare_models
-from statemachine.compare.why import Explanation, explain
+from statemachine.compare.why import Explanation, WhyRequest, explain
 from statemachine.runs.controllers import function_scenario
 
 SECONDS = 0.4
@@ -43,11 +43,13 @@ def _written(folder: Path, **texts: str) -> dict[str, Path]:
 def _why(folder: Path, function: str, left: str, right: str) -> Explanation:
     paths = _written(folder, function=function, left=left, right=right)
     return explain(
-        sm.load(paths["left"]),
-        sm.load(paths["right"]),
-        function_scenario(f"{paths['function']}:f"),
-        seconds=SECONDS,
-        uncertain=None,
+        WhyRequest(
+            sm.load(paths["left"]),
+            sm.load(paths["right"]),
+            function_scenario(f"{paths['function']}:f"),
+            seconds=SECONDS,
+            uncertain=None,
+        )
     )
 
 
@@ -247,11 +249,13 @@ def test_what_no_function_reads_costs_no_run_and_is_named(tmp_path):
     texts = [f"{HEAD}{USER['joint'][0]}{BOTH}</mujoco>".format(value) for value in (0.3, 0.6)]
     paths = _written(tmp_path, left=texts[0], right=texts[1])
     found = explain(
-        sm.load(paths["left"]),
-        sm.load(paths["right"]),
-        sm.runs.scenarios.scenario("gravity"),
-        seconds=SECONDS,
-        uncertain=None,
+        WhyRequest(
+            sm.load(paths["left"]),
+            sm.load(paths["right"]),
+            sm.runs.scenarios.scenario("gravity"),
+            seconds=SECONDS,
+            uncertain=None,
+        )
     )
     assert found.shares == ()
     assert found.unread == ("user data of j1",)

@@ -23,13 +23,15 @@ from PIL import Image
 import statemachine as sm
 from statemachine.compare import Comparison, compare, touches
 from statemachine.compare.series import total_forces
-from statemachine.compare.why import Explanation
+from statemachine.compare.why import Explanation, Share
+from statemachine.compare.why.gap import FirstTouch
+from statemachine.compare.why.locate import Localisation
+from statemachine.compare.why.written import FigureValues
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.measures import Deviation
 from statemachine.measures.text import quantity
 from statemachine.page import (
-    Figures,
     Headline,
     Items,
     Page,
@@ -39,6 +41,7 @@ from statemachine.page import (
     Text,
     Verdict,
 )
+from statemachine.report.compare import PageParts
 from statemachine.report.compare import page as compared
 from statemachine.report.finding import events_of, headline, leading, subject
 from statemachine.report.html import Look, check_target, report, write_report
@@ -47,12 +50,13 @@ from statemachine.report.html.scene import moments_of, rows_at
 from statemachine.report.notebook import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
 from statemachine.report.sides import commanded
-from statemachine.report.why import answer, causes, parts, steps
+from statemachine.report.why import causes, steps
+from statemachine.report.why_answer import answer, parts
 from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, assert_has, assert_in, refused, soon, with_figures
+from .conftest import ROOT, assert_has, assert_in, refused, soon
 from .test_drawing import area_of
 from .test_strange_traces import added, cut
 from .test_strange_traces import changed as edited
@@ -68,7 +72,7 @@ def of(one: Trace, two: Trace) -> Made:
 
 
 def page_of(made: Made, looks: Any = None, **more: Any) -> str:
-    return report(compared(made[0], **more), looks or made[3:] * 2)
+    return report(compared(made[0], parts=PageParts(**more)), looks or made[3:] * 2)
 
 
 def recorded(name: str, kind: Any = "model") -> Made:
@@ -288,16 +292,16 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     comparison, one, two, _ = made
     worst = max((a for a in comparison.agreements if a.kind == "joint"), key=lambda a: a.max)
     gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
-    contact = Figures(
+    contact = Localisation(
         name="contact", values=None, without="nothing touches", share=0.5, alone=None,
         gap=1e-8 * gap.worst, is_still=False,
     )  # fmt: skip
 
-    def row(name: str, share: float) -> Figures:
-        values = ((name, "kp 998.2", "its motors"),)
-        return Figures(
+    def row(name: str, share: float) -> Share:
+        values = (FigureValues(name, "kp 998.2", "its motors"),)
+        return Share(
             name=name, kind="engine", values=values, unit="", units=("",), share=share, alone=share,
-            last=share, error=0.0, note="", place=None, chosen=None,
+            last=share, place=None,
         )  # fmt: skip
 
     fields: dict[str, Any] = {
@@ -325,10 +329,10 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
         "Servo law, kp 998.2 on the left and its motors on the right: 60.0 % of the 2.58°.",
     )
     # What the run shows itself comes before.
-    touch = Figures(time=0.27, what="gripper on floor", before=3e-16)
+    touch = FirstTouch(0.27, "gripper on floor", before=3e-16, moments=54)
     before = "Until the first touch, gripper on floor at 0.270 s, the gap of the joints is 2e-14°"
     assert said(touch=touch).causes[0].startswith(f"{before} at most")
-    late = Figures(time=0.27, what="finger on floor", before=0.01)  # they were apart before
+    late = FirstTouch(0.27, "finger on floor", before=0.01, moments=54)  # they were apart before
     assert len(said(touch=late).causes) == 1
     # Of two that are as far apart the page names one, here and where it counts agreements.
     lead = leading(hold[0])
@@ -342,24 +346,30 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     assert other.lead.startswith("The box relative to gripperframe is up to 2.58° apart")
 
 
+def refused_cause(name: str, why: str) -> Share:
+    return Share(name, values=(), unit="", units=(), place=None, kind="joint", note=why)
+
+
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     located = explanation_of(hold, shares=(), explained=0.0, located=1.0)
-    wider = {"explained": -0.25, "located": 1.25, "brought": 1.25 * located.gap}
+    wider: dict[str, Any] = {"explained": -0.25, "located": 1.25, "brought": 1.25 * located.gap}
     worse = explanation_of(hold, **wider)  # all brought over widens the gap
     (contact,), rows = located.found_in, worse.shares
-    switch = with_figures(rows[0], name="contact", values=(("contact", True, False),), share=0.1)
+    switch = replace(
+        rows[0], name="contact", values=(FigureValues("contact", True, False),), share=0.1
+    )
     # Two values that read the same are shown with all their digits.
-    close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
-    rounded = with_figures(rows[0], values=(close,), units=("rad",))
+    close = FigureValues("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
+    rounded = replace(rows[0], values=(close,), units=("rad",))
     masked = [
-        [with_figures(row, **{part: value}) for row, value in zip(rows, values, strict=True)]
+        [replace(row, **{part: value}) for row, value in zip(rows, values, strict=True)]
         for part, *values in (
             *(("share", -217.0, 127.0), ("share", 127.0, -126.5)),
             *(("alone", -0.094, 0.0), ("last", -0.094, 0.0)),  # it widens the gap at first, or last
         )
     ]
-    apart = [with_figures(row, alone=0.05, last=1.1) for row in rows]
-    still = with_figures(located, found_in=[with_figures(contact, is_still=True)])
+    apart = [replace(row, alone=0.05, last=1.1) for row in rows]
+    still = replace(located, found_in=(replace(contact, is_still=True),))
     for explanation, says in (
         (located, "^50.0 % of the 2.58° comes from contact"),
         (
@@ -374,7 +384,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         (explanation_of(hold, shares=apart), "5.0 % alone and 110.0 % last"),
         (still, "a weak hint$"),
         (
-            with_figures(located, shares=[Figures(name="extra joint of a", note="no", share=None)]),
+            replace(located, shares=(refused_cause("extra joint of a", "no"),)),
             "goes without contact on both sides; it may come from extra joint of a, which cannot",
         ),
         (
@@ -395,30 +405,30 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         ),
         (explanation_of(hold, floor=0.04, tolerance=0.1), "^The gap of 2.58° is within its tol"),
         (
-            with_figures(located, one_engine=True),
+            replace(located, one_engine=True),
             "^The cause was not found: 50.0 % of the 2.58° goes without contact on both sides",
         ),
         (explanation_of(hold, negligible=1.0), "^The two sides move alike"),
     ):
         assert re.search(says, answer(explanation)), says
     # An integrator that parts the sides only where nothing touches says what it does with contact.
-    chosen = with_figures(contact, name="integrator", values=("rk4", "its own"), without="euler")
-    chosen = with_figures(chosen, share=0.2, alone=0.013)
-    beyond = [with_figures(row, share=share) for row, share in zip(rows, (1.4, 0.1), strict=True)]
+    chosen = replace(contact, name="integrator", values=("rk4", "its own"), without="euler")
+    chosen = replace(chosen, share=0.2, alone=0.013)
+    beyond = [replace(row, share=share) for row, share in zip(rows, (1.4, 0.1), strict=True)]
     for explanation, says in (
         (
-            with_figures(located, found_in=(contact, chosen)),
+            replace(located, found_in=(contact, chosen)),
             "As the sides come, with contact, euler takes away 1.3 % of the gap.",
         ),
         (
-            with_figures(located, found_in=(chosen,)),
+            replace(located, found_in=(chosen,)),
             "† Integrator: this part goes when both sides run with euler, as far as they can",
         ),
         (explanation_of(hold, shares=beyond), "A part beyond 100 % says that the gap cannot be"),
     ):
         texts = [block.text for block in causes(explanation) if isinstance(block, Text)]
         assert sum(says in text for text in texts) == 1, says
-    tiny = [with_figures(row, **dict.fromkeys(("share", "alone", "last"), 2e-4)) for row in rows]
+    tiny = [replace(row, **dict.fromkeys(("share", "alone", "last"), 2e-4)) for row in rows]
     # What is not in the list of changes may move what is not explained.
     several: Any = {"first": {"joints": worse.first["joints"], "box": worse.first["joints"]}}
     for shares, missing in (((rows[0], *tiny), True), (rows, False)):
@@ -437,11 +447,11 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         (table,) = [block for block in causes(explanation) if isinstance(block, Table)]
         assert [row[column] for row in table.rows] == cells
     # Where something cannot be brought to the same, a location is not an explanation.
-    row = Figures(name="shape of box", note="another size", share=None)
-    found = (with_figures(contact, share=1.0),)
+    row = refused_cause("shape of box", "another size")
+    found = (replace(contact, share=1.0),)
     assert parts(worse).endswith("Of the 3.22°, 100.0 % is localised and < 0.1 % unexplained")
     assert [each.verdict.holds for each in (located, worse, still)] == [True, False, False]
-    assert not with_figures(located, shares=(row,), found_in=found).verdict.holds
+    assert not replace(located, shares=(row,), found_in=found).verdict.holds
 
 
 def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:

@@ -48,10 +48,13 @@ def test_they_show_what_they_say() -> None:
     limp, held = PICTURES["gravity"].poses()
     assert limp[-1, lift] > 0.4
     assert abs(held[:, lift]).max() < 0.001
-    rows = np.concatenate(PICTURES["forward"].poses())
+    solid, ghost = PICTURES["forward"].poses()
+    assert ghost is not None
+    rows = np.concatenate((solid, ghost))
     tips = sm.Kinematics("so101").poses(rows, "gripperframe").pos
     assert np.linalg.norm(tips[1] - tips[0]) == pytest.approx(9.95e-3, abs=5e-6)
     one, two = PICTURES["replay"].poses()
+    assert two is not None
     assert np.array_equal(one, two)
     assert np.ptp(one[:, 0]) > 0.2
 

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepEffects, effects
 from statemachine.sweep.folder import write_manifest
 from statemachine.sweep.main_effects import MainEffects, main_effects
+from statemachine.sweep.manifest import SweepManifest
 from statemachine.sweep.quantities import cell_values, parse_quantity
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, schema_of
@@ -145,7 +146,7 @@ def test_where_there_is_no_share_it_is_said_why(design: Design, value: Value, sa
 def test_the_error_in_a_grid_is_that_of_the_seeds() -> None:
     design, seeds = Design((grid("x", 0, 1, 4), grid("y", 0, 1, 4))), 8
     draw = np.random.default_rng(0)
-    settings = np.array([x + y for x, y in (point.values for point in design.points())])
+    settings = np.array([np.sum([float(v) for v in point.values]) for point in design.points()])
     few, many = (
         main_effects(design, settings[:, None] + draw.normal(0, noise, (16, seeds)))
         for noise in (0.01, 0.3)
@@ -211,7 +212,7 @@ def made_up(
         },
         "factors": [{**asdict(vary), "label": vary.label} for vary in design.factors],
     }  # fmt: skip
-    write_manifest(folder, manifest)
+    write_manifest(folder, cast(SweepManifest, manifest))
     writer = RowWriter(folder, design.factors, {})
     for backend, point, seed in product(tips, list(design.points()), range(seeds)):
         row: dict[str, Any] = {

@@ -17,7 +17,7 @@ import statemachine as sm
 from statemachine.compare.models import read
 from statemachine.compare.sides import Request, Side
 from statemachine.compare.two_sides import run_sides
-from statemachine.compare.why.explain import explain
+from statemachine.compare.why import WhyRequest, explain
 from statemachine.errors import EngineWarning, ModelError, UnsupportedError
 from statemachine.installed import silence
 from statemachine.models import models_dir
@@ -396,7 +396,7 @@ def test_what_the_engine_gives_of_its_own_explains_a_gap(
     """Self-collision and 1 kg are settings; with all of them changed nothing of the gap stays."""
     path = written(tmp_path / "robot.urdf", URDFS[name])
     sides = sm.load(path, backend="pybullet", defaults="engine"), sm.load(path, backend="pybullet")
-    found = explain(*sides, SCENARIOS["gravity"], seconds=0.25, jobs=1)
+    found = explain(WhyRequest(*sides, SCENARIOS["gravity"], seconds=0.25, jobs=1))
     (row,) = (row for row in found.shares if row.name == cause)
     assert own in str(row.values)
     assert row.last is not None

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.why import Explanation, explain
+from statemachine.compare.why import Explanation, WhyRequest, explain
 from statemachine.compare.why.settings import NEEDS, TITLES
 from statemachine.compare.why.shapley import shapley
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, UnknownNameError
@@ -59,7 +59,7 @@ def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) ->
     )
     with pytest.warns(EngineWarning, match="RK4 acts as Euler"):
         one, two = on_both(written(tmp_path / "m.xml", text))
-    result = explain(one, two, FALL, seconds=1.0)
+    result = explain(WhyRequest(one, two, FALL, seconds=1.0))
     (row,) = result.shares
     assert (row.values[0][1:], row.chosen[0]) == (("rk4", "its own"), "left")
     assert result.verdict.holds
@@ -71,7 +71,7 @@ def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
     with registered("hidden", "tests.hidden_world:load"):
         two = sm.load("so101/scene", backend="hidden")
         two.raw.body_mass[:] *= 1.3  # which no compiled model tells
-        result = explain(arm, two, HOLD, uncertain=None)
+        result = explain(WhyRequest(arm, two, HOLD, uncertain=None))
     assert result.unexplained > 0.9
     assert not {"gravity", "servo law"} & {part.name for part in result.found_in}
 
@@ -79,7 +79,7 @@ def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
 def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     record = Mock(side_effect=rerun.record)
     monkeypatch.setattr(rerun, "record", record)
-    result = explain(arm, arm.replace(gravity=[0, 0, -9]), HOLD, uncertain=None, jobs=1)
+    result = explain(WhyRequest(arm, arm.replace(gravity=[0, 0, -9]), HOLD, uncertain=None, jobs=1))
     # Both as they come, and the right with the left's gravity.
     assert record.call_count == result.runs == 3
 
@@ -94,12 +94,14 @@ def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None
 def test_timesteps_meet_where_they_can_or_are_interpolated(
     arm: Model, timestep: float, facts: dict[str, Any]
 ) -> None:
-    assert_has(explain(arm, arm.replace(timestep=timestep), HOLD, uncertain=None), **facts)
+    assert_has(
+        explain(WhyRequest(arm, arm.replace(timestep=timestep), HOLD, uncertain=None)), **facts
+    )
 
 
 def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
     two = arm.replace(timestep=2 * arm.timestep, substeps=4, damping=0.7)
-    result = explain(arm, two, HOLD, uncertain=None)
+    result = explain(WhyRequest(arm, two, HOLD, uncertain=None))
     (step,) = [row for row in result.shares if row.name == "timestep"]
     assert step.values == (("timestep", 0.005, 0.01), ("substeps", 1, 4))
     assert result.brought == result.unexplained == 0.0
@@ -107,11 +109,19 @@ def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
 
 def test_another_quantity(arm: Model) -> None:
     two = arm.replace(armature=0.04)
-    result = explain(arm, two, HOLD, quantity="gripperframe", uncertain=None)
+    result = explain(WhyRequest(arm, two, HOLD, quantity="gripperframe", uncertain=None))
     assert_has(result, quantity="gripperframe", unit="m", gap=result.first["gripperframe"].worst)
     refused(
-        (UnknownNameError, "gripperframe", lambda: explain(arm, two, HOLD, quantity="gripperfram")),
-        (UnknownNameError, "known: joints", lambda: explain(arm, two, HOLD, quantity="")),
+        (
+            UnknownNameError,
+            "gripperframe",
+            lambda: explain(WhyRequest(arm, two, HOLD, quantity="gripperfram")),
+        ),
+        (
+            UnknownNameError,
+            "known: joints",
+            lambda: explain(WhyRequest(arm, two, HOLD, quantity="")),
+        ),
     )
 
 
@@ -119,7 +129,7 @@ def test_what_is_held_is_what_it_is_about(mujoco_box: sm.Model) -> None:
     two = mujoco_box.replace()
     two.raw.geom_friction[:] *= 0.1
     two = two.replace()  # so that what the Model tells follows
-    result = explain(mujoco_box, two, BOX, uncertain=None)
+    result = explain(WhyRequest(mujoco_box, two, BOX, uncertain=None))
     assert result.quantity == "box relative to gripperframe"
     assert sum(shares(result).values()) == pytest.approx(1.0)
     seen, time = [], np.empty(0)
@@ -141,11 +151,11 @@ def test_a_run_that_diverges_is_said_with_what_would_let_it_stand(arm: Model) ->
     coarse = arm.replace(timestep=0.02, integrator="euler")
     two = coarse.replace(armature=0, damping=0)
     refused(
-        (BadInputError, "does not reach the end", lambda: explain(coarse, two, HOLD)),
+        (BadInputError, "does not reach the end", lambda: explain(WhyRequest(coarse, two, HOLD))),
         (
             BadInputError,
             r"brought to the same: armature of 6 joints, damping",
-            lambda: explain(arm.replace(timestep=0.02), two, HOLD),
+            lambda: explain(WhyRequest(arm.replace(timestep=0.02), two, HOLD)),
         ),
     )
 
@@ -156,12 +166,12 @@ def test_one_changed_default_is_one_row_and_its_line_is_found(tmp_path: Path) ->
     text = right.read_text(encoding="utf-8")
     written(right, text.replace('armature="0.028"', 'armature="0.042"'))
     one, two = sm.load("so101"), sm.load(right)
-    row = explain(one, two, HOLD, uncertain=None).shares[0]
+    row = explain(WhyRequest(one, two, HOLD, uncertain=None)).shares[0]
     assert (row.name, row.share) == ("armature of 6 joints", 1.0)
     line = next(k for k, line in enumerate(text.splitlines(), 1) if 'armature="0.028"' in line)
     assert (row.place.file, row.place.line) == ("so101.xml", line)
     # What the file does not say, because an option does, has no line there.
-    row = explain(one, one.replace(armature=0.042), HOLD, uncertain=None).shares[0]
+    row = explain(WhyRequest(one, one.replace(armature=0.042), HOLD, uncertain=None)).shares[0]
     assert row.place is None
 
 
@@ -170,13 +180,13 @@ def test_joints_that_an_experiment_does_not_move_are_told(arm: Model) -> None:
     damping[arm.joint_id("shoulder_pan")] = damping[arm.joint_id("elbow_flex")] = 0.9
     waves = replace(scenario("waves"), seconds=1.0)
     for experiment, still in ((HOLD, ("shoulder_pan",)), (waves, ())):
-        result = explain(arm, arm.replace(damping=damping), experiment, uncertain=None)
+        result = explain(WhyRequest(arm, arm.replace(damping=damping), experiment, uncertain=None))
         assert result.still == still
 
 
 def test_finer_splits_what_changed_alike(arm: Model) -> None:
     two = arm.replace(armature=1.5 * arm.dof_armature)
-    parts = shares(explain(arm, two, HOLD, uncertain=None, finer=True, budget=20))
+    parts = shares(explain(WhyRequest(arm, two, HOLD, uncertain=None, finer=True, budget=20)))
     assert (len(parts), sum(parts.values())) == (6, pytest.approx(1.0, abs=0.05))
 
 
@@ -474,7 +484,9 @@ def explanations() -> dict[tuple[str, str], Explanation]:
         experiment = scenario(name)
         one, two = sm.load(experiment.model), quietly(experiment.model, defaults=defaults)
         # What is tested holds of few drawn orders as of many.
-        results[name, defaults] = explain(one, two, experiment, uncertain=None, budget=40)
+        results[name, defaults] = explain(
+            WhyRequest(one, two, experiment, uncertain=None, budget=40)
+        )
     return results
 
 
@@ -541,7 +553,7 @@ def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
 def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     one, two = quietly("so101/scene"), quietly("so101/scene", defaults="engine")
     for sides in ((one, two), (two, one)):
-        result = explain(*sides, HOLD, uncertain=None, budget=20)
+        result = explain(WhyRequest(*sides, HOLD, uncertain=None, budget=20))
         assert result.gap > 0.1
         assert result.brought == 0.0
 
@@ -552,7 +564,7 @@ def test_an_integrator_is_found_behind_contact_too() -> None:
     raw = sm.load("so101/scene").replace()
     raw.raw.opt.integrator = 1  # RK4, which PyBullet does not have
     left, right = raw.replace(), quietly("so101/scene")
-    result = explain(left, right, HOLD, uncertain=None)
+    result = explain(WhyRequest(left, right, HOLD, uncertain=None))
     assert [part.name for part in result.found_in] == ["contact", "integrator"]
     chosen = result.found_in[1]
     assert chosen.share > 0.1
@@ -569,7 +581,7 @@ def test_an_integrator_is_found_behind_contact_too() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
     fresh = quietly("so101/scene", defaults="engine")
-    result = explain(fresh, fresh.replace(gravity=[0, 0, -9.81]), HOLD, uncertain=None)
+    result = explain(WhyRequest(fresh, fresh.replace(gravity=[0, 0, -9.81]), HOLD, uncertain=None))
     assert (list(shares(result)), result.brought) == (["gravity"], 0.0)
 
 
@@ -581,7 +593,7 @@ def test_files_and_settings_of_an_engine_are_explained_together(
     heavy: Any = arm.replace(mass=1.3 * arm.body_mass)
     heavy.save_binary(tmp_path / "heavy.mjb")
     right = quietly(str(tmp_path / "heavy.mjb"), defaults="engine", trust_binary=True)
-    result = explain(arm, right, HOLD, uncertain=None, budget=40)
+    result = explain(WhyRequest(arm, right, HOLD, uncertain=None, budget=40))
     assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
 

@@ -198,13 +198,13 @@ def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
     left_label, right_label = (side.label for side in sides)
     sides, given = with_options(sides, {**asked.options, **request.options})
     left, right = (side.load() for side in sides)
-    return why.explain(
+    question = why.WhyRequest(
         left,
         right,
         replace(asked, options=given),
-        recordings=[
+        recordings=tuple(
             for_left(t, model, request) for t, model in zip(traces, (left, right), strict=False)
-        ],
+        ),
         seconds=request.seconds,
         seed=request.seed,
         names=request.names,
@@ -215,8 +215,8 @@ def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
         labels=None if left_label == right_label else (left_label, right_label),
         uncertain=None if options.no_chaos else parse_uncertainty(options.uncertainty),
         jobs=options.jobs,
-        progress=progress,
     )
+    return why.explain(question, progress)
 
 
 OF_MODELS: tuple[Row, ...] = (

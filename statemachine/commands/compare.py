@@ -326,18 +326,20 @@ def _run_compare(
         why_not = "Next: another experiment, such as gravity or waves, may move what this does not."
     lead = leading(comparison, parts["floor"])
     why_not = why_not or NEXT.format(name=shlex.quote(name_of(lead.name)))
-    more: dict[str, Any] = {
-        "why_not": "" if comparison.ended or comparison.agrees else why_not  # the page says it
-    }
+    more = report.PageParts()
+    if not comparison.ended and not comparison.agrees:  # else the page says it
+        more = report.PageParts(why_not=why_not)
     if options.html:
-        more = questions.for_page(options, request, run.traces, comparison.ended)
+        more = report.PageParts(
+            **questions.for_page(options, request, run.traces, comparison.ended)
+        )
     page = report.page(
         comparison,
         said=run.said,
         run=run if with_sides else None,
         played=played,
         **parts,
-        **more,
+        parts=more,
     )
     if options.html:
         files.write_page(options, request, run.traces, page)

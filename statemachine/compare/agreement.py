@@ -5,7 +5,7 @@ And how far the fingertip of each is from a third party's: two that agree may bo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -15,7 +15,6 @@ import numpy as np
 from ..backends import load
 from ..errors import StateMachineError, TraceError
 from ..installed import WITNESS
-from ..interface import Array
 from ..kinematics import Kinematics, shared_joints
 from ..measures import (
     QUANTITIES,
@@ -27,24 +26,12 @@ from ..measures import (
     tolerance_of,
 )
 from ..measures.text import on
-from ..page import Figures
 from ..runs import Header, Trace, model_file
-from ..runs.header import model_files
+from ..runs.header import Provenance, model_files
 from .labels import labels_of, notes_on
-from .series import Series, at_the_end, default_tip, joint_columns, series, touches
+from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
-# Of the header of a run, what the JSON of a comparison has.
-_OF_RUN = [
-    "backend",
-    "label",
-    "experiment",
-    "timestep",
-    "defaults",
-    "recorded",
-    "ended",
-    "provenance",
-]
 
 
 @dataclass(frozen=True)
@@ -53,13 +40,16 @@ class Agreement:
 
     Attributes:
         name: What is compared.
-        kind: Which sort of quantity it is; unit: its SI unit.
-        max: The largest difference; at: when [s from the start].
-        rms: Root mean square of the difference over common time.
+        kind: Which sort of quantity it is.
+        unit: Its SI unit.
+        max: The largest difference [unit].
+        at: When that is [s from the start].
+        rms: Root mean square of the difference over common time [unit].
         settled: Mean of the difference over the last tenth of common time; of a force the
-            difference of the means.
+            difference of the means [unit].
         since: When it was first beyond the tolerance [s]; None if never.
-        tolerance: What does not matter; reason: why that much.
+        tolerance: What does not matter [unit].
+        reason: Why that much.
         verdict: "agrees" within tolerance always; "settles" beyond it on the way, but
             `settled` within; "differs" else.
         note: What the figures do not say, as which side never touched.
@@ -86,14 +76,39 @@ class Agreement:
         return np.inf if np.isnan(share) else share
 
 
+@dataclass(frozen=True)
+class RunFacts:
+    """What a run was, as the JSON of a comparison says it; all of it from the trace's header.
+
+    Attributes:
+        backend: What ran it.
+        label: Engine and version.
+        experiment: What was run.
+        timestep: From one row to the next [s].
+        defaults: "model", or "engine" for the engine as its own users meet it.
+        recorded: Whether the run was recorded before, and not made for this comparison.
+        ended: Why it ended before its time; "" if it did not.
+        provenance: What it was computed with.
+    """
+
+    backend: str
+    label: str
+    experiment: str
+    timestep: float
+    defaults: str
+    recorded: bool
+    ended: str
+    provenance: Provenance
+
+
 @dataclass(frozen=True, eq=False)
 class SideRun:
     """One side of a comparison.
 
     Attributes:
-        label: What tells it from the other: engine and version, or file, or options; short:
-            the same for tables.
-        trace: Its run; rows: how many rows it has; run: what JSON says of it.
+        label: What tells it from the other: engine and version, or file, or options.
+        short: The same for tables.
+        trace: Its run.
     """
 
     label: str
@@ -101,11 +116,23 @@ class SideRun:
     trace: Trace = field(repr=False, metadata={"json": False})
 
     @property
-    def run(self) -> Figures:
-        return Figures(**{name: getattr(self.trace.header, name) for name in _OF_RUN})
+    def run(self) -> RunFacts:
+        """What the run was."""
+        header = self.trace.header
+        return RunFacts(
+            backend=header.backend,
+            label=header.label,
+            experiment=header.experiment,
+            timestep=header.timestep,
+            defaults=header.defaults,
+            recorded=header.recorded,
+            ended=header.ended,
+            provenance=header.provenance,
+        )
 
     @property
     def rows(self) -> int:
+        """How many rows the trace has."""
         return len(self.trace)
 
 
@@ -114,9 +141,11 @@ class Comparison:
     """Two traces, compared.
 
     Attributes:
-        left, right: The sides; every difference is between them, none is the truth.
+        left: One side; every difference is between the two, none is the truth.
+        right: The other side.
         tip: The site that was compared; "" for none.
-        moments: How many moments were compared; until: the last of them [s].
+        moments: How many moments were compared.
+        until: The last of them [s].
         agreements: One for each quantity.
         notes: What makes the comparison less than one of two engines.
         touches: One for each pair of bodies that touches on either side.
@@ -130,7 +159,7 @@ class Comparison:
     until: float
     agreements: tuple[Agreement, ...]
     notes: tuple[str, ...]
-    touches: tuple[Figures, ...] = field(metadata={"json": False})
+    touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 
     @property
@@ -176,27 +205,34 @@ def compare(
     longest = max(left.timestep, right.timestep)
     agreements = []
     for curve in curves:
-        reach = max(_reach(left, curve), _reach(right, curve)) if curve.kind == "tip" else 0.0
+        reach = 0.0
+        if curve.kind == "tip":
+            reach = max(_reach(left, curve), _reach(right, curve))
         allowed = tolerance_of(curve.kind, curve.left, curve.right, reach, longest, tolerances)
-        agreements.append(_agreement(curve.name, curve.kind, curve.difference, curve.time,
-                                _settled(curve), allowed))  # fmt: skip
+        agreements.append(_agreement_of(curve, allowed))
     common = common_moments(left.time, right.time, (left.timestep, right.timestep))
     labels = labels_of(left.header, right.header)
     allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
-    agreements += _first_touches(left, right, pairs, float(common.time[-1]), allowed, labels.short)
+    until = float(common.time[-1])
+    for touch in pairs:
+        missed = _missed_touch(touch, left, right, labels.short)
+        agreements.append(_first_touch(touch, missed, until, allowed))
     strange = [
         f"{agreement.name}: {agreement.note}, so it cannot agree"
         for agreement in agreements
         if agreement.note.startswith("no number")
     ]
+    notes = notes_on(left, right, common, strange)
+    left_side = SideRun(labels.long[0], labels.short[0], left)
+    right_side = SideRun(labels.long[1], labels.short[1], right)
     return Comparison(
-        left=SideRun(labels.long[0], labels.short[0], left),
-        right=SideRun(labels.long[1], labels.short[1], right),
+        left=left_side,
+        right=right_side,
         tip=site,
-        moments=len(curves[0].time),
-        until=float(curves[0].time[-1]),
+        moments=len(common.time),
+        until=until,
         agreements=tuple(agreements),
-        notes=tuple(notes_on(left, right, common, strange)),
+        notes=tuple(notes),
         touches=pairs,
         curves=curves,
     )
@@ -220,27 +256,30 @@ def _reach(trace: Trace, curve: Series) -> float:
     return float(lengths[np.isfinite(lengths)].max(initial=0.0))
 
 
-def _agreement(
-    name: str, kind: str, apart: Array, time: Array, settled: float, allowed: Tolerance,
-    note: str = "",
-) -> Agreement:  # fmt: skip
-    """What a difference (n,) over time (n,) comes to; what has a note differs at any size."""
-    beyond = np.flatnonzero(~(apart <= allowed.value) | bool(note))  # NaN is not within
-    strange = int(np.count_nonzero(~np.isfinite(apart)))
-    note = f"no number at {strange} of {len(apart)} moments" if strange else note
+def _agreement_of(curve: Series, allowed: Tolerance) -> Agreement:
+    """Return what the difference of a quantity over time comes to."""
+    settled = _settled(curve)
+    beyond = np.flatnonzero(~(curve.difference <= allowed.value))  # NaN is not within
     verdict: Verdict = "agrees"
+    since = None
     if len(beyond):
-        verdict = "settles" if settled <= allowed.value and not note else "differs"
-    gap = Deviation.of(apart, time, QUANTITIES[kind].unit)
+        verdict = "settles" if settled <= allowed.value else "differs"
+        since = float(curve.time[beyond[0]])
+    note = ""
+    strange = int(np.count_nonzero(~np.isfinite(curve.difference)))
+    if strange:
+        note = f"no number at {strange} of {len(curve.difference)} moments"
+        verdict = "differs"
+    gap = Deviation.of(curve.difference, curve.time, QUANTITIES[curve.kind].unit)
     return Agreement(
-        name=name,
-        kind=kind,
+        name=curve.name,
+        kind=curve.kind,
         unit=gap.unit,
         max=gap.worst,
         at=gap.at,
         rms=gap.rms,
         settled=settled,
-        since=float(time[beyond[0]]) if len(beyond) else None,
+        since=since,
         tolerance=allowed.value,
         reason=allowed.reason,
         verdict=verdict,
@@ -248,30 +287,74 @@ def _agreement(
     )
 
 
-def _first_touches(
-    left: Trace, right: Trace, pairs: Sequence[Figures], until: float, allowed: Tolerance,
-    labels: tuple[str, str],
-) -> list[Agreement]:  # fmt: skip
-    """When each pair of bodies first touches, on either side."""
-    agreements = []
-    for touch in pairs:
-        first, note = [touch.left.first, touch.right.first], ""
-        known = [time for time in first if time is not None]
-        if len(known) == 1:  # as late as can be: it had not touched when the comparison ended
-            side = first.index(None)
-            known_pairs = same_pairs(
-                {touch.pair: None}, dict.fromkeys((left, right)[side].touches())
-            )
-            note = f"{'later' if touch.pair in known_pairs else 'never'} {on(labels[side])}"
-            known.append(until)
-        gap = abs(known[0] - known[1])
-        name, at = f"{touch.pair}, first touch", np.array([min(known)])
-        agreements.append(_agreement(name, "contact", np.array([gap]), at, gap, allowed, note))
-    return agreements
+def _missed_touch(touch: Touch, left: Trace, right: Trace, labels: tuple[str, str]) -> str:
+    """Say on which side a pair of bodies does not touch while they are compared; "" for neither."""
+    if touch.left.first is None:
+        trace, label = left, labels[0]
+    elif touch.right.first is None:
+        trace, label = right, labels[1]
+    else:
+        return ""
+    touching_later = same_pairs({touch.pair: None}, dict.fromkeys(trace.touches()))
+    when = "later" if touch.pair in touching_later else "never"
+    return f"{when} {on(label)}"
 
 
-def witness(left: Trace, right: Trace, path: Path | None = None) -> Figures | None:
-    """Pinocchio's forward kinematics of each trace's qpos, against the recorded site.
+def _first_touch(touch: Touch, missed: str, until: float, allowed: Tolerance) -> Agreement:
+    """Compare when a pair of bodies first touches.
+
+    Args:
+        touch: The pair.
+        missed: On which side it does not touch; "" for neither. Then it differs at any size, and
+            it touches there as late as can be: it had not when the comparison ended.
+        until: When that was [s].
+        allowed: What does not matter.
+    """
+    left_first = until if touch.left.first is None else touch.left.first
+    right_first = until if touch.right.first is None else touch.right.first
+    gap = abs(left_first - right_first)
+    at = min(left_first, right_first)
+    is_beyond = bool(missed) or not gap <= allowed.value
+    return Agreement(
+        name=f"{touch.pair}, first touch",
+        kind="contact",
+        unit=QUANTITIES["contact"].unit,
+        max=gap,
+        at=at,
+        rms=gap,
+        settled=gap,
+        since=at if is_beyond else None,
+        tolerance=allowed.value,
+        reason=allowed.reason,
+        verdict="differs" if is_beyond else "agrees",
+        note=missed,
+    )
+
+
+@dataclass(frozen=True)
+class WitnessResult:
+    """How far the fingertip of each side is from where a third party puts it.
+
+    Attributes:
+        by: The witness and its version.
+        site: Which site.
+        left: Largest distance at any row of the first trace [m].
+        right: Largest distance at any row of the second trace [m].
+        rows: How many poses were compared.
+        grade: "own reading" if the witness read the model's file with its own parser, "same
+            reading" if it computed from the numbers that the file was compiled to.
+    """
+
+    by: str
+    site: str
+    left: float
+    right: float
+    rows: int
+    grade: str
+
+
+def witness(left: Trace, right: Trace, path: Path | None = None) -> WitnessResult | None:
+    """Hold Pinocchio's forward kinematics of each trace's qpos against the recorded site.
 
     Args:
         left: A trace.
@@ -279,15 +362,9 @@ def witness(left: Trace, right: Trace, path: Path | None = None) -> Figures | No
         path: The model's file; by default the one that the headers name.
 
     Returns:
-        by: The witness and its version.
-        site: Which site.
-        left: Largest distance at any row of the first trace [m]; right: of the second.
-        rows: How many poses were compared.
-        grade: "own reading" if the witness read the model's file with its own parser, "same
-            reading" if it computed from the numbers that the file was compiled to.
-
-        None where Pinocchio is missing, where neither it nor an engine that is here can read
-        the model, and where the file that the traces were recorded with is not here.
+        The distances; None where Pinocchio is missing, where neither it nor an engine that is
+        here can read the model, and where the file that the traces were recorded with is not
+        here.
     """
     site = default_tip(left.header, right.header)
     if not site or "site_xpos" not in left or "site_xpos" not in right:
@@ -305,7 +382,7 @@ def witness(left: Trace, right: Trace, path: Path | None = None) -> Figures | No
             return None
     except StateMachineError:
         return None
-    return Figures(
+    return WitnessResult(
         by=f"{WITNESS} {kinematics.version}",
         site=site,
         left=first,

@@ -43,27 +43,37 @@ def labels_of(left: Header, right: Header) -> Labels:
     engines = left.label, right.label
     others = list(_apart(left, right))
     backends = left.backend, right.backend
-    own = [", engine defaults" * (header.defaults == "engine") for header in (left, right)]
-    ways = backends[0] + own[0], backends[1] + own[1]
-    # The first by which they differ.
-    short = next(
-        (right for right in (backends, ways, *others, engines) if right[0] != right[1]), ways
-    )
-    parts = [*([engines] if engines[0] != engines[1] or not others else []), *others]
+    with_defaults = _with_defaults(left), _with_defaults(right)
+    short = with_defaults
+    for names in (backends, with_defaults, *others, engines):
+        if names[0] != names[1]:
+            short = names
+            break
+    parts = others
+    if engines[0] != engines[1] or not others:
+        parts = [engines, *others]
     long = ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
     return Labels(numbered(long), numbered(short))
 
 
+def _with_defaults(header: Header) -> str:
+    """Return the backend of a run, and whether it kept its engine's defaults."""
+    if header.defaults == "engine":
+        return f"{header.backend}, engine defaults"
+    return header.backend
+
+
 def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterator[str]:
-    """A line for a side that has what the other has not: names by kind, as in `Matched.only`."""
-    for own, label in zip(only, labels, strict=True):
-        parts = [
-            # Where the other side has some over, too, they may be the same.
-            f"{kind}{'s' * (len(names) > 1)} {few(names, 6)}"
-            + " (--map LEFT=RIGHT)" * all(side.get(kind) for side in only)
-            for kind, names in own.items()
-            if names
-        ]
+    """Yield a line for a side that has what the other has not, as `Matched.only` tells it."""
+    unmatched_on_both = [kind for kind in only[0] if only[0].get(kind) and only[1].get(kind)]
+    for unmatched, label in zip(only, labels, strict=True):
+        parts = []
+        for kind, names in unmatched.items():
+            if names:
+                part = f"{kind if len(names) == 1 else f'{kind}s'} {few(names, 6)}"
+                if kind in unmatched_on_both:  # they may be the same
+                    part += " (--map LEFT=RIGHT)"
+                parts.append(part)
         if parts:
             yield f"only {label} has {'; '.join(parts)}: not compared"
 
@@ -83,14 +93,15 @@ def options_apart(left: Mapping[str, Any], right: Mapping[str, Any]) -> Two:
         for name in dict.fromkeys([*left, *right])
         if typed_option(name, left.get(name)) != typed_option(name, right.get(name))
     ]
-    texts = [
-        ", ".join(
-            typed_option(name, options[name]) if name in options else f"{name} of the file"
-            for name in differing
-        )
-        for options in (left, right)
-    ]
-    return texts[0], texts[1]
+    return _typed_options(differing, left), _typed_options(differing, right)
+
+
+def _typed_options(names: Iterable[str], options: Mapping[str, Any]) -> str:
+    """Return some options as they are typed, and which of them are left to the file."""
+    return ", ".join(
+        typed_option(name, options[name]) if name in options else f"{name} of the file"
+        for name in names
+    )
 
 
 def typed_option(name: str, value: Any) -> str:
@@ -111,18 +122,23 @@ def _apart(left: Header, right: Header) -> Iterator[Two]:
     elif a.model_sha256 != b.model_sha256:
         last = a.model_file.split("/")[-1]
         yield f"{last} ({a.model_sha256[:8]})", f"{last} ({b.model_sha256[:8]})"
-    options = options_apart(*(_with_known(*pair) for pair in ((left, right), (right, left))))
+    options = options_apart(_with_known(left, right), _with_known(right, left))
     if options[0] != options[1]:
         yield options
     if left.backend != right.backend or left.label != right.label:
         return
-    for name, values in (
-        ("", (left.experiment, right.experiment)),
-        ("from ", (left.keyframe or "the default state", right.keyframe or "the default state")),
-        ("seed ", (a.seed, b.seed)),
-    ):
-        if values[0] != values[1]:
-            yield f"{name}{values[0]}", f"{name}{values[1]}"
+    if left.experiment != right.experiment:
+        yield left.experiment, right.experiment
+    left_start, right_start = _start_of(left), _start_of(right)
+    if left_start != right_start:
+        yield f"from {left_start}", f"from {right_start}"
+    if a.seed != b.seed:
+        yield f"seed {a.seed}", f"seed {b.seed}"
+
+
+def _start_of(header: Header) -> str:
+    """Return where a run starts, in words."""
+    return header.keyframe or "the default state"
 
 
 def _with_known(header: Header, other: Header) -> dict[str, Any]:
@@ -141,12 +157,8 @@ def numbered(names: Two) -> Two:
     return names if names[0] != names[1] else (f"{names[0]} (first)", f"{names[1]} (second)")
 
 
-# A line, and whether it is to be said.
-Note = tuple[object, str]
-
-
 def notes_on(left: Trace, right: Trace, common: Common, of_quantities: Iterable[str]) -> list[str]:
-    """A line for each thing that a reader of the figures must know.
+    """Return a line for each thing that a reader of the figures must know.
 
     Args:
         left: A trace.
@@ -154,105 +166,115 @@ def notes_on(left: Trace, right: Trace, common: Common, of_quantities: Iterable[
         common: The moments that they share.
         of_quantities: What is to be said of single quantities.
     """
-    a, b = left.header, right.header
-    labels = labels_of(a, b).long
-    columns = dict.fromkeys(
-        what
-        for column, what in _COMPARED.items()
-        if not tell(left, right, column) and (column in left or column in right)
-    )
+    labels = labels_of(left.header, right.header).long
+    notes = list(_notes_on_files(left.header, right.header))
+    notes += _notes_on_joints(left, right, labels)
+    notes += _notes_on_columns(left, right)
+    notes += of_quantities
+    notes += _notes_on_experiments(left.header, right.header)
+    notes += _notes_on_time(left, right, common, labels)
+    notes += _notes_on_physics(left.header, right.header)
+    notes += _notes_on_commands(left, right, common)
+    notes += _notes_on_side(left, labels[0])
+    notes += _notes_on_side(right, labels[1])
+    return notes
+
+
+def _notes_on_files(left: Header, right: Header) -> Iterator[str]:
+    a, b = left.provenance, right.provenance
+    if a.model_sha256 != b.model_sha256:
+        yield f"the two sides use different model files: {a.model_file} and {b.model_file}"
+
+
+def _notes_on_joints(left: Trace, right: Trace, labels: Two) -> Iterator[str]:
+    ours, theirs = left.header.joint_labels, right.header.joint_labels
+    only = [f"{name} ({labels[0]})" for name in ours if name not in theirs]
+    only += [f"{name} ({labels[1]})" for name in theirs if name not in ours]
+    if only:
+        yield f"compared is what both have; missing on one side: {', '.join(only)}"
+    other_kind = []
+    start_differs = False
+    for name in ours:
+        if name not in theirs:
+            continue
+        here, there = joint_columns(left.header, name), joint_columns(right.header, name)
+        if here.kind is not there.kind:
+            other_kind.append(name)
+            continue
+        positions = left.qpos[0, here.qpos], right.qpos[0, there.qpos]
+        velocities = left.qvel[0, here.qvel], right.qvel[0, there.qvel]
+        if not (np.array_equal(*positions) and np.array_equal(*velocities)):
+            start_differs = True
+    if other_kind:
+        yield f"not compared, for they are joints of another kind: {', '.join(other_kind)}"
+    if start_differs:
+        yield "the runs do not start in the same state"
+
+
+def _notes_on_columns(left: Trace, right: Trace) -> Iterator[str]:
+    missing: dict[str, None] = {}
+    for column, what in _COMPARED.items():
+        if not tell(left, right, column) and (column in left or column in right):
+            missing[what] = None
+    if missing:
+        yield f"not compared, for one side does not tell it: {', '.join(missing)}"
+
+
+def _notes_on_experiments(left: Header, right: Header) -> Iterator[str]:
+    if left.experiment != right.experiment:
+        yield f"the experiments are two: {left.experiment} and {right.experiment}"
+
+
+def _notes_on_time(left: Trace, right: Trace, common: Common, labels: Two) -> Iterator[str]:
+    left_step, right_step = left.header.timestep, right.header.timestep
+    until = float(common.time[-1])
+    if left_step != right_step:
+        spacing = until / max(1, len(common.time) - 1)
+        yield (
+            f"timesteps differ, {significant(1000 * left_step)} and {milliseconds(right_step)}, "
+            f"and meet every {milliseconds(spacing, 3)}: compared are these common moments alone, "
+            "nothing is interpolated, and a peak between two of them is not seen"
+        )
+    left_end = float(left.time[-1] - left.time[0])
+    right_end = float(right.time[-1] - right.time[0])
+    if abs(left_end - right_end) > max(left_step, right_step) * (1 + SAME):
+        longer = labels[1] if right_end > left_end else labels[0]
+        yield (
+            f"the runs are {left_end:g} and {right_end:g} s long: what {longer} does after "
+            f"{until:g} s is not compared"
+        )
+
+
+def _notes_on_physics(left: Header, right: Header) -> Iterator[str]:
+    if not np.allclose(left.gravity, right.gravity, rtol=0, atol=1e-12):
+        yield f"gravity differs: {numbers(left.gravity)} and {numbers(right.gravity)} m/s²"
+    if any(header.defaults == "engine" and header.energy_by for header in (left, right)):
+        yield (
+            "energy is measured by one yardstick on both sides, masses, armature and gravity of "
+            f"the model ({left.energy_by or right.energy_by}), whatever an engine itself has"
+        )
+
+
+def _notes_on_commands(left: Trace, right: Trace, common: Common) -> Iterator[str]:
+    if left.header.actuators != right.header.actuators:
+        yield "the actuators differ, in name or in order"
+        return
     # The command of a last row is never carried out.
     used = (common.left < len(left) - 1) & (common.right < len(right) - 1)
-    commands = left.ctrl[common.left[used]], right.ctrl[common.right[used]]
-    same = a.actuators == b.actuators
-    notes: list[Note] = [
-        (
-            a.provenance.model_sha256 != b.provenance.model_sha256,
-            f"the two sides use different model files: {a.provenance.model_file} and "
-            f"{b.provenance.model_file}",
-        ),
-        *_of_joints(left, right, labels),
-        (columns, f"not compared, for one side does not tell it: {', '.join(columns)}"),
-        *((True, line) for line in of_quantities),
-        (
-            a.experiment != b.experiment,
-            f"the experiments are two: {a.experiment} and {b.experiment}",
-        ),
-        *_of_time(left, right, common, labels),
-        (
-            not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12),
-            f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²",
-        ),
-        (
-            any(header.defaults == "engine" and header.energy_by for header in (a, b)),
-            "energy is measured by one yardstick on both sides, masses, armature and gravity of "
-            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has",
-        ),
-        (not same, "the actuators differ, in name or in order"),
-        (
-            same and not np.array_equal(*commands),
-            "the commands differ: the controllers saw different states, or are two",
-        ),
-    ]
-    for trace, label in zip((left, right), labels, strict=True):
-        header, inside = trace.header, few(trace.overlaps)
-        notes += [
-            (inside, f"{label} starts with shapes inside each other: {inside}"),
-            (header.ended, f"{label} ended early: {header.ended}"),
-            (
-                header.rewritten,
-                f"{label}: in {header.rewritten} rows the state was written, by the "
-                "controller; that is not part of the commands",
-            ),
-            (
-                header.single,
-                f"the recorded run of {header.backend} keeps all but its state in single precision",
-            ),
-        ]
-    return [line for said, line in notes if said]
+    if not np.array_equal(left.ctrl[common.left[used]], right.ctrl[common.right[used]]):
+        yield "the commands differ: the controllers saw different states, or are two"
 
 
-def _of_joints(left: Trace, right: Trace, labels: Two) -> list[Note]:
-    a, b = left.header, right.header
-    only = [
-        f"{name} ({label})"
-        for header, other, label in ((a, b, labels[0]), (b, a, labels[1]))
-        for name in header.joint_labels
-        if name not in other.joint_labels
-    ]
-    shared = {
-        name: [joint_columns(header, name) for header in (a, b)]
-        for name in a.joint_labels
-        if name in b.joint_labels
-    }
-    other = [name for name, (x, y) in shared.items() if x.kind is not y.kind]
-    moved = any(
-        not np.array_equal(left.qpos[0, x.qpos], right.qpos[0, y.qpos])
-        or not np.array_equal(left.qvel[0, x.qvel], right.qvel[0, y.qvel])
-        for x, y in shared.values()
-        if x.kind is y.kind
-    )
-    return [
-        (only, f"compared is what both have; missing on one side: {', '.join(only)}"),
-        (other, f"not compared, for they are joints of another kind: {', '.join(other)}"),
-        (moved, "the runs do not start in the same state"),
-    ]
-
-
-def _of_time(left: Trace, right: Trace, common: Common, labels: Two) -> list[Note]:
-    steps = [trace.header.timestep for trace in (left, right)]
-    apart = float(common.time[-1]) / max(1, len(common.time) - 1)
-    ends = [float(trace.time[-1] - trace.time[0]) for trace in (left, right)]
-    return [
-        (
-            steps[0] != steps[1],
-            f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}, and "
-            f"meet every {milliseconds(apart, 3)}: compared are these common moments alone, "
-            "nothing is interpolated, and a peak between two of them is not seen",
-        ),
-        (
-            abs(ends[0] - ends[1]) > max(steps) * (1 + SAME),
-            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {labels[ends[1] > ends[0]]} "
-            f"does after {common.time[-1]:g} s is not compared",
-        ),
-    ]
+def _notes_on_side(trace: Trace, label: str) -> Iterator[str]:
+    header, overlaps = trace.header, few(trace.overlaps)
+    if overlaps:
+        yield f"{label} starts with shapes inside each other: {overlaps}"
+    if header.ended:
+        yield f"{label} ended early: {header.ended}"
+    if header.rewritten:
+        yield (
+            f"{label}: in {header.rewritten} rows the state was written, by the controller; that "
+            "is not part of the commands"
+        )
+    if header.single:
+        yield f"the recorded run of {header.backend} keeps all but its state in single precision"

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..backends.actuators import ctrl_owners
 from ..engines import room
 from ..engines.description.match import Matching, Pair, match, renamed
 from ..engines.description.records import Robot
@@ -21,8 +22,8 @@ from ..engines.description.tree import GroupTree
 from ..engines.records import BodyPair, Counterparts, Pairs
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
-from ..interface import INPUTS, Array, Model, State
-from ..rotations import HERE
+from ..interface import Array, Model, State
+from ..rotations import HERE, Placement
 from ..runs import SideStart
 
 Only = Mapping[str, tuple[str, ...]]
@@ -55,9 +56,9 @@ class Matched(Counterparts):
     @property
     def joints_elsewhere(self) -> bool:
         """Whether who reads qpos or qvel by number meets other joints on the second."""
+        here, there = self.left, self.right
         return any(
-            self.left.jnt_qposadr[a] != self.right.jnt_qposadr[b]
-            or self.left.jnt_dofadr[a] != self.right.jnt_dofadr[b]
+            here.jnt_qposadr[a] != there.jnt_qposadr[b] or here.jnt_dofadr[a] != there.jnt_dofadr[b]
             for a, b in self.joints
         )
 
@@ -70,7 +71,9 @@ class Matched(Counterparts):
     def start(self, left: SideStart, right: SideStart) -> SideStart:
         """The start of the first Model in the second's terms; the rest is that of `right`."""
         return SideStart(
-            **{part: self.moved(part, getattr(left, part), getattr(right, part)) for part in INPUTS}
+            qpos=self.moved("qpos", left.qpos, right.qpos),
+            qvel=self.moved("qvel", left.qvel, right.qvel),
+            ctrl=self.moved("ctrl", left.ctrl, right.ctrl),
         )
 
     def state(self, left: State, right: State) -> State:
@@ -101,21 +104,27 @@ class Matched(Counterparts):
 
         Activations are of actuators that have as many of them.
         """
-        compiled: tuple[Any, Any] = self.left.compiled, self.right.compiled
-        left, right = compiled
-        led = [
-            (int(left.body_mocapid[pair.left]), int(right.body_mocapid[pair.right]))
-            for pair in self.solids
-            if left.body_mocapid[pair.left] >= 0 <= right.body_mocapid[pair.right]
-        ]
+        left, right = self.left.compiled, self.right.compiled
+        activations: Iterable[tuple[int, int]] = ()
+        if left is not None and right is not None:
+            activations = _activations(self.actuators, left, right)
+        mocap_bodies = list(self._mocap_bodies())
         return {
             "qpos": self._spans("jnt_qposadr", "nq"),
             "qvel": self._spans("jnt_dofadr", "nv"),
             "ctrl": _ends(self.actuators),
-            "act": _ends(_activations(self.actuators, left, right) if None not in compiled else ()),
-            "mocap_pos": _ends((3 * a + k, 3 * b + k) for a, b in led for k in range(3)),
-            "mocap_quat": _ends((4 * a + k, 4 * b + k) for a, b in led for k in range(4)),
+            "act": _ends(activations),
+            "mocap_pos": _ends(_entries(mocap_bodies, 3)),
+            "mocap_quat": _ends(_entries(mocap_bodies, 4)),
         }
+
+    def _mocap_bodies(self) -> Iterator[tuple[int, int]]:
+        """Yield the numbers of mocap bodies, as `body_mocapid` has them, that are counterparts."""
+        for pair in self.solids:
+            here = int(self.left.compiled.body_mocapid[pair.left])
+            there = int(self.right.compiled.body_mocapid[pair.right])
+            if here >= 0 and there >= 0:
+                yield here, there
 
     def _spans(self, start: str, end: str) -> list[list[int]]:
         """The places of the joints of both, in qpos or qvel."""
@@ -127,15 +136,21 @@ class Matched(Counterparts):
         return places
 
 
+def _entries(bodies: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
+    """Yield the places of so many numbers of each body, which stand one after the other."""
+    for here, there in bodies:
+        for k in range(size):
+            yield size * here + k, size * there + k
+
+
 def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
+    """Return the left ends of some pairs, and the right ones."""
     both = list(pairs)
     return [[a for a, _ in both], [b for _, b in both]]
 
 
 def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
     """Pairs of places in act."""
-    from ..backends.actuators import ctrl_owners
-
     owner = ctrl_owners(left), ctrl_owners(right)
     pairs: set[tuple[int, int]] = set()
     for a, b in actuators:
@@ -159,7 +174,7 @@ def match_models(left: Model, right: Model, names: Mapping[str, str] | None = No
         UnknownNameError: A name that was given is not there.
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
-    given = dict(names or {})
+    given = {} if names is None else dict(names)
     robots = [_description(model) for model in (left, right)]
     for side, model in enumerate((left, right)):
         known = robots[side].names | {name for name in model.actuator_names if name}
@@ -170,37 +185,46 @@ def match_models(left: Model, right: Model, names: Mapping[str, str] | None = No
     ours = {a: b for a, b in given.items() if a in robots[0].names}
     trees = [GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])]
     matching = match(trees[0], trees[1], one_world=all(robot.rooted for robot in robots))
-    moving = [
-        (p.left.joint, p.right.joint) for p in matching.pairs if p.left.joint and p.right.joint
-    ]
-    joints = tuple(sorted((a.number, b.number) for a, b in moving if a.kind == b.kind))
+    joints = _joints(matching)
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.left: solid for solid in map(_solid, matching.pairs)}
     solids = (*by_body.values(), *_led(left, right, given))
+    by_name = _by_name(left.body_names, right.body_names, given)
+    bodies = _and_further(((solid.left, solid.right) for solid in solids), by_name)
     sites = _sites(left, right, given, matching, trees)
     actuators = _actuators(left, right, joints, given)
-    only = tuple(
-        {
-            "joint": _rest(model.joint_names, joints, k),
-            "actuator": _rest(model.actuator_names, actuators, k),
-            "site": _rest(model.site_names, sites, k),
-        }
-        for k, model in enumerate((left, right))
-    )
+    only_left = _only(left, 0, joints, actuators, sites)
+    only_right = _only(right, 1, joints, actuators, sites)
     return Matched(
         left=left,
         right=right,
         joints=joints,
-        bodies=_and_further(
-            ((solid.left, solid.right) for solid in solids),
-            _by_name(left.body_names, right.body_names, given),
-        ),
+        bodies=bodies,
         sites=sites,
         actuators=actuators,
         solids=solids,
-        only=(only[0], only[1]),
+        only=(only_left, only_right),
         notes=(*matching.notes(), *_by_place(left, right, sites, actuators, given)),
     )
+
+
+def _joints(matching: Matching) -> Pairs:
+    """Return the joints of counterparts that are of one kind."""
+    joints = []
+    for pair in matching.pairs:
+        here, there = pair.left.joint, pair.right.joint
+        if here and there and here.kind == there.kind:
+            joints.append((here.number, there.number))
+    return tuple(sorted(joints))
+
+
+def _only(model: Model, side: int, joints: Pairs, actuators: Pairs, sites: Pairs) -> Only:
+    """Return what has no counterpart: the names of one of two Models, 0 or 1."""
+    return {
+        "joint": _rest(model.joint_names, joints, side),
+        "actuator": _rest(model.actuator_names, actuators, side),
+        "site": _rest(model.site_names, sites, side),
+    }
 
 
 def match_alike(left: Model, right: Model) -> Matched:
@@ -250,13 +274,17 @@ def _led(left: Model, right: Model, given: Mapping[str, str]) -> list[BodyPair]:
 
     Those without a name in both are one where as many others come before them.
     """
-    bodies = [np.flatnonzero(model.compiled.body_mocapid >= 0).tolist() for model in (left, right)]
-    ours, theirs = (
-        [m.body_names[b] for b in own] for m, own in zip((left, right), bodies, strict=True)
-    )
+    left_bodies, right_bodies = _mocap_bodies_of(left), _mocap_bodies_of(right)
+    ours = [left.body_names[body] for body in left_bodies]
+    theirs = [right.body_names[body] for body in right_bodies]
     nameless = [(k, k) for k, names in enumerate(zip(ours, theirs, strict=False)) if not any(names)]
     pairs = sorted([*_by_name(ours, theirs, given), *nameless])
-    return [BodyPair(bodies[0][a], bodies[1][b], HERE, False) for a, b in pairs]
+    return [BodyPair(left_bodies[a], right_bodies[b], HERE, False) for a, b in pairs]
+
+
+def _mocap_bodies_of(model: Model) -> list[int]:
+    """Return the ids of the mocap bodies of a Model."""
+    return np.flatnonzero(model.compiled.body_mocapid >= 0).tolist()
 
 
 def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str]) -> Pairs:
@@ -278,26 +306,30 @@ def _sites(
     trees: Sequence[GroupTree],
 ) -> Pairs:
     """By name, then by place: of what is left, those in one place of the same solid."""
-    places = [
-        [
-            (number, at @ frame.place)
-            for frame in tree.robot.frames
-            for number, at in [tree.at[frame.link]]
-        ]
-        for tree in trees
-    ]
+    left_places, right_places = _frame_places(trees[0]), _frame_places(trees[1])
 
-    def in_one_place(sites: tuple[int, int]) -> bool:
-        (number, place), (there, other) = places[0][sites[0]], places[1][sites[1]]
+    def in_one_place(site: int, other: int) -> bool:
+        (number, place), (other_number, other_place) = left_places[site], right_places[other]
         pair = matching.of(number)
-        if pair is None or there != pair.right.number:
+        if pair is None or other_number != pair.right.number:
             return False
-        return (pair.align @ place).distance(other) < _ONE_PLACE
+        return (pair.align @ place).distance(other_place) < _ONE_PLACE
 
-    places_of = product(range(left.nsite), range(right.nsite))
-    return _and_further(
-        _by_name(left.site_names, right.site_names, given), filter(in_one_place, places_of)
+    by_place = (
+        (site, other)
+        for site, other in product(range(left.nsite), range(right.nsite))
+        if in_one_place(site, other)
     )
+    return _and_further(_by_name(left.site_names, right.site_names, given), by_place)
+
+
+def _frame_places(tree: GroupTree) -> list[tuple[int, Placement]]:
+    """Return for each frame of a robot the number of its solid, and where it is in that."""
+    places = []
+    for frame in tree.robot.frames:
+        number, at = tree.at[frame.link]
+        places.append((number, at @ frame.place))
+    return places
 
 
 def _actuators(left: Model, right: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..backends.starts import asleep_from_the_start
-from ..errors import BadInputError, EngineError, EngineWarning, TraceError, refuse
+from ..errors import BadInputError, EngineError, EngineWarning, TraceError
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import amount, common_moments, same_pairs
 from ..processes.parallel import forks_for, in_forks
@@ -82,13 +82,10 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
     for word in words:
         value, unit = amount(word)
         kind = {"m": "length", "rad": "angle"}.get(unit, "")
-        refuse(
-            (
-                not kind or np.isnan(value),
-                f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}",
-            ),
-            (kind in sizes, f"the {kind} that is uncertain is given twice: {word!r}"),
-        )
+        if not kind or np.isnan(value):
+            raise BadInputError(f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}")
+        if kind in sizes:
+            raise BadInputError(f"the {kind} that is uncertain is given twice: {word!r}")
         sizes[kind] = value
     return Uncertainty(**sizes)
 
@@ -259,7 +256,9 @@ class Band:
     """The chaos floor of one quantity of a comparison.
 
     Attributes:
-        name, kind, unit: Of the Agreement of the two sides.
+        name: Of the quantity, as in the Agreement of the two sides.
+        kind: Which sort of quantity it is.
+        unit: Its SI unit.
         most: The largest width of the band, in the unit.
         end: The width at the last moment.
         inside_from: The time from which on the gap between the two sides lies inside [s]; None if
@@ -491,6 +490,7 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
     """
     outside = np.flatnonzero(~(gap <= width))
     last = int(outside[-1]) + 1 if len(outside) else 0
+    inside_from = float(moments[last]) if last < len(moments) else None
     chance: Chance | None = None
     if agreement.verdict != "agrees":
         chance = _chance_of(gap, width, agreement.tolerance, at_the_end(moments))
@@ -500,7 +500,7 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
         unit=agreement.unit,
         most=float(width.max()),
         end=float(width[-1]),
-        inside_from=float(moments[last]) if last < len(moments) else None,
+        inside_from=inside_from,
         chance=chance,
         width=width,
     )

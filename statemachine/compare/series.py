@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..interface import Array, Ints, JointType, usual_site
 from ..measures import QUANTITIES, SAME, common_moments, distances, same_pairs
-from ..page import Figures
 from ..rotations import angle_between, matrix_from_quat
 from ..runs import Header, Trace
 
@@ -86,23 +85,52 @@ def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
             curves += _joint(name, time, sides)
     site = default_tip(left.header, right.header) if tip is None else tip
     if site and tell(left, right, "site_xpos") and tell(left, right, "site_xmat"):
-        (p, r), (q, s) = ([part[rows] for part in trace.site(site)] for trace, rows in sides)
-        curves.append(_curve(f"{site}, position", "tip", time, p, q))
-        curves.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
+        curves += _site(site, time, sides)
     if tell(left, right, "energy"):
-        # From that of the start, where a mass of another file has another height.
-        totals = (trace["energy"].sum(axis=1) for trace, _ in sides)
-        changes = (t[rows] - t[0] for t, (_, rows) in zip(totals, sides, strict=True))
-        curves.append(_curve("energy", "energy", time, *changes))
+        curves.append(_curve("energy", "energy", time, *_energy_changes(sides)))
     if tell(left, right, "contact_force"):
-        forces = [normal_forces(left), normal_forces(right)]
-        forces[1] = same_pairs(forces[0], forces[1])
-        for pair in dict.fromkeys([*forces[0], *forces[1]]):
-            values = (
-                force.get(pair, np.zeros(len(trace)))[rows]
-                for force, (trace, rows) in zip(forces, sides, strict=True)
-            )
-            curves.append(_curve(f"{pair}{NORMAL}", "force", time, *values))
+        curves += _normal_forces_of_pairs(time, sides)
+    return curves
+
+
+def _site(site: str, time: Array, sides: Sides) -> list[Series]:
+    """Compare position and rotation of a site."""
+    positions, rotations = [], []
+    for trace, rows in sides:
+        position, rotation = trace.site(site)
+        positions.append(position[rows])
+        rotations.append(rotation[rows])
+    return [
+        _curve(f"{site}, position", "tip", time, *positions),
+        _turned(f"{site}, rotation", "tip rotation", time, *rotations),
+    ]
+
+
+def _energy_changes(sides: Sides) -> list[Array]:
+    """Return by how much (n,) the energy of each side has changed since its start [J].
+
+    A mass may have another height in another file, so that energies themselves differ.
+    """
+    changes = []
+    for trace, rows in sides:
+        total = trace["energy"].sum(axis=1)
+        changes.append(total[rows] - total[0])
+    return changes
+
+
+def _normal_forces_of_pairs(time: Array, sides: Sides) -> list[Series]:
+    """Compare the normal force of each pair of bodies that touches on either side."""
+    (left, left_rows), (right, right_rows) = sides
+    left_forces = normal_forces(left)
+    right_forces = same_pairs(left_forces, normal_forces(right))
+    curves = []
+    for pair in dict.fromkeys([*left_forces, *right_forces]):
+        left_force = left_forces.get(pair, np.zeros(len(left)))
+        right_force = right_forces.get(pair, np.zeros(len(right)))
+        curve = _curve(
+            f"{pair}{NORMAL}", "force", time, left_force[left_rows], right_force[right_rows]
+        )
+        curves.append(curve)
     return curves
 
 
@@ -130,17 +158,21 @@ def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
     if kind is JointType.FREE:
         curves.append(_curve(f"{name}, position", "body", time, *(side[:, :3] for side in values)))
     with np.errstate(invalid="ignore"):  # all zero is not a rotation: NaN, which never agrees
-        turned = (
-            matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
-            for q in values
-        )
-        curves.append(_turned(f"{name}, rotation", "body rotation", time, *turned))
+        rotations = [matrix_from_quat(_unit_length(side[:, -4:])) for side in values]
+        curves.append(_turned(f"{name}, rotation", "body rotation", time, *rotations))
     return curves
+
+
+def _unit_length(quats: Array) -> Array:
+    """Return quaternions (n, 4), scaled to unit length."""
+    return quats / np.linalg.norm(quats, axis=1, keepdims=True)
 
 
 def default_tip(*headers: Header) -> str:
     """The site that all have: gripperframe, else the last one; "" if they share none."""
-    shared = [s for s in headers[0].sites if s and all(s in header.sites for header in headers)]
+    shared = [site for site in headers[0].sites if site]
+    for header in headers[1:]:
+        shared = [site for site in shared if site in header.sites]
     tip = usual_site(shared)
     return "" if tip is None else shared[tip]
 
@@ -190,42 +222,65 @@ def tell(left: Trace, right: Trace, column: str) -> bool:
     )
 
 
-_NEVER = Figures(
-    first=None, last=None, share=0.0, force=0.0, total=0.0, ends=False, deepest=0.0, deepest_at=0.0
-)
+@dataclass(frozen=True)
+class PairContacts:
+    """The contacts of one pair of bodies on one side.
 
+    The defaults are those of a pair that never touches.
 
-def touches(left: Trace, right: Trace) -> tuple[Figures, ...]:
-    """Every pair of bodies that touches on either side; none if a trace does not tell.
-
-    Returns:
-        The pair, and `left` and `right`, its contacts on each side; see `_contacts`.
+    Attributes:
+        first: When they first touch [s from the start]; None if never.
+        last: When they last touch [s from the start]; None if never.
+        share: Of the moments, in how many they touch, 0 to 1.
+        force: Mean of the summed normal forces over the last tenth of the run [N].
+        ends: Whether they touch at the last moment.
+        total: As `force`, of the length of the whole force, friction and all, added as vectors
+            [N].
+        deepest: How far one shape is in the other at most [m].
+        deepest_at: When that is [s from the start].
     """
+
+    first: float | None = None
+    last: float | None = None
+    share: float = 0.0
+    force: float = 0.0
+    ends: bool = False
+    total: float = 0.0
+    deepest: float = 0.0
+    deepest_at: float = 0.0
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A pair of bodies that touches on at least one of two sides.
+
+    Attributes:
+        pair: The names of the bodies, as "gripper on floor".
+        left: Its contacts on the left side.
+        right: Its contacts on the right side.
+    """
+
+    pair: str
+    left: PairContacts
+    right: PairContacts
+
+
+def touches(left: Trace, right: Trace) -> tuple[Touch, ...]:
+    """Return every pair of bodies that touches on either side; none if a trace does not tell."""
     if "contact_row" not in left or "contact_row" not in right:
         return ()
     until = float(common_moments(left.time, right.time, (left.timestep, right.timestep)).time[-1])
     left_contacts = _contacts(left, until)
     right_contacts = same_pairs(left_contacts, _contacts(right, until))
+    never = PairContacts()
     return tuple(
-        Figures(
-            pair=pair, left=left_contacts.get(pair, _NEVER), right=right_contacts.get(pair, _NEVER)
-        )
+        Touch(pair, left_contacts.get(pair, never), right_contacts.get(pair, never))
         for pair in left_contacts | right_contacts
     )
 
 
-def _contacts(trace: Trace, until: float) -> dict[str, Figures]:
-    """Contacts by pair of bodies, up to a moment [s from the start].
-
-    Returns:
-        first: When they first touch [s from the start]; None if never.
-        last: When they last touch.
-        share: Of the moments, in how many they touch, 0 to 1.
-        force: Mean of the summed normal forces over the last tenth of the run [N].
-        total: The same of the length of the whole force, friction and all, added as vectors.
-        ends: Whether they touch at the last moment.
-        deepest: How far one shape is in the other at most [m]; deepest_at: when [s].
-    """
+def _contacts(trace: Trace, until: float) -> dict[str, PairContacts]:
+    """Return the contacts of a trace by pair of bodies, up to a moment [s from the start]."""
     time = trace.time - trace.time[0]
     time = time[time <= until + SAME * trace.header.timestep]
     tail = np.flatnonzero(time >= until * (1 - SETTLED) - SAME * trace.header.timestep)
@@ -235,18 +290,40 @@ def _contacts(trace: Trace, until: float) -> dict[str, Figures]:
         rows = touching[: len(time)].nonzero()[0]
         if not len(rows):
             continue
-        places = trace.contact_pairs[pair]
-        places = places[trace["contact_row"][places] < len(time)]
-        distance = np.nan_to_num(trace["contact_dist"][places])
-        deepest = int(np.argmin(distance))
-        contacts[pair] = Figures(
-            first=float(time[rows[0]]),
-            last=float(time[rows[-1]]),
-            share=len(rows) / len(time),
-            force=float(np.nan_to_num(forces[pair][tail]).mean()),
-            ends=bool(rows[-1] == len(time) - 1),
-            total=float(np.nan_to_num(totals[pair][tail]).mean()),
-            deepest=max(0.0, -float(distance[deepest])),
-            deepest_at=float(time[trace["contact_row"][places[deepest]]]),
+        deepest, deepest_at = _deepest_overlap(trace, pair, time)
+        first_row, last_row = int(rows[0]), int(rows[-1])
+        force = _mean_force(forces[pair], tail)
+        total = _mean_force(totals[pair], tail)
+        share = len(rows) / len(time)
+        contacts[pair] = PairContacts(
+            first=float(time[first_row]),
+            last=float(time[last_row]),
+            share=share,
+            force=force,
+            ends=last_row == len(time) - 1,
+            total=total,
+            deepest=deepest,
+            deepest_at=deepest_at,
         )
     return contacts
+
+
+def _deepest_overlap(trace: Trace, pair: str, time: Array) -> tuple[float, float]:
+    """Return how far one shape of a pair of bodies is in the other at most [m], and when [s].
+
+    Args:
+        trace: The run.
+        pair: The bodies, which touch at one of the moments.
+        time: (n,) of the first n rows, since the start [s]; later ones do not count.
+    """
+    places = trace.contact_pairs[pair]
+    rows = trace["contact_row"][places]
+    places, rows = places[rows < len(time)], rows[rows < len(time)]
+    distance = np.nan_to_num(trace["contact_dist"][places])
+    deepest = int(np.argmin(distance))
+    return max(0.0, -float(distance[deepest])), float(time[rows[deepest]])
+
+
+def _mean_force(forces: Array, rows: Ints) -> float:
+    """Return the mean of forces (n,) [N] over some rows; what is not a number counts as zero."""
+    return float(np.nan_to_num(forces[rows]).mean())

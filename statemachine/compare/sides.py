@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 
 from ..backends import BackendChoice, backend_names, load_to_run, parse_backend
 from ..engines import room
-from ..errors import BadInputError, StateMachineError, check_name, refuse, shown, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
 from ..measures.text import command, listed
@@ -111,17 +111,21 @@ class TakenParts:
         """
         giver = load_to_run(self.of.file, menagerie=self.of.menagerie)
         matched = match_models(giver, model, self.names)
-        pairs = {"joint": matched.joints, "body": matched.bodies, "site": matched.sites}
         names = {
-            kind: {
-                getattr(giver, f"{kind}_names")[a]: getattr(model, f"{kind}_names")[b]
-                for a, b in of_kind
-            }
-            for kind, of_kind in pairs.items()
+            "joint": _renamed(giver.joint_names, model.joint_names, matched.joints),
+            "body": _renamed(giver.body_names, model.body_names, matched.bodies),
+            "site": _renamed(giver.site_names, model.site_names, matched.sites),
         }
         return model.with_compiled(
             room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
         )
+
+
+def _renamed(
+    names: Sequence[str], others: Sequence[str], pairs: Iterable[tuple[int, int]]
+) -> dict[str, str]:
+    """Return by what other name each thing goes that has a counterpart."""
+    return {names[here]: others[there] for here, there in pairs}
 
 
 def with_options(
@@ -139,8 +143,13 @@ def with_options(
         for name in left
         if name in right and np.array_equal(left[name], right[name])
     }
-    own = [{name: o[name] for name in o if name not in both} for o in (left, right)]
-    return [replace(side, options=o) for side, o in zip(sides, own, strict=True)], both
+    return [_without(sides[0], left, both), _without(sides[1], right, both)], both
+
+
+def _without(side: Side, options: Mapping[str, Any], common: Mapping[str, Any]) -> Side:
+    """Return a side with those of some options that are not among the common ones."""
+    own = {name: value for name, value in options.items() if name not in common}
+    return replace(side, options=own)
 
 
 def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side]:
@@ -179,9 +188,11 @@ def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side
 def _split_options(word: str) -> tuple[str, list[str]]:
     """A side's word, and the options behind it; a file's name may have spaces."""
     texts: list[str] = []
-    while not Path(word).exists() and (found := _LAST_OPTION.search(word)):
-        texts.insert(0, found[1])
-        word = word[: found.start()]
+    option = _LAST_OPTION.search(word)
+    while option is not None and not Path(word).exists():
+        texts.insert(0, option[1])
+        word = word[: option.start()]
+        option = _LAST_OPTION.search(word)
     return word.strip(), texts
 
 
@@ -203,22 +214,16 @@ def _refuse_mistyped(word: str) -> None:
     Raises:
         BadInputError: It reads as FILE@, FILE:ENGINE, FILE,FILE or the name of an option.
     """
-    parts, (before, _, after) = word.split(","), word.rpartition(":")
-    refuse(
-        (
-            word.endswith("@") and len(word) > 1,
-            f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}",
-        ),
-        (
-            before and after in backend_names(),
-            f"an engine stands behind an @: type {before}@{after}",
-        ),
-        (
-            len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")),
-            f"two sides are two words: type {' '.join(parts)}",
-        ),
-        (word in OPTIONS, f"{word} is an option of a side: type {word}=VALUE"),
-    )
+    if word.endswith("@") and len(word) > 1:
+        raise BadInputError(f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}")
+    before, _, after = word.rpartition(":")
+    if before and after in backend_names():
+        raise BadInputError(f"an engine stands behind an @: type {before}@{after}")
+    parts = word.split(",")
+    if len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")):
+        raise BadInputError(f"two sides are two words: type {' '.join(parts)}")
+    if word in OPTIONS:
+        raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
 
 
 def _option(text: str) -> tuple[str, Any]:
@@ -251,8 +256,8 @@ class Request:
         what: Name of an experiment, FILE.py:FUNCTION, or one or two files of traces.
         backends: The two backends, as `parse_backend` reads them; of one trace the one that is
             not its own is taken.
-        model: Instead of the experiment's own, or a trace's; menagerie: where its name is looked
-            up.
+        model: Instead of the experiment's own, or a trace's.
+        menagerie: Where its name is looked up.
         seconds: Instead of the experiment's own time [s].
         seed: Of an experiment that draws something.
         options: For `Model.replace`, on both sides.
@@ -278,13 +283,15 @@ class Request:
     @property
     def is_traces(self) -> bool:
         """Whether files were named, not an experiment."""
-        return any(map(is_trace, self.what))
+        return any(is_trace(word) for word in self.what)
 
     @property
     def words(self) -> list[str]:
         """What is run, and the model if one is said, as one types them, without folders."""
-        models = [_typed(model) for model in [self.model] if model]
-        return [*(Path(word).name for word in self.what), *models]
+        words = [Path(word).name for word in self.what]
+        if self.model:
+            words.append(_typed(self.model))
+        return words
 
     @property
     def taken(self) -> tuple[str, ...]:
@@ -304,9 +311,10 @@ class Request:
         """
         if self.sides:
             return self.sides
+        backends = [parse_backend(word) for word in self.backends]
         return [
             Side(self.model or model, backend.name, backend.defaults, {}, self.menagerie)
-            for backend in map(parse_backend, self.backends)
+            for backend in backends
         ]
 
     def scenario(self) -> Scenario:
@@ -350,49 +358,81 @@ def split_words(
         BadInputError: Sides without an experiment, one side of an engine, or more than two.
         StateMachineError: As `parse_sides` does.
     """
-    size = len([*takewhile(is_trace, words)]) or 1
+    size = len(list(takewhile(is_trace, words)))
+    if size == 0:
+        size = 1
     what, rest = tuple(words[:size]), words[size:]
-    runs = what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0])
-    is_side = not runs and _is_side(what[0], menagerie)
-    for trace in filter(is_trace, rest):
-        raise BadInputError(f"{trace} is a recorded run: type statemachine compare {trace} FILE")
-    if rest and not (runs or is_side):
+    is_run = what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0])
+    is_side = not is_run and _is_side(what[0], menagerie)
+    for word in rest:
+        if is_trace(word):
+            raise BadInputError(f"{word} is a recorded run: type statemachine compare {word} FILE")
+    if rest and not (is_run or is_side):
         raise unknown_name("experiment", what[0], SCENARIOS)
-    if any(word in SCENARIOS for word in rest) or not (runs or is_side):
+    if any(word in SCENARIOS for word in rest) or not (is_run or is_side):
         return tuple(words), ()  # nothing that can be compared
-    rest = words if is_side else rest
+    if is_side:
+        _refuse_sides_alone(words, parse_sides(words, menagerie))
     sides = parse_sides(rest, menagerie)
-    alone = len(sides) == 1 and sides[0].file == _split_options(rest[0])[0]
-    other = next(name for name in reversed(PAIR) if not sides or name != sides[0].engine)
-    another = [f"{side.file}@{other}" for side in sides if len(sides) == 1]
-    named = command(word for word in (*rest, *another) if not _OPTION.fullmatch(word))
-    run = ["hold" if is_side else what[0], *rest, *([] if alone else another)]
-    typed = command(["statemachine", "compare", *run])
-    refuse(
-        (
-            is_side,
-            f"compare what? {typed} runs an experiment ({', '.join(SCENARIOS)}) or "
-            f"FILE.py:FUNCTION; statemachine compare --models {named} lists what the files "
-            "differ in",
-        ),
-        (
-            size > 1 and sides and not alone,
-            "two traces have their own sides; a model is one FILE",
-        ),
-        (
-            len(sides) > 2,
-            f"{len(sides)} sides, {listed([side.label for side in sides])}: compare takes two",
-        ),
-        (
-            len(sides) == 1 and not alone,
-            f"one side only: name the other, as in: {typed}",
-        ),
-        (
-            not sides and is_function(what[0]),
-            f"{what[0]} runs on a model, as in: {typed} so101",
-        ),
-    )
+    _check_number_of_sides(what, rest, sides)
     return what, tuple(sides)
+
+
+def _refuse_sides_alone(words: Sequence[str], sides: Sequence[Side]) -> NoReturn:
+    """Refuse sides without anything to run on them, and say what can be typed.
+
+    Raises:
+        BadInputError: Always.
+    """
+    run, files = ["hold", *words], [*words]
+    if len(sides) == 1:
+        files.append(_on_other_engine(sides[0]))
+        if not _is_model_alone(words, sides):
+            run.append(_on_other_engine(sides[0]))
+    typed = command(["statemachine", "compare", *run])
+    named = command(word for word in files if not _OPTION.fullmatch(word))
+    raise BadInputError(
+        f"compare what? {typed} runs an experiment ({', '.join(SCENARIOS)}) or "
+        f"FILE.py:FUNCTION; statemachine compare --models {named} lists what the files differ in"
+    )
+
+
+def _check_number_of_sides(
+    what: Sequence[str], words: Sequence[str], sides: Sequence[Side]
+) -> None:
+    """Check that there are two sides, or a model for both engines, or none where none is needed.
+
+    Args:
+        what: What is to be run.
+        words: Those of the sides, as typed.
+        sides: What these say.
+
+    Raises:
+        BadInputError: There are too many, or too few.
+    """
+    alone = _is_model_alone(words, sides)
+    if len(what) > 1 and sides and not alone:
+        raise BadInputError("two traces have their own sides; a model is one FILE")
+    if len(sides) > 2:
+        labels = listed([side.label for side in sides])
+        raise BadInputError(f"{len(sides)} sides, {labels}: compare takes two")
+    if len(sides) == 1 and not alone:
+        typed = command(["statemachine", "compare", what[0], *words, _on_other_engine(sides[0])])
+        raise BadInputError(f"one side only: name the other, as in: {typed}")
+    if not sides and is_function(what[0]):
+        typed = command(["statemachine", "compare", what[0], *words])
+        raise BadInputError(f"{what[0]} runs on a model, as in: {typed} so101")
+
+
+def _is_model_alone(words: Sequence[str], sides: Sequence[Side]) -> bool:
+    """Tell whether the only side is a model without an engine, for both engines."""
+    return len(sides) == 1 and sides[0].file == _split_options(words[0])[0]
+
+
+def _on_other_engine(side: Side) -> str:
+    """Return what to type for the file of a side on the last engine of the pair that is not its."""
+    other = next(name for name in reversed(PAIR) if name != side.engine)
+    return f"{side.file}@{other}"
 
 
 def _is_file(word: str) -> bool:

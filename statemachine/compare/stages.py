@@ -65,31 +65,14 @@ class StageReader:
     def __init__(self, matched: Matched) -> None:
         self._matched = matched
         self._models = left, right = matched.left, matched.right
-        here, names, turns = _dofs(left, [a for a, _ in matched.joints])
-        self._dofs = here, _dofs(right, [b for _, b in matched.joints])[0]
-        frames = [left.body_names[s.left] or f"body {s.left}" for s in matched.solids[1:]]
-        frames += [left.site_names[a] or f"site {a}" for a, _ in matched.sites]
+        dofs, names, turns = _dofs(left, [a for a, _ in matched.joints])
+        self._dofs = dofs, _dofs(right, [b for _, b in matched.joints])[0]
         self._upper = np.triu_indices(len(names))
-        entries = list(zip(*(places.tolist() for places in self._upper), strict=True))
-        masses = [
-            names[i] if names[i] == names[j] else f"{names[i]} and {names[j]}" for i, j in entries
-        ]
-        accelerations = np.where(turns, "rad/s²", "m/s²").tolist()
-        self.columns = [
-            StageColumn(KINEMATICS, frames, ["m"] * len(frames)),
-            StageColumn(KINEMATICS, frames, ["rad"] * len(frames)),
-            StageColumn(MASS, masses, [("kg", "kg·m", "kg·m²")[turns[i] + turns[j]]
-                                       for i, j in entries]),
-        ]  # fmt: skip
-        for stage, arrays in {**ARRAYS, AFTER: ("",)}.items():
-            units = np.where(turns, "N·m", "N").tolist()
-            self.columns.append(
-                StageColumn(
-                    stage,
-                    [f"{n} ({_WORDS[a]})" if a in _WORDS else n for a in arrays for n in names],
-                    (accelerations if stage in (ACCELERATION, AFTER) else units) * len(arrays),
-                )
-            )
+        frames = _frames(matched)
+        positions = StageColumn(KINEMATICS, frames, ["m"] * len(frames))
+        rotations = StageColumn(KINEMATICS, frames, ["rad"] * len(frames))
+        self.columns = [positions, rotations, _mass_column(names, turns)]
+        self.columns += [_force_column(stage, names, turns) for stage in (*ARRAYS, AFTER)]
         self._contact_names = _contact_names(matched)
 
     def prime(self, side: int, data: Data, before: dict[str, Array]) -> str:
@@ -128,10 +111,10 @@ class StageReader:
         """All columns but the velocity update."""
         model, dofs = self._models[side], self._dofs[side]
         mass = room(model.backend).mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
-        forces = [
-            np.concatenate([array_or_nan(data, name)[dofs] for name in arrays])[:, None]
-            for arrays in ARRAYS.values()
-        ]
+        forces = []
+        for arrays in ARRAYS.values():
+            parts = [array_or_nan(data, name)[dofs] for name in arrays]
+            forces.append(np.concatenate(parts)[:, None])
         return [*self._poses(side, data), mass[self._upper][:, None], *forces]
 
     def _poses(self, side: int, data: Data) -> tuple[Array, Array]:
@@ -163,6 +146,50 @@ class StageReader:
                 total[0] = max(depth, total[0])
                 total[1:] += -force if a > b else force
         return by_pair
+
+
+def _frames(matched: Matched) -> list[str]:
+    """Return the names of the bodies and the sites that both Models have, as on the left."""
+    left = matched.left
+    bodies = [left.body_names[solid.left] or f"body {solid.left}" for solid in matched.solids[1:]]
+    sites = [left.site_names[site] or f"site {site}" for site, _ in matched.sites]
+    return bodies + sites
+
+
+_MASS_UNITS = ("kg", "kg·m", "kg·m²")  # by how many of two degrees of freedom turn
+
+
+def _mass_column(dofs: Sequence[str], turns: Ints) -> StageColumn:
+    """Return the upper triangle of the mass matrix.
+
+    Args:
+        dofs: The joint of each degree of freedom.
+        turns: (k,) 1 for one that turns, else 0.
+    """
+    names, units = [], []
+    for i in range(len(dofs)):
+        for j in range(i, len(dofs)):
+            names.append(dofs[i] if dofs[i] == dofs[j] else f"{dofs[i]} and {dofs[j]}")
+            units.append(_MASS_UNITS[turns[i] + turns[j]])
+    return StageColumn(MASS, names, units)
+
+
+def _force_column(stage: str, dofs: Sequence[str], turns: Ints) -> StageColumn:
+    """Return the forces, or the accelerations, of a stage: of each array each degree of freedom.
+
+    Args:
+        stage: One of `ARRAYS`, or the velocity update.
+        dofs: The joint of each degree of freedom.
+        turns: (k,) 1 for one that turns, else 0.
+    """
+    is_acceleration = stage in (ACCELERATION, AFTER)
+    turning, sliding = ("rad/s²", "m/s²") if is_acceleration else ("N·m", "N")
+    names, units = [], []
+    for array in ARRAYS.get(stage, ("",)):
+        suffix = f" ({_WORDS[array]})" if array in _WORDS else ""
+        names += [f"{dof}{suffix}" for dof in dofs]
+        units += [turning if turn else sliding for turn in turns.tolist()]
+    return StageColumn(stage, names, units)
 
 
 # What says how a contact of two keys is called, and the key of each geom: of the two keys the
@@ -257,25 +284,21 @@ def measures(
     """
     if not readings:
         return []
-    columns = [
-        (column, [np.array([moment[k].values[c] for moment in readings]) for k in range(3)])
-        for c, column in enumerate(reader.columns)
-    ]
-    pairs = list(
-        dict.fromkeys(p for moment in readings for k in (1, 2, 0) for p in moment[k].contacts)
-    )
+    # Each side over all moments.
+    running = [as_it_runs for as_it_runs, _, _ in readings]
+    left = [put_back for _, put_back, _ in readings]
+    right = [on_the_right for _, _, on_the_right in readings]
+    by_unit: list[StageMeasure] = []
+    for number, column in enumerate(reader.columns):
+        sides = [_values(side, number) for side in (running, left, right)]
+        by_unit += _by_unit(column, *sides)
+    pairs = _pairs(readings)
     if pairs:
-        # Depth and force of each pair at each moment; what is not found is zero.
-        sides = [
-            np.array([[m[k].contacts.get(pair, np.zeros(4)) for pair in pairs] for m in readings])
-            for k in range(3)
-        ]
-        units = (FOUND, "m", slice(0, 1)), (FORCE, "N", slice(1, 4))
-        columns += [
-            (StageColumn(stage, pairs, [unit] * len(pairs)), [side[:, :, part] for side in sides])
-            for stage, unit, part in units
-        ]
-    by_unit = [measure for column, sides in columns for measure in _by_unit(column, *sides)]
+        contacts = [_contacts_of(side, pairs) for side in (running, left, right)]
+        depths = [side[:, :, :1] for side in contacts]
+        forces = [side[:, :, 1:] for side in contacts]
+        by_unit += _by_unit(StageColumn(FOUND, pairs, ["m"] * len(pairs)), *depths)
+        by_unit += _by_unit(StageColumn(FORCE, pairs, ["N"] * len(pairs)), *forces)
     # What is nothing but rounding, as the contact force of a run in which nothing touches,
     # is held against the other forces, and accelerations against what forces give.
     least = {unit: _largest_scale(by_unit, FORCES, unit) for unit in ("N·m", "N")}
@@ -289,6 +312,30 @@ def measures(
     return by_unit
 
 
+def _values(side: Sequence[StepReading], number: int) -> Array:
+    """Return the elements (n, k, size) of a column, by its number, on one side."""
+    return np.array([reading.values[number] for reading in side])
+
+
+def _pairs(readings: Sequence[tuple[StepReading, StepReading, StepReading]]) -> list[str]:
+    """Return who touches whom at any moment, those of the left side first."""
+    pairs: dict[str, None] = {}
+    for running, left, right in readings:
+        for reading in (left, right, running):
+            pairs |= dict.fromkeys(reading.contacts)
+    return list(pairs)
+
+
+def _contacts_of(side: Sequence[StepReading], pairs: Sequence[str]) -> Array:
+    """Return depth and force (n, k, 4) of each pair on one side; what is not found is zero."""
+    contacts = np.zeros((len(side), len(pairs), 4))
+    for moment, reading in enumerate(side):
+        for k, pair in enumerate(pairs):
+            if pair in reading.contacts:
+                contacts[moment, k] = reading.contacts[pair]
+    return contacts
+
+
 def _by_unit(
     column: StageColumn, running: Array, left: Array, right: Array
 ) -> Iterator[StageMeasure]:
@@ -299,17 +346,21 @@ def _by_unit(
         known = np.flatnonzero(np.isfinite(apart).all(axis=0))
         if len(known):
             null = np.nan_to_num(_distances(running[:, places], left[:, places]))
-            sizes = _sizes(column.stage, left[:, places], right[:, places])
-            acting = sizes[sizes > _LEAST * sizes.max(initial=0.0)]
+            names = [column.names[places[k]] for k in known.tolist()]
             yield StageMeasure(
                 column.stage,
                 unit,
-                [column.names[places[k]] for k in known.tolist()],
+                names,
                 apart[:, known],
                 null[:, known],
-                # The median, of those that are no thousandth of the largest.
-                float(np.median(acting)) if len(acting) else 0.0,
+                _usual_size(_sizes(column.stage, left[:, places], right[:, places])),
             )
+
+
+def _usual_size(sizes: Array) -> float:
+    """Return the median of sizes (n,), of those that are no thousandth of the largest."""
+    acting = sizes[sizes > _LEAST * sizes.max(initial=0.0)]
+    return float(np.median(acting)) if len(acting) else 0.0
 
 
 def _distances(left: Array, right: Array) -> Array:

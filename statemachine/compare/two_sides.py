@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from ..backends import BackendChoice, parse_backend
 from ..engines import room
-from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, refuse
+from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError
 from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
@@ -54,8 +55,8 @@ class SidesRun:
     """What came of running two sides.
 
     Attributes:
-        left, right: The runs, each with the commands that its own side computed; those of the
-            right go by the names of the left.
+        left: The run of the left, with the commands that its own side computed.
+        right: That of the right, with its own commands; it goes by the names of the left.
         played: The left's start and commands on the right, for an open loop. It is `right`
             where these were the right's own, and where there is no open loop.
         commands: "its own" if the two sides were told different things; "the same" if what
@@ -119,61 +120,126 @@ def prepare_sides(
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
-    unlike = (room(engine_of(model.backend)).unlike_its_users(model) for model in models)
-    unlike_users = dict.fromkeys(line for lines in unlike for line in lines)
-    said, seed, start, key = list[str](), request.seed, None, scenario.keyframe
+    notes_on_engines = [room(engine_of(model.backend)).unlike_its_users(model) for model in models]
+    start, notes = None, list[str]()
     if trace is not None:
         _refuse_of_run(request)
         trace = for_left(trace, left, request)
-        said.append(
-            f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
-        )
         scenario, seed = recorded_scenario(trace), trace.header.provenance.seed
         start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
+        notes.append(
+            f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
+        )
     else:
         scenario = scenario.on(left)
-        key, seed = scenario.keyframe, request.seed if scenario.seeded else None
-    first = start
-    if key is not None and matched and key not in [frame.name for frame in right.keyframes]:
-        first, key = start_of(left, key), None
-        said.append(
-            f"{right.path.name} has no keyframe {scenario.keyframe!r}: it starts in the left's"
-        )
-    if request.every > 1 and left.timestep != right.timestep:
-        said.append(
-            f"{request.every} steps are {milliseconds(request.every * left.timestep)} on the left "
-            f"and {milliseconds(request.every * right.timestep)} on the right"
-        )
-    own_start = start_of(right, key)
-    begin = matched.start(first, own_start) if matched and first else first
+        seed = request.seed if scenario.seeded else None
+    right_start = _start_of_right(scenario.keyframe, start, left, right, matched)
+    notes += right_start.notes
+    notes += _notes_on_every(request.every, left, right)
 
-    def own(model: Model) -> Controller:
+    def left_controller(model: Model) -> Controller:
         return scenario.controller(model, request.seed)
 
-    def theirs(model: Model) -> Controller:
-        controller = own(model if scenario.own else left)
-        if matched and not scenario.own:
-            controller = controller_for_right(controller, matched, own_start.ctrl)
-        return beginning_with(lambda _, ctrl=begin.ctrl: ctrl, controller) if begin else controller
+    def right_controller(model: Model) -> Controller:
+        if scenario.own:
+            controller = scenario.controller(model, request.seed)
+        else:
+            controller = scenario.controller(left, request.seed)
+            if matched:
+                controller = controller_for_right(controller, matched, right_start.own.ctrl)
+        if right_start.given is None:
+            return controller
+        first_ctrl = right_start.given.ctrl
+        return beginning_with(lambda _: first_ctrl, controller)
 
-    left_rerun, right_rerun = (
-        Rerun(
-            model,
-            own if model is left else theirs,
-            seconds,
-            keyframe=scenario.keyframe if model is left else key,
-            qpos=at and at.qpos,
-            qvel=at and at.qvel,
-            defaults=side.defaults,
-            options={**given, **side.options},
-            experiment=scenario.name,
-            says=scenario.says,
-            seed=seed,
-            writes_state=scenario.own,  # ours write nothing but ctrl
-        )
-        for model, side, at in zip(models, sides, (start, begin), strict=True)
+    left_rerun = Rerun(
+        left,
+        left_controller,
+        seconds,
+        defaults=sides[0].defaults,
+        options={**given, **sides[0].options},
     )
-    return (left_rerun, right_rerun), matched, (*said, *request.taken, *unlike_users)
+    right_rerun = Rerun(
+        right,
+        right_controller,
+        seconds,
+        defaults=sides[1].defaults,
+        options={**given, **sides[1].options},
+    )
+    reruns = (
+        _of_scenario(_starting(left_rerun, scenario.keyframe, start), scenario, seed),
+        _of_scenario(
+            _starting(right_rerun, right_start.keyframe, right_start.given), scenario, seed
+        ),
+    )
+    notes += request.taken
+    notes += dict.fromkeys(chain(*notes_on_engines))
+    return reruns, matched, tuple(notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _RightStart:
+    """Where the right side starts.
+
+    Attributes:
+        keyframe: One of its own; None for its default state.
+        own: Its state there, for what the left has no counterpart of.
+        given: What is written over that, in terms of the right; None for nothing.
+        notes: What a reader should know of it.
+    """
+
+    keyframe: str | None
+    own: SideStart
+    given: SideStart | None
+    notes: tuple[str, ...]
+
+
+def _start_of_right(
+    keyframe: str | None,
+    start: SideStart | None,
+    left: Model,
+    right: Model,
+    matched: Matched | None,
+) -> _RightStart:
+    """Return where the right side starts, if the left starts in a keyframe, or in a state."""
+    given, notes = start, ()
+    known = [frame.name for frame in right.keyframes]
+    if keyframe is not None and matched and keyframe not in known:
+        given = start_of(left, keyframe)
+        notes = (f"{right.path.name} has no keyframe {keyframe!r}: it starts in the left's",)
+        keyframe = None
+    own = start_of(right, keyframe)
+    if matched and given:
+        given = matched.start(given, own)
+    return _RightStart(keyframe, own, given, notes)
+
+
+def _notes_on_every(every: int, left: Model, right: Model) -> list[str]:
+    """Say for how long a command holds, where that is not the same on both sides."""
+    if every <= 1 or left.timestep == right.timestep:
+        return []
+    return [
+        f"{every} steps are {milliseconds(every * left.timestep)} on the left "
+        f"and {milliseconds(every * right.timestep)} on the right"
+    ]
+
+
+def _starting(rerun: Rerun, keyframe: str | None, start: SideStart | None) -> Rerun:
+    """Return a run that starts in a keyframe, and in some other state if one is given."""
+    if start is None:
+        return replace(rerun, keyframe=keyframe)
+    return replace(rerun, keyframe=keyframe, qpos=start.qpos, qvel=start.qvel)
+
+
+def _of_scenario(rerun: Rerun, scenario: Scenario, seed: int | None) -> Rerun:
+    """Return a run whose trace says what was run."""
+    return replace(
+        rerun,
+        experiment=scenario.name,
+        says=scenario.says,
+        seed=seed,
+        writes_state=scenario.own,  # ours write nothing but ctrl
+    )
 
 
 def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
@@ -195,19 +261,29 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
             raise BadInputError("compare takes one experiment, or one or two traces")
         if request.is_traces:
             return _opened(request, progress)
-        is_known = request.what[0] in SCENARIOS or is_function(request.what[0])
-        if not is_known and Path(request.what[0]).is_file():
-            raise BadInputError(
-                f"{request.what[0]!r} is not a trace: a trace ends in .npz or .parquet"
-            )
-        for word in request.backends:
-            parse_backend(word)
+        _check_what(request)
     try:
-        reruns, matched, said = prepare_sides(request)
+        reruns, matched, notes = prepare_sides(request)
     except MissingEngineError:
         if request != Request(request.what, request.backends):
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
+    return replace(_run_both(request, reruns, matched, progress), said=notes)
+
+
+def _check_what(request: Request) -> None:
+    """Check that what is run is no file that cannot be run, and that there are such backends."""
+    what = request.what[0]
+    if what not in SCENARIOS and not is_function(what) and Path(what).is_file():
+        raise BadInputError(f"{what!r} is not a trace: a trace ends in .npz or .parquet")
+    for word in request.backends:
+        parse_backend(word)
+
+
+def _run_both(
+    request: Request, reruns: tuple[Rerun, Rerun], matched: Matched | None, progress: Progress
+) -> SidesRun:
+    """Run both sides, and the right once more in open loop where its commands were its own."""
     left_run, right_run = (
         rerun.record(
             command=_command(request, BackendChoice(rerun.model.backend, rerun.defaults)),
@@ -216,33 +292,34 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
         for k, rerun in enumerate(reruns)
     )
     left, right = (rerun.model for rerun in reruns)
-    rights, commands = [right_run], _loop(request, left_run, right_run, matched)
+    commands = _loop(request, left_run, right_run, matched)
+    right_runs = [right_run]
     if commands == "its own":
         theirs = in_terms_of_right(left_run, right_run, matched)
         in_open_loop = replayed(theirs, right, reruns[1].defaults, reruns[1].options)
-        rights.append(in_open_loop.record(progress=part_of(progress, 0.7, 0.3)))
-    a, b = (run.header.provenance.model_file for run in (left_run, right_run))
-    if left.path != right.path and a == b:  # as much of the paths as tells them apart
-        names = files_apart(left.path.parts, right.path.parts)
-        left_run, rights = called(left_run, names[0]), [called(run, names[1]) for run in rights]
+        right_runs.append(in_open_loop.record(progress=part_of(progress, 0.7, 0.3)))
+    same_name = left_run.header.provenance.model_file == right_run.header.provenance.model_file
+    if left.path != right.path and same_name:  # as much of the paths as tells them apart
+        left_file, right_file = files_apart(left.path.parts, right.path.parts)
+        left_run = called(left_run, left_file)
+        right_runs = [called(run, right_file) for run in right_runs]
     if matched is not None:
-        both = [named_as_left(left_run, run, matched) for run in rights]
-        left_run, rights = both[0][0], [run for _, run in both]
+        pairs = [named_as_left(left_run, run, matched) for run in right_runs]
+        left_run, right_runs = pairs[0][0], [run for _, run in pairs]
     return SidesRun(
         left=left_run,
-        right=rights[0],
-        played=rights[-1],
+        right=right_runs[0],
+        played=right_runs[-1],
         commands=commands,
         matched=matched,
         reruns=reruns,
         file=left.path if left.path == right.path else None,
         missing=missing_parts(left, right),
-        said=said,
     )
 
 
 def _loop(request: Request, left: Trace, right: Trace, matched: Matched | None) -> Loop:
-    """What the two sides were told."""
+    """Return what the two sides were told."""
     if request.is_traces:
         return "recorded"
     if left.header.rewritten or right.header.rewritten:
@@ -255,7 +332,9 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
     """Two traces; or one, and what comes of its ctrl on the other engine."""
     traces = [read(word) for word in request.what]
     both = len(traces) == 2
-    _refuse_of_run(request, **dict.fromkeys(request.options, both))
+    _refuse_of_run(request)
+    if both and request.options:
+        raise _of_a_run(next(iter(request.options)))
     if both:
         return SidesRun(traces[0], traces[1], traces[1])
     side, what = _other_side(request, _side_of(request, 0, traces[0])), request.what[0]
@@ -299,9 +378,11 @@ def _command(request: Request, backend: BackendChoice) -> str:
     """The command that records one side of an experiment; "" where it cannot say that."""
     if request.sides or request.every > 1 or {*request.options} - {"timestep"}:
         return ""
+    words = ["statemachine", "trace", "record", *request.words, "--backend", str(backend)]
+    folder = "DIR" if request.menagerie else None
     return command(
-        ["statemachine", "trace", "record", *request.words, "--backend", str(backend)],
-        ("--menagerie", request.menagerie and "DIR", None),
+        words,
+        ("--menagerie", folder, None),
         ("--seconds", request.seconds, None),
         ("--seed", request.seed, 0),
         ("--timestep", request.options.get("timestep"), None),
@@ -337,7 +418,9 @@ def recorded_sides(
     """
     traces = tuple(read(word) for word in request.what)
     _refuse_of_run(request)
-    sides = request.sides or tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
+    sides = request.sides
+    if not sides:
+        sides = tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
     if len(sides) == 1:
         sides = (*sides, _other_side(request, sides[0]))
     again = recorded_scenario(*traces)
@@ -350,10 +433,13 @@ def recorded_scenario(*traces: Trace) -> Scenario:
     header = traces[0].header
     seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
     return Scenario(
-        *(header.experiment, header.says, "", seconds),
-        lambda _model, _seed: commands_of(traces[0]),
-        header.says,
-        lambda _model: None,
+        name=header.experiment,
+        says=header.says,
+        model="",
+        seconds=seconds,
+        controller=lambda _model, _seed: commands_of(traces[0]),
+        elsewhere=header.says,
+        needs=lambda _model: None,
         options=header.options,
     )
 
@@ -379,17 +465,15 @@ def _other_side(request: Request, own: Side) -> Side:
     raise BadInputError(f"the trace is of {own.chosen_backend()}: name another with --backend")
 
 
-def _refuse_of_run(request: Request, **given: bool) -> None:
+def _refuse_of_run(request: Request) -> None:
     """Raise BadInputError for an option that has no meaning for a trace."""
-    refused = {
-        "seconds": request.seconds is not None,
-        "seed": request.seed != 0,
-        "keyframe": request.keyframe is not None,
-        **given,
-    }
-    refuse(
-        *(
-            (wrong, f"{option} is of a run, and a trace is a run that was made")
-            for option, wrong in refused.items()
-        )
-    )
+    if request.seconds is not None:
+        raise _of_a_run("seconds")
+    if request.seed != 0:
+        raise _of_a_run("seed")
+    if request.keyframe is not None:
+        raise _of_a_run("keyframe")
+
+
+def _of_a_run(option: str) -> BadInputError:
+    return BadInputError(f"{option} is of a run, and a trace is a run that was made")

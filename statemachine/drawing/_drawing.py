@@ -6,7 +6,7 @@ MuJoCo's: half of a box's edges, half of a cylinder's length (XML reference, `ge
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,8 +107,10 @@ def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Surface:
 
 
 def _triangles(number: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Two triangles for each square of a grid of numbered points (rows, columns)."""
-    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    """Return two triangles for each square of a grid of numbered points (rows, columns)."""
+    first, second = number[:-1], number[1:]
+    a, b = first[:, :-1], first[:, 1:]
+    d, c = second[:, :-1], second[:, 1:]
     return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
@@ -130,16 +132,12 @@ def welded(vertices: ArrayLike, faces: ArrayLike) -> Surface:
 
 # MuJoCo's mjtGeom, in its order.
 _KINDS = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]
-_PRIMITIVES: dict[str, Callable[[list[float]], Surface]] = {  # of their sizes
-    "sphere": lambda size: ellipsoid([size[0]] * 3),
-    "ellipsoid": ellipsoid,
-    "capsule": lambda size: capsule(size[0], size[1]),
-    "cylinder": lambda size: cylinder(size[0], size[1]),
-    "box": box,
-}
 _SEEN_GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2; 3 to 5 are for what only touches
 _UNSET = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)  # the rgba of a geom that names none
 _WIDE = 4  # half an endless plane is so many times the model's extent
+
+
+Colour = tuple[float, float, float, float]  # red, green, blue and opacity, 0 to 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +159,7 @@ class Part:
     body: int
     vertices: NDArray[np.float32]
     faces: NDArray[np.int32]
-    rgba: tuple[float, float, float, float]
+    rgba: Colour
     endless: bool = False
 
     @property
@@ -223,56 +221,85 @@ def drawing_of(model: Model) -> Drawing:
         if shape is None:
             left_out.append(f"geom {geom}, a {kind}")
             continue
-        turn = rotations.matrix_from_quat(raw.geom_quat[geom])
-        placed = welded(shape.vertices @ turn.T + raw.geom_pos[geom], shape.faces)
-        parts.append(
-            Part(
-                kind="mesh" if kind == "sdf" else kind,
-                geom=geom,
-                body=int(raw.geom_bodyid[geom]),
-                vertices=placed.vertices,
-                faces=placed.faces,
-                rgba=rgba,
-                endless=kind == "plane" and not (raw.geom_size[geom, :2] > 0).all(),
-            )
-        )
+        parts.append(_part(raw, geom, kind, shape, rgba))
     x, y, z = raw.stat.center.tolist()
+    view = raw.vis.global_
     return Drawing(
         parts=tuple(parts),
         center=(x, y, z),
         extent=float(raw.stat.extent),
-        azimuth=float(raw.vis.global_.azimuth),
-        elevation=float(raw.vis.global_.elevation),
+        azimuth=float(view.azimuth),
+        elevation=float(view.elevation),
         file=model.path,
         left_out=tuple(left_out),
     )
 
 
+def _part(raw: Any, geom: int, kind: str, shape: Surface, rgba: Colour) -> Part:
+    """Return a geom with its shape, which is in its own frame, in the frame of its body."""
+    turn = rotations.matrix_from_quat(raw.geom_quat[geom])
+    placed = welded(shape.vertices @ turn.T + raw.geom_pos[geom], shape.faces)
+    has_end = (raw.geom_size[geom, :2] > 0).all()
+    return Part(
+        kind="mesh" if kind == "sdf" else kind,
+        geom=geom,
+        body=int(raw.geom_bodyid[geom]),
+        vertices=placed.vertices,
+        faces=placed.faces,
+        rgba=rgba,
+        endless=kind == "plane" and not has_end,
+    )
+
+
 def _shape(raw: Any, geom: int, kind: str) -> Surface | None:
-    """A geom in its own frame; None if there are no triangles to be had of it."""
+    """Return a geom in its own frame; None if there are no triangles to be had of it."""
     size, data = raw.geom_size[geom].tolist(), int(raw.geom_dataid[geom])
     if kind == "plane":
         wide = _WIDE * float(raw.stat.extent)
-        return rectangle(size[0] or wide, size[1] or wide)
-    if kind in _PRIMITIVES:
-        return _PRIMITIVES[kind](size)
+        return rectangle(size[0] if size[0] else wide, size[1] if size[1] else wide)
     if kind == "hfield":
-        rows, columns = int(raw.hfield_nrow[data]), int(raw.hfield_ncol[data])
-        half_x, half_y, top, _ = raw.hfield_size[data].tolist()
-        start = int(raw.hfield_adr[data])
-        heights = raw.hfield_data[start : start + rows * columns].reshape(rows, columns)
-        return terrain(top * heights, half_x, half_y)
-    if kind in ("mesh", "sdf") and data >= 0:
-        vert, face = int(raw.mesh_vertadr[data]), int(raw.mesh_faceadr[data])
-        return Surface(
-            raw.mesh_vert[vert : vert + int(raw.mesh_vertnum[data])],
-            raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
-        )
+        return _height_field(raw, data)
+    if kind in ("mesh", "sdf"):
+        return _mesh(raw, data) if data >= 0 else None
+    return _primitive(kind, size)
+
+
+def _primitive(kind: str, size: Sequence[float]) -> Surface | None:
+    """Return a geom that is made of its `geom_size` alone; None for other kinds."""
+    match kind:
+        case "sphere":
+            return ellipsoid([size[0]] * 3)
+        case "ellipsoid":
+            return ellipsoid(size)
+        case "capsule":
+            return capsule(size[0], size[1])
+        case "cylinder":
+            return cylinder(size[0], size[1])
+        case "box":
+            return box(size)
     return None
 
 
-def _colour(raw: Any, geom: int) -> tuple[float, float, float, float]:
-    """As MuJoCo's viewer takes it: the geom's own rgba before its material's."""
+def _height_field(raw: Any, number: int) -> Surface:
+    """Return a height field of a compiled model."""
+    rows, columns = int(raw.hfield_nrow[number]), int(raw.hfield_ncol[number])
+    half_x, half_y, top, _ = raw.hfield_size[number].tolist()
+    start = int(raw.hfield_adr[number])
+    heights = raw.hfield_data[start : start + rows * columns].reshape(rows, columns)
+    return terrain(top * heights, half_x, half_y)
+
+
+def _mesh(raw: Any, number: int) -> Surface:
+    """Return a mesh of a compiled model."""
+    first_vertex, first_face = int(raw.mesh_vertadr[number]), int(raw.mesh_faceadr[number])
+    last_vertex = first_vertex + int(raw.mesh_vertnum[number])
+    last_face = first_face + int(raw.mesh_facenum[number])
+    vertices = raw.mesh_vert[first_vertex:last_vertex]
+    return Surface(vertices, raw.mesh_face[first_face:last_face])
+
+
+def _colour(raw: Any, geom: int) -> Colour:
+    """Return the colour as MuJoCo's viewer takes it: the geom's own rgba before its material's."""
     rgba, material = raw.geom_rgba[geom], int(raw.geom_matid[geom])
     if material >= 0 and np.array_equal(rgba, _UNSET):
         rgba = raw.mat_rgba[material].copy()

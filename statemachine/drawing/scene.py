@@ -111,9 +111,11 @@ class Motion:
         """Corners (n, 3) of boxes about all that belongs to a body, at some of the moments."""
         rows = np.unique(np.linspace(0, len(self.xpos) - 1, _MOMENTS).astype(int))
         xpos, turn = self.xpos[rows], matrix_from_quat(self.xquat[rows])
-        parts = [part for part in self.drawing.parts if not part.endless]
+        finite = [part for part in self.drawing.parts if not part.endless]
+        moving = [part for part in finite if part.body]
+        parts = moving if moving else finite
         corners = [np.empty((0, 3))]
-        for part in [part for part in parts if part.body] or parts:
+        for part in parts:
             ends = np.stack([part.vertices.min(axis=0), part.vertices.max(axis=0)]).astype(float)
             box = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
             placed = np.einsum("nij,kj->nki", turn[:, part.body], box) + xpos[:, part.body, None]
@@ -204,14 +206,20 @@ def compose(solid: Shot, ghost: Shot | None, bias: float, line: int) -> Pixels:
     seen = ghost.depth < solid.depth - bias
     inside = np.isfinite(ghost.depth)
     for _ in range(line):
-        # Without the pixels at the edge; the frame of the picture is none.
-        wide = np.pad(inside, 1, constant_values=True)
-        inside &= wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:]
+        inside = _without_edge(inside)
     rgb = solid.rgb.copy()
     mixed = (1 - _STRENGTH) * solid.rgb[seen] + _STRENGTH * ghost.rgb[seen]
     rgb[seen] = np.round(mixed).astype(np.uint8)
     rgb[seen & ~inside] = (0.6 * 255 * np.asarray(GHOST)).astype(np.uint8)
     return rgb
+
+
+def _without_edge(region: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a region of a picture without the pixels at its edge; the picture's frame is none."""
+    wide = np.pad(region, 1, constant_values=True)
+    above_and_below = wide[:-2, 1:-1] & wide[2:, 1:-1]
+    beside = wide[1:-1, :-2] & wide[1:-1, 2:]
+    return region & above_and_below & beside
 
 
 def smaller(rgb: Pixels, by: int) -> Pixels:

@@ -27,7 +27,6 @@ from ..installed import raise_if_interrupted
 if TYPE_CHECKING:
     from ..drawing.scene import Camera, Drawer
     from ..interface import Array, Data, Model
-    from ..page import Figures
     from .call_watch import CallWatch
     from .description.records import Robot
     from .measured import Phrases
@@ -35,8 +34,9 @@ if TYPE_CHECKING:
         Counterparts,
         Dials,
         Edit,
-        LeftAlone,
+        EngineTerm,
         ModelDifference,
+        UncommandedJoint,
         WayBack,
     )
 
@@ -114,24 +114,25 @@ class RawEngine:
 
     # The engine as it comes. Nothing here goes through an adapter that emulates the contract.
 
-    def terms(self, model: Model) -> tuple[Figures, ...]:
-        """What the interface calls things, and what the engine does.
-
-        Returns:
-            thing: What is meant; ours: what the interface has for it; engine: what the engine has.
-        """
+    def terms(self, model: Model) -> tuple[EngineTerm, ...]:
+        """Return what the interface calls things, and what the engine does."""
         return ()
 
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
-        """Leave a joint alone for some time [s], on four freshly loaded models.
+    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[UncommandedJoint, ...]:
+        """Return how a joint moves that nobody commands, on four freshly loaded models.
 
-        They are as the engine loads them; with the model's gravity; without the engine's own
-        motors too; and without the damping of joints.
+        As it comes; with the model's gravity; without the engine's own motors too; and
+        without the damping of joints.
+
+        Args:
+            model: A Model on this engine.
+            seconds: Simulated time.
+            joint: Id of a hinge or slide.
         """
         return ()
 
     def ways_back(self, model: Model) -> tuple[WayBack, ...]:
-        """Try each of the engine's own ways to go back to an earlier state."""
+        """Return which of the engine's own ways to go back to an earlier state is exact."""
         return ()
 
     def unlike_its_users(self, model: Model) -> list[str]:

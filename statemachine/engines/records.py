@@ -13,6 +13,63 @@ from ..rotations import Placement
 Setting = Literal["model", "off"]  # of a dial; one that is not named is as it comes
 
 
+@dataclass(frozen=True)
+class EngineTerm:
+    """A thing of the interface, and what the engine itself has for it.
+
+    Attributes:
+        thing: What is meant, as "joint elbow_flex".
+        ours: What the interface has for it, as "qpos[2]".
+        engine: What the engine has for it.
+    """
+
+    thing: str
+    ours: str
+    engine: str
+
+
+@dataclass(frozen=True)
+class UncommandedJoint:
+    """A joint that nobody commands, some time after its model was loaded as it comes.
+
+    Attributes:
+        label: What was done to the engine before.
+        time: Simulated time [s].
+        position: Of the joint then [rad; of a slide, m].
+        motor: What the engine's own motor exerts on it [N·m or N].
+        explicit: Largest h·D/M of the joint damping that the engine applies explicitly; above 2 a
+            joint gains speed from being damped.
+        gravity: Length of the gravity of a fresh world [m/s²].
+        widest: How far any joint of the robot is from zero then [rad or m].
+        turns: In how many steps the joint's velocity changed its sign.
+        steps: How many steps were taken.
+    """
+
+    label: str
+    time: float
+    position: float
+    motor: float
+    explicit: float
+    gravity: float
+    widest: float
+    turns: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class WayBack:
+    """One of the engine's own ways to go back to an earlier state.
+
+    Attributes:
+        name: What is done.
+        difference: Of the second future from the first: the largest of a coordinate [rad or m];
+            zero means the same bits.
+    """
+
+    name: str
+    difference: float
+
+
 class Dials(ABC):
     """What can be set in an engine's own way or in the model's.
 
@@ -73,48 +130,6 @@ class Counterparts:
     sites: Pairs
     actuators: Pairs
     solids: tuple[BodyPair, ...]
-
-
-@dataclass(frozen=True)
-class LeftAlone:
-    """A joint that nobody commands, after some time on a freshly loaded model.
-
-    Attributes:
-        label: What was done to the engine before.
-        time: Simulated time [s].
-        position: Of the joint then [rad; of a slide, m].
-        motor: What the engine's own motor exerts on it [N·m; on a slide, N].
-        explicit: Largest h·D/M of the joint damping that the engine applies explicitly; above 2 a
-            joint gains speed from being damped.
-        gravity: Length of the gravity of a fresh world [m/s²].
-        widest: How far any joint of the robot is from zero then [rad or m].
-        turns: In how many steps the joint's velocity changed its sign.
-        steps: Of how many.
-    """
-
-    label: str
-    time: float
-    position: float
-    motor: float
-    explicit: float
-    gravity: float
-    widest: float
-    turns: int
-    steps: int
-
-
-@dataclass(frozen=True)
-class WayBack:
-    """A way back to an earlier state that was tried.
-
-    Attributes:
-        name: What was done.
-        difference: Of the second future from the first: the largest of a coordinate [rad, m or
-            part of a quaternion]; zero means the same bits.
-    """
-
-    name: str
-    difference: float
 
 
 # The figure of a difference that is the angle [rad] by which the second model's element is turned.

@@ -25,7 +25,7 @@ from .session import CodeRun, Options, stepping_loop
 from .template import Blocks, Results, differences, emulated, largest_gap, where
 
 if TYPE_CHECKING:
-    from ..engines.records import LeftAlone
+    from ..engines.records import UncommandedJoint
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
 # The first that is paid is taken; each is a row of the longer ones.
@@ -56,7 +56,7 @@ class GravityResult:
     servos_on: Droop
     servos_off: Droop
     longer: dict[str, Droop]
-    alone: tuple[LeftAlone, ...]
+    alone: tuple[UncommandedJoint, ...]
     provenance: Provenance
 
 

@@ -12,6 +12,7 @@ from ..runs.drive import Progress, part_of
 from ..runs.header import Provenance, provenance
 from ..runs.robot import is_the_arm
 from . import LESSONS, forward, gravity, objects, replay, state, time
+from ._falling import SERVO
 from .session import CodeRun, LessonModule, Options, fitted, load_line, slots_of
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ def _servo_carries_the_load(result: GravityResult) -> bool:
     servos_on, servos_off = result.servos_on, result.servos_off
     balanced = servos_on.balanced and servos_off.balanced
     on, off = _ends(result)
-    return balanced and servos_on.held_by == gravity.SERVO and abs(off) > abs(on)
+    return balanced and servos_on.held_by == SERVO and abs(off) > abs(on)
 
 
 def _ends(result: GravityResult) -> tuple[float, float]:

@@ -46,28 +46,58 @@ class Quantity:
     reason: str = ""
 
 
-QUANTITIES = {
-    quantity.name: quantity
-    for quantity in (
-        Quantity("joint", "rad", "joints", True, True, COUNT, _COUNT_SAYS),
-        Quantity("slide", "m", "slides", True, True, 1e-4, "a tenth of a millimetre"),
-        Quantity("tip", "m", "sites", True),
-        Quantity(
-            "tip rotation", "rad", "rotation of sites", True, False, COUNT, _COUNT_SAYS
-        ),
-        Quantity(
-            "body", "m", "free bodies", True, True, 1e-3,
-            "a millimetre: chosen for bodies of centimetres (--tolerance body=5mm for larger ones)",
-        ),
-        Quantity(
-            "body rotation", "rad", "rotation of free bodies", True, True, np.radians(1.0),
-            "a degree: it moves what is 57 mm from the origin by 1 mm",
-        ),
-        Quantity("energy", "J", "energy"),
-        Quantity("contact", "s", "first touches"),
-        Quantity("force", "N", "normal forces"),
-    )
-}  # fmt: skip
+_KINDS = (
+    Quantity(
+        "joint",
+        "rad",
+        "joints",
+        moves=True,
+        own=True,
+        tolerance=COUNT,
+        reason=_COUNT_SAYS,
+    ),
+    Quantity(
+        "slide",
+        "m",
+        "slides",
+        moves=True,
+        own=True,
+        tolerance=1e-4,
+        reason="a tenth of a millimetre",
+    ),
+    Quantity("tip", "m", "sites", moves=True),
+    Quantity(
+        "tip rotation",
+        "rad",
+        "rotation of sites",
+        moves=True,
+        tolerance=COUNT,
+        reason=_COUNT_SAYS,
+    ),
+    Quantity(
+        "body",
+        "m",
+        "free bodies",
+        moves=True,
+        own=True,
+        tolerance=1e-3,
+        reason="a millimetre: chosen for bodies of centimetres (--tolerance body=5mm for larger "
+        "ones)",
+    ),
+    Quantity(
+        "body rotation",
+        "rad",
+        "rotation of free bodies",
+        moves=True,
+        own=True,
+        tolerance=np.radians(1.0),
+        reason="a degree: it moves what is 57 mm from the origin by 1 mm",
+    ),
+    Quantity("energy", "J", "energy"),
+    Quantity("contact", "s", "first touches"),
+    Quantity("force", "N", "normal forces"),
+)
+QUANTITIES = {quantity.name: quantity for quantity in _KINDS}
 
 
 @dataclass(frozen=True)
@@ -104,15 +134,14 @@ def tolerance_of(
             f"what one count of a 12-bit encoder moves it, at a reach of {reach:.2f} m",
         )
     if kind == "energy":
-        changes = max(float(np.ptp(v[np.isfinite(v)])) if np.isfinite(v).any() else 0.0
-                      for v in (left, right))  # fmt: skip
+        change = max(_change(left), _change(right))
         return Tolerance(
-            max(_ENERGY * changes, 1e-9),
-            f"1 % of {rounded(changes, 'J')}, by which the energy changes in the run",
+            max(_ENERGY * change, 1e-9),
+            f"1 % of {rounded(change, 'J')}, by which the energy changes in the run",
         )
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
-        acting = max(float(v[v > 0].mean()) if (v > 0).any() else 0.0 for v in (left, right))
+        acting = max(_mean_acting(left), _mean_acting(right))
         return Tolerance(
             max(_FORCE * acting, 1e-6),
             "5 % of the mean force while they touch",
@@ -123,9 +152,22 @@ def tolerance_of(
     )
 
 
+def _change(energies: Array) -> float:
+    """Return the difference between the largest and the smallest finite energy (n,) [J]."""
+    finite = energies[np.isfinite(energies)]
+    return float(np.ptp(finite)) if len(finite) else 0.0
+
+
+def _mean_acting(forces: Array) -> float:
+    """Return the mean of forces (n,) [N] where there is one."""
+    acting = forces[forces > 0]
+    return float(acting.mean()) if len(acting) else 0.0
+
+
 # What a size is given in: the suffix, its size in SI, and the SI unit.
+_DEGREE = np.pi / 180
 _SUFFIXES = (
-    ("deg", np.pi / 180, "rad"),
+    ("deg", _DEGREE, "rad"),
     ("rad", 1.0, "rad"),
     ("mm", 1e-3, "m"),
     ("cm", 1e-2, "m"),
@@ -244,21 +286,26 @@ class ContactNames:
     def _names(self, left: int, right: int) -> tuple[str, str]:
         """Both, worked out once: a contact lasts for many steps."""
         if (left, right) not in self._pairs:
-            ordered = sorted((left, right), key=self._distance, reverse=True)
-            owners = [self._owner(geom) for geom in ordered]
-            pair, own = " on ".join(owners), [self._geoms[geom] for geom in ordered]
+            upper, lower = sorted((left, right), key=self._distance, reverse=True)
+            pair = f"{self._owner(upper)} on {self._owner(lower)}"
             shapes = [
-                name for name, owner in zip(own, owners, strict=True) if name not in ("", owner)
+                self._geoms[geom]
+                for geom in (upper, lower)
+                if self._geoms[geom] not in ("", self._owner(geom))
             ]
-            self._pairs[left, right] = pair, pair + (f" ({' on '.join(shapes)})" if shapes else "")
+            with_shapes = f"{pair} ({' on '.join(shapes)})" if shapes else pair
+            self._pairs[left, right] = pair, with_shapes
         return self._pairs[left, right]
 
     def _owner(self, geom: int) -> str:
+        """Return the body of a geom; the geom itself where that is fixed to the world."""
         body = self._body_of[geom]
-        return self._bodies[body] if body else self._geoms[geom] or self._bodies[0]
+        if body == 0 and self._geoms[geom]:
+            return self._geoms[geom]
+        return self._bodies[body]
 
     def _distance(self, geom: int) -> tuple[int, int]:
-        """How many bodies are between a geom and the world, and the number of its own."""
+        """Return how many bodies are between a geom and the world, and the number of its own."""
         body = above = self._body_of[geom]
         for count in range(len(self._parents)):
             if not above:
@@ -274,10 +321,10 @@ def together(contacts: Iterable[str]) -> str:
     """Contacts in a list, the geoms of one pair of bodies behind it: "a on b (c, d), e on f"."""
     parts = (contact.partition(" (") for contact in contacts)
     geoms = grouped((pair, shapes.removesuffix(")")) for pair, _, shapes in parts)
-    pairs = [
-        f"{pair} ({', '.join(filter(None, shapes))})" if any(shapes) else pair
-        for pair, shapes in geoms.items()
-    ]
+    pairs = []
+    for pair, shapes in geoms.items():
+        named = [shape for shape in shapes if shape]
+        pairs.append(f"{pair} ({', '.join(named)})" if named else pair)
     return few(pairs, _LISTED)
 
 

@@ -152,12 +152,15 @@ def percent(part: float | None) -> str:
 
 def count(number: int, thing: str, zero: str = "0") -> str:
     """A number of things: "1 step", "2,000 steps"."""
-    return f"{f'{number:,}' if number else zero} {thing}" + ("" if number == 1 else "s")
+    things = thing if number == 1 else f"{thing}s"
+    return f"{number:,} {things}" if number else f"{zero} {things}"
 
 
 def listed(words: Sequence[str]) -> str:
     """Words in a row: "a, b and c"."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
@@ -202,5 +205,7 @@ def command(words: Iterable[str], *options: tuple[str, object, object]) -> str:
     typed = [*words]
     for flag, value, usual in options:
         if value != usual:
-            typed += [flag] if value is True else [flag, str(value)]
+            typed.append(flag)
+            if value is not True:
+                typed.append(str(value))
     return " ".join(map(shlex.quote, typed))

@@ -8,7 +8,7 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -43,8 +43,11 @@ SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "statemachine",
     "pdf.fonttype": 42,
     "text.parse_math": False,  # a name may have a $ in it
-    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor"), INK),
-    **dict.fromkeys(("xtick.color", "ytick.color"), INK),
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
 }
 _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
@@ -124,7 +127,7 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
     Raises:
         MissingEngineError: matplotlib is not installed.
     """
-    sizes = [_SIZES[type(picture)](picture) for picture in pictures]
+    sizes = [_size_of(picture) for picture in pictures]
     heights = [height for _, height in sizes]
 
     def draw() -> Any:
@@ -144,7 +147,15 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
 
 def draw_picture(axes: Any, picture: Drawn) -> None:
     """Draw a picture on axes of matplotlib's."""
-    cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
+    match picture:
+        case Traces():
+            _traces(axes, picture)
+        case Slots():
+            _slots(axes, picture)
+        case Pipeline():
+            _pipeline(axes, picture)
+        case Bars():
+            _bars(axes, picture)
 
 
 def chart(picture: Traces, size: tuple[float, float], box: Box) -> str:
@@ -171,19 +182,16 @@ def chart(picture: Traces, size: tuple[float, float], box: Box) -> str:
 
 
 def _traces(axes: Any, picture: Traces) -> None:
-    # "engine: what": one colour for what, one kind of line for an engine.
-    parts = {name: name.rpartition(": ")[::2] for name in picture.curves}
-    engines, things = (list(dict.fromkeys(words)) for words in zip(*parts.values(), strict=True))
+    """Draw curves over one axis, with the tolerance and the chaos floor where they are known."""
     curves = [(np.asarray(x, float), np.asarray(y, float)) for x, y in picture.curves.values()]
     every = np.concatenate([y for _, y in curves])
     least = _log_axis(axes, every, picture.tolerance) if picture.log else -np.inf
-    for k, ((x, y), (name, (engine, thing))) in enumerate(zip(curves, parts.items(), strict=True)):
-        colour = _COLOURS[things.index(thing) % len(_COLOURS)]
-        style: dict[str, Any] = {"linestyle": _LINES[engines.index(engine) % 4], "color": colour}
-        if picture.sides:
-            style = GAP if picture.log else SIDES[k]
-        places = _parted(x, np.where(y == 0, 0.0, np.maximum(y, least))) if picture.log else (x, y)
-        axes.plot(*places, label=name, **style)
+    styles = _styles(picture)
+    for name, (x, y), style in zip(picture.curves, curves, styles, strict=True):
+        points = x, y
+        if picture.log:
+            points = _parted(x, np.where(y == 0, 0.0, np.maximum(y, least)))
+        axes.plot(*points, label=name, **style)
     _spanned(axes, every, picture.least)
     if picture.tolerance:
         axes.axhline(picture.tolerance, color=INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
@@ -202,6 +210,24 @@ def _traces(axes: Any, picture: Traces) -> None:
         axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
+def _styles(picture: Traces) -> list[dict[str, Any]]:
+    """Return the style of each curve.
+
+    Of curves that are called "engine: what", what has one colour, an engine one kind of line.
+    """
+    if picture.sides:
+        return [GAP if picture.log else SIDES[k] for k in range(len(picture.curves))]
+    parts = [name.rpartition(": ") for name in picture.curves]
+    engines = list(dict.fromkeys(engine for engine, _, _ in parts))
+    things = list(dict.fromkeys(thing for _, _, thing in parts))
+    styles = []
+    for engine, _, thing in parts:
+        colour = _COLOURS[things.index(thing) % len(_COLOURS)]
+        line = _LINES[engines.index(engine) % len(_LINES)]
+        styles.append({"linestyle": line, "color": colour})
+    return styles
+
+
 def _spanned(axes: Any, values: Array, least: float) -> None:
     """Let the vertical axis go over so much at least: what does not matter is not blown up."""
     values = values[np.isfinite(values)]
@@ -211,13 +237,14 @@ def _spanned(axes: Any, values: Array, least: float) -> None:
 
 
 def _log_axis(axes: Any, values: Array, tolerance: float | None) -> float:
-    """A log axis with a level of its own for what is exactly zero, parted from the rest.
+    """Make the axis a log one with a level of its own for what is exactly zero.
 
     Returns:
         The least value that has a place: below a thousandth of the tolerance nothing matters.
     """
     shown = values[np.isfinite(values) & (values > 0)]
-    shown = np.append(shown, tolerance) if tolerance else shown
+    if tolerance:
+        shown = np.append(shown, tolerance)
     most, least = (shown.max(), shown.min()) if len(shown) else (1.0, 1.0)
     high = math.ceil(math.log10(most) + 0.05)
     low = min(math.floor(math.log10(least)), high - 2)
@@ -231,8 +258,10 @@ def _log_axis(axes: Any, values: Array, tolerance: float | None) -> float:
     room = max(2, int(axes.bbox.height / axes.figure.dpi / 0.35))
     powers = range(high, low - 1, -(high - low + 1) // room)[::-1]
     names = [f"{10.0**k:g}" if k in _WRITTEN_OUT else f"1e{k}".replace("-", "−") for k in powers]
-    zero = [0.0] if has_zero else []
-    axes.set_yticks([*zero, *(10.0**k for k in powers)], [*(["0"] * len(zero)), *names])
+    ticks = [10.0**k for k in powers]
+    if has_zero:
+        ticks, names = [0.0, *ticks], ["0", *names]
+    axes.set_yticks(ticks, names)
     axes.minorticks_off()
     return below
 
@@ -316,15 +345,15 @@ def _bars(axes: Any, picture: Bars) -> None:
     axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
-_DRAW = {
-    Traces: _traces,
-    Slots: _slots,
-    Pipeline: _pipeline,
-    Bars: _bars,
-}
-_SIZES: dict[type, Callable[[Any], tuple[float, float]]] = {
-    Traces: lambda _: (7.0, 3.4),
-    Slots: lambda _: (7.5, 2.6),
-    Bars: lambda p: (7.0, 0.9 + 0.42 * len(p.names)),
-    Pipeline: lambda p: (7.5, 0.26 * max(len(content) for _, content in p.stages) + 1.6),
-}
+def _size_of(picture: Drawn) -> tuple[float, float]:
+    """Return width and height of a picture [inches]."""
+    match picture:
+        case Traces():
+            return 7.0, 3.4
+        case Slots():
+            return 7.5, 2.6
+        case Bars(names=names):
+            return 7.0, 0.9 + 0.42 * len(names)
+        case Pipeline(stages=stages):
+            longest = max(len(content) for _, content in stages)
+            return 7.5, 0.26 * longest + 1.6

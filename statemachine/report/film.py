@@ -25,7 +25,7 @@ from ..errors import BadInputError, MissingEngineError, TraceError
 from ..installed import require_extra
 from ..interface import Array, Model
 from ..measures import nearest
-from ..page import Figures, Picture, RobotPicture
+from ..page import Picture, RobotPicture
 from ..runs import Trace
 from ..runs.drive import Progress, silent
 from ..runs.whole import replace_file
@@ -36,8 +36,15 @@ from .over_time import charts_of
 SUFFIX = ".webp"
 FILM_SIZE = (640, 480)  # width and height [pixels]
 _LONGEST = 5000  # pictures of one film
-_WEBP: dict[str, Any] = {"format": "WEBP", "save_all": True, "loop": 0, "quality": 70, "method": 3}
-_WEBP |= {"kmin": 30, "kmax": 60}  # pictures between those that stand alone
+_WEBP: dict[str, Any] = {
+    "format": "WEBP",
+    "save_all": True,
+    "loop": 0,
+    "quality": 70,
+    "method": 3,
+    "kmin": 30,  # pictures between those that stand alone
+    "kmax": 60,
+}
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,25 @@ class Timing:
         return np.diff(np.round(1000 * ends)).astype(int).tolist()
 
 
+@dataclass(frozen=True)
+class FilmFile:
+    """A film that was written.
+
+    Attributes:
+        path: Where it was written.
+        pictures: How many it has.
+        seconds: How long it takes to watch [s].
+        size: Of the file [bytes].
+        renderer: What drew it.
+    """
+
+    path: Path
+    pictures: int
+    seconds: float
+    size: int
+    renderer: str
+
+
 def check_film(path: Path) -> None:
     """Check that there can be such a film, before anything is run.
 
@@ -92,7 +118,7 @@ def write_film(
     comparison: Comparison | None = None,
     *,
     progress: Progress = silent,
-) -> Figures:
+) -> FilmFile:
     """Write a film of one trace, or of two and how far apart they are.
 
     Args:
@@ -102,12 +128,6 @@ def write_film(
         renderer: What draws.
         comparison: Of the two; has the tolerance that is drawn.
         progress: Told the fraction that is done.
-
-    Returns:
-        path: Where it was written.
-        pictures: How many; seconds: how long it takes to watch [s].
-        size: Bytes.
-        renderer: What drew it.
 
     Raises:
         BadInputError: See `check_film`; or there would be too many pictures.
@@ -136,7 +156,7 @@ def write_film(
         replace_file(path, lambda out: write_webp(out, pictures(), timing.milliseconds))
     finally:
         shots.close()
-    return Figures(
+    return FilmFile(
         path=path,
         pictures=timing.count,
         seconds=sum(timing.milliseconds) / 1000,
@@ -185,7 +205,9 @@ def frames(
     sides = [
         motion_of(trace, model, timing.times) for trace, model in zip(traces, models, strict=True)
     ]
-    return drawn(sides, size, camera or camera_for(sides, size[0] / size[1]), renderer)
+    if camera is None:
+        camera = camera_for(sides, size[0] / size[1])
+    return drawn(sides, size, camera, renderer)
 
 
 def motion_of(trace: Trace, model: Model, times: Array) -> Motion:

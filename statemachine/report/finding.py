@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from ..compare.perturbed import CLEAR, Chance, ChaosFloor
 from ..compare.series import SETTLED, at_the_end
 from ..measures import QUANTITIES
 from ..measures.text import capital, few, grouped, listed, quantity, rounded, short_time
-from ..page import Block, Figures, Headline, Table, TableCell
+from ..page import Block, Headline, Table, TableCell
 from ..runs import Trace
 from . import template
-from .template import if_true
-from .why import answer, proofs
+from .template import if_true, slots_of
+from .why_answer import answer, proofs
 
 if TYPE_CHECKING:
     from ..compare.why import Explanation
@@ -54,38 +55,50 @@ ENDS = {
 
 def headline(
     comparison: Comparison,
-    events: Sequence[Figures],
+    events: Sequence[Event],
     explanation: Explanation | None = None,
     floor: ChaosFloor | None = None,
 ) -> Headline:
-    """The largest difference, what explains it, and what is left of it in the end."""
-    agreements, until = comparison.agreements, comparison.until
+    """Return the largest difference, what explains it, and what is left of it in the end."""
     if comparison.agrees:
-        same = all(agreement.max == 0 for agreement in agreements)
-        return Headline(LEADS["same" if same else "agree"].format(until=until))
+        same = all(agreement.max == 0 for agreement in comparison.agreements)
+        return Headline(LEADS["same" if same else "agree"].format(until=comparison.until))
     if comparison.ended:
-        sides = [s.label for s in (comparison.left, comparison.right) if s.trace.header.ended]
-        lead = LEADS["ended"].format(
-            sides=" and ".join(sides),
-            until=until,
-            agrees=sum(agreement.verdict == "agrees" for agreement in agreements),
-            total=len(agreements),
-        )
-        return Headline(lead, holds=False)
+        return _of_an_early_end(comparison)
     what, far, at, agreement = subject(comparison, explanation, floor)
-    contact = agreement if agreement and agreement.kind == "contact" else None
-    left, right = short_labels(comparison)
-    lead = LEADS["contact" if contact else "apart"].format(
-        what=name_of(contact.name) if contact else what,
-        far=(contact and contact.note) or far,
-        at=short_time(at),
-        left=left,
-        right=right,
-        parting=_parting(comparison, events),
-    )
+    parting_words = _parting(comparison, events)
+    if agreement is not None and agreement.kind == "contact":
+        what = name_of(agreement.name)
+        far = agreement.note if agreement.note else far
+        lead = LEADS["contact"].format(what=what, far=far, parting=parting_words)
+    else:
+        left, right = short_labels(comparison)
+        lead = LEADS["apart"].format(
+            what=what,
+            far=far,
+            at=short_time(at),
+            left=left,
+            right=right,
+            parting=parting_words,
+        )
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
-    end = _by_chance(comparison, floor, agreement) or _in_the_end(comparison, agreement)
+    end = _by_chance(comparison, floor, agreement)
+    if not end:
+        end = _in_the_end(comparison, agreement)
     return Headline(capital(lead), causes, end, holds=False)
+
+
+def _of_an_early_end(comparison: Comparison) -> Headline:
+    """Return the headline of a comparison of which a run ended before its time."""
+    sides = [side.label for side in (comparison.left, comparison.right) if side.trace.header.ended]
+    verdicts = Counter(agreement.verdict for agreement in comparison.agreements)
+    lead = LEADS["ended"].format(
+        sides=" and ".join(sides),
+        until=comparison.until,
+        agrees=verdicts["agrees"],
+        total=len(comparison.agreements),
+    )
+    return Headline(lead, holds=False)
 
 
 def _by_chance(
@@ -112,7 +125,7 @@ def floor_sides(comparison: Comparison, floor: ChaosFloor) -> str:
     return left if floor.sides == (0,) else right
 
 
-def _parting(comparison: Comparison, events: Sequence[Figures]) -> str:
+def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
     """When the runs part; of moments farther apart than timesteps, which is the first."""
     at = parting(comparison)
     if at is None:
@@ -254,127 +267,270 @@ def parting(comparison: Comparison) -> float | None:
 
 
 def in_words(comparison: Comparison) -> list[Block]:
-    """What a reader should know before the figures."""
-    agreements, holds, ended = comparison.agreements, comparison.agrees, comparison.ended
-    worst, first = leading(comparison), parting(comparison)
-    counts = Counter(agreement.verdict for agreement in agreements)
-    unlike, cut = not holds and not ended, bool(ended and not holds)
-    parted = [named(a) for a in agreements if first is not None and a.since == first]
-    return template.blocks(
-        "finding",
-        total=len(agreements),
+    """Return what a reader should know before the figures."""
+    slots = slots_of(_verdicts_of(comparison), _worst_of(comparison), _first_parting_of(comparison))
+    return template.blocks("finding", **slots)
+
+
+@dataclass(frozen=True)
+class _Verdicts:
+    """How many quantities agree, and which sentences that makes.
+
+    Attributes:
+        total: How many quantities there are.
+        moments: How many moments were compared.
+        agrees: How many quantities agree.
+        settles: How many settle.
+        differs: How many differ.
+        within: "" where all agree.
+        cut: "" where a run ended before its time.
+        unlike: "" where neither is so.
+    """
+
+    total: int
+    moments: int
+    agrees: int
+    settles: int
+    differs: int
+    within: str | None
+    cut: str | None
+    unlike: str | None
+
+
+def _verdicts_of(comparison: Comparison) -> _Verdicts:
+    counts = Counter(agreement.verdict for agreement in comparison.agreements)
+    unlike = not comparison.agrees and not comparison.ended
+    return _Verdicts(
+        total=len(comparison.agreements),
         moments=comparison.moments,
-        within=if_true(holds),
-        cut=if_true(cut),
+        agrees=counts["agrees"],
+        settles=counts["settles"],
+        differs=counts["differs"],
+        within=if_true(comparison.agrees),
+        cut=if_true(comparison.ended),
         unlike=if_true(unlike),
-        **{kind: counts[kind] for kind in ("agrees", "settles", "differs")},
-        far=quantity(worst.max, worst.unit),
-        tolerance=quantity(worst.tolerance, worst.unit),
-        at=short_time(worst.at),
-        nearest=name_of(worst.name) if holds and worst.max else None,
-        farthest=named(worst) if unlike and worst.kind != "contact" else None,
-        first=parted[0] if cut and parted else None,
-        parted=short_time(first or 0.0),
     )
 
 
+@dataclass(frozen=True)
+class _Worst:
+    """The quantity that is farthest beyond its tolerance.
+
+    Attributes:
+        far: Its largest difference.
+        tolerance: Its tolerance.
+        at: When the difference is largest.
+        nearest: What it is called where all agree and something differs at all; else None.
+        farthest: What it is called where not all agree; else None.
+    """
+
+    far: str
+    tolerance: str
+    at: str
+    nearest: str | None
+    farthest: str | None
+
+
+def _worst_of(comparison: Comparison) -> _Worst:
+    worst = leading(comparison)
+    nearest = farthest = None
+    if comparison.agrees and worst.max:
+        nearest = name_of(worst.name)
+    if not comparison.agrees and not comparison.ended and worst.kind != "contact":
+        farthest = named(worst)
+    far, tolerance = (quantity(value, worst.unit) for value in (worst.max, worst.tolerance))
+    return _Worst(far, tolerance, short_time(worst.at), nearest, farthest)
+
+
+@dataclass(frozen=True)
+class _FirstParting:
+    """What leaves its tolerance first before a run ends early.
+
+    Attributes:
+        first: What it is called; None for nothing.
+        parted: When.
+    """
+
+    first: str | None = None
+    parted: str | None = None
+
+
+def _first_parting_of(comparison: Comparison) -> _FirstParting:
+    at = parting(comparison)
+    if at is None or not comparison.ended:
+        return _FirstParting()
+    first = next(a for a in comparison.agreements if a.since == at)
+    return _FirstParting(named(first), short_time(at))
+
+
 def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
-    """How the floor was made, how high it is, and which gaps may be chance."""
+    """Say how the floor was made, how high it is, and which gaps may be chance."""
+    return template.blocks(
+        "floor",
+        clear=f"{CLEAR:g}",
+        **slots_of(_perturbed_of(comparison, floor), _chances_of(floor)),
+    )
+
+
+@dataclass(frozen=True)
+class _Perturbed:
+    """The runs that a chaos floor is made of.
+
+    Attributes:
+        sides: What was run again.
+        recorded: The side that was not; None for none.
+        runs: How many more times each.
+        changed: By what.
+        ended: How many of the runs ended early; None for none.
+        most: How far they get from the run of their own side; None where that has no bound.
+    """
+
+    sides: str
+    recorded: str | None
+    runs: int
+    changed: str
+    ended: int | None
+    most: str | None
+
+
+def _perturbed_of(comparison: Comparison, floor: ChaosFloor) -> _Perturbed:
+    recorded = None
+    for side, label in enumerate(short_labels(comparison)):
+        if side not in floor.sides:
+            recorded = label
+    sizes = _highest(floor)
+    return _Perturbed(
+        sides=floor_sides(comparison, floor),
+        recorded=recorded,
+        runs=floor.runs,
+        changed=changed_by(floor),
+        ended=floor.ended if floor.ended else None,
+        most=listed(sizes) if sizes and not floor.ended else None,
+    )
+
+
+def _highest(floor: ChaosFloor) -> list[str]:
+    """Return the highest floor of all angles, and that of all lengths."""
     sizes = []
     for unit in ("rad", "m"):
         bands = [band for band in floor.bands if band.unit == unit]
         if bands:
             highest = max(bands, key=lambda band: band.most)
             sizes.append(f"{quantity(highest.most, unit)} ({name_of(highest.name)})")
+    return sizes
+
+
+@dataclass(frozen=True)
+class _Chances:
+    """Which gaps may be chance.
+
+    Attributes:
+        every_gap: "" where every gap is inside the floor all the time.
+        later: Quantities that are inside it in the end alone; None for none.
+        inside: Quantities of which nothing can be concluded; None for none.
+        between: Those of which it cannot be told; None for none.
+    """
+
+    every_gap: str | None
+    later: str | None
+    inside: str | None
+    between: str | None
+
+
+def _chances_of(floor: ChaosFloor) -> _Chances:
     motion = [band for band in floor.bands if band.kind != "contact"]
     everywhere = all(band.inside_from == 0 for band in motion)
-    moving = [
+    is_chaotic = any(band.most > 0 for band in motion)
+    later = [
         f"{name_of(band.name)} from {short_time(band.inside_from)} on"
         for band in motion
         if band.inside_from is not None and band.most > 0 and band.chance == "beyond"
     ]
-
-    def named(chance: Chance) -> str | None:
-        names = [name_of(band.name) for band in floor.bands if band.chance == chance]
-        return few(names, _NAMED) if names else None
-
-    recorded = {0, 1} - set(floor.sides)
-    return template.blocks(
-        "floor",
-        sides=floor_sides(comparison, floor),
-        recorded=short_labels(comparison)[recorded.pop()] if recorded else None,
-        runs=floor.runs,
-        changed=changed_by(floor),
-        ended=floor.ended or None,
-        most=listed(sizes) if sizes and not floor.ended else None,
-        clear=f"{CLEAR:g}",
-        every_gap=if_true(everywhere and any(band.most > 0 for band in motion)),
-        later=few(moving, _NAMED) if moving else None,
-        inside=named("inside"),
-        between=named("cannot be told"),
+    return _Chances(
+        every_gap=if_true(everywhere and is_chaotic),
+        later=few(later, _NAMED) if later else None,
+        inside=_names_with(floor, "inside"),
+        between=_names_with(floor, "cannot be told"),
     )
 
 
+def _names_with(floor: ChaosFloor, chance: Chance) -> str | None:
+    """Return the quantities with a chance, in a sentence; None for none."""
+    names = [name_of(band.name) for band in floor.bands if band.chance == chance]
+    return few(names, _NAMED) if names else None
+
+
 def changed_by(floor: ChaosFloor) -> str:
-    """What was changed in the runs that it is made of."""
+    """Return what was changed in the runs that it is made of."""
     size = floor.uncertain
     sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
     start = f", and the start by {listed(sizes)}" if sizes else ""
     return f"start and commands changed by rounding ({floor.rounding:g}){start}"
 
 
-def events_of(comparison: Comparison) -> list[Figures]:
-    """First touches on each side, where each quantity parts, largest differences, early ends.
+@dataclass(frozen=True)
+class Event:
+    """Something that happens in one of two runs, or between them.
 
-    Returns:
+    Attributes:
         time: Since the start [s].
-        kind: "touch", "part", "largest" or "end".
+        kind: A first touch, a quantity that leaves its tolerance, a largest difference, or the
+            early end of a run.
         text: What happens, in a few words.
-        side: 0 or 1, or None for both.
-        what: What touches what; empty otherwise.
+        side: 0 for the left, 1 for the right; None for what is between them.
+        what: What touches what; "" of other kinds.
     """
+
+    time: float
+    kind: Literal["touch", "part", "largest", "end"]
+    text: str
+    side: int | None = None
+    what: str = ""
+
+
+def events_of(comparison: Comparison) -> list[Event]:
+    """Return first touches, where each quantity parts, largest differences, and early ends."""
+    events: list[Event] = []
+    for touch in comparison.touches:
+        for side, contacts in enumerate((touch.left, touch.right)):
+            if contacts.first is not None:
+                text = f"first touch: {touch.pair}"
+                events.append(Event(contacts.first, "touch", text, side, touch.pair))
     parted = [
-        (agreement.since, agreement.at, agreement.name.replace(", ", " "))
+        agreement
         for agreement in comparison.agreements
         if agreement.kind != "contact" and agreement.since is not None
     ]
-    rows: list[tuple[float, str, str, int | None, str]] = [
-        *(
-            (contact.first, "touch", f"first touch: {touch.pair}", side, touch.pair)
-            for touch in comparison.touches
-            for side, contact in enumerate((touch.left, touch.right))
-            if contact.first is not None
-        ),
-        *(
-            (since, "part", f"beyond tolerance from here: {'; '.join(names)}", None, "")
-            for since, names in grouped((since, name) for since, _, name in parted).items()
-        ),
-        *(
-            (at, "largest", f"largest difference: {'; '.join(names)}", None, "")
-            for at, names in grouped((at, name) for _, at, name in parted).items()
-        ),
-        *(
-            ((len(trace) - 1) * trace.timestep, "end", f"ends early: {ended}", number, "")
-            for number, trace in enumerate(traces_of(comparison))
-            if (ended := trace.header.ended)
-        ),
-    ]
-    names = ("time", "kind", "text", "side", "what")
-    events = [Figures(**dict(zip(names, row, strict=True))) for row in rows]
+    by_since = grouped((agreement.since, name_of(agreement.name)) for agreement in parted)
+    for since, names in by_since.items():
+        if since is not None:
+            text = f"beyond tolerance from here: {'; '.join(names)}"
+            events.append(Event(since, "part", text))
+    by_largest = grouped((agreement.at, name_of(agreement.name)) for agreement in parted)
+    for at, names in by_largest.items():
+        events.append(Event(at, "largest", f"largest difference: {'; '.join(names)}"))
+    for side, trace in enumerate(traces_of(comparison)):
+        if trace.header.ended:
+            end = (len(trace) - 1) * trace.timestep
+            events.append(Event(end, "end", f"ends early: {trace.header.ended}", side))
     return sorted(events, key=lambda event: event.time)
 
 
 def events_table(comparison: Comparison) -> Table:
-    """What happens when; the same on both sides at the same time is one row."""
-    sides = grouped(((event.time, event.text), event.side) for event in events_of(comparison))
-    where = {None: "between them", **dict(enumerate(long_labels(comparison)))}
-    return Table.of(
-        sides,
-        {
-            "time": lambda event: TableCell(short_time(event[0]), at=event[0]),
-            "what": lambda event: capital(event[1]),
-            "on": lambda event: "both" if {0, 1} <= {*sides[event]} else where[sides[event][0]],
-        },
+    """Return what happens when; the same on both sides at the same time is one row."""
+    both = grouped(((event.time, event.text), event.side) for event in events_of(comparison))
+    rows = []
+    for (time, text), sides in both.items():
+        where = "both" if {0, 1} <= set(sides) else _where(sides[0], comparison)
+        rows.append((TableCell(short_time(time), at=time), capital(text), where))
+    return Table(
+        ("time", "what", "on"),
+        rows,
         "First touches, partings, largest differences; press a time to go there",
-        words={"what", "on"},
+        words=frozenset({0, 1, 2}),
     )
+
+
+def _where(side: int | None, comparison: Comparison) -> str:
+    """Return what a side is called; None is between the two."""
+    return "between them" if side is None else long_labels(comparison)[side]

@@ -4,44 +4,101 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from ..grading.class_table import ClassEntry, verdict_word
 from ..grading.exercise import Grade
 from ..grading.faults.run import Examination, FaultTrial
 from ..grading.judges import JUDGES
 from ..measures.text import count
-from ..page import Page, Table, Text, Verdict
-from . import template
-from .template import if_true, versions_of
+from ..page import Page, Table
+from ..show.templates import PageContent, render
+from .template import versions_of
+
+# What is said where a student's code is not kept from the files of this machine.
+ONLY_WATCHED = (
+    "This system has no sandbox for a student's code: what it reads is only watched, not prevented "
+    "(docs/teaching.md)."
+)
+_WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
+
+
+@dataclass(frozen=True)
+class _Remark:
+    """A remark on a function, or with "" on the file as a whole, and whether it passed."""
+
+    function: str
+    text: str
+    passed: bool
+
+
+@dataclass(frozen=True)
+class GradePage(PageContent):
+    """Content of the page of a file that was judged.
+
+    Attributes:
+        grade: Of the file.
+        remarks: On its functions.
+    """
+
+    template = "grade.md.j2"
+    grade: Grade
+    remarks: Sequence[_Remark]
+    only_watched: str = ONLY_WATCHED
 
 
 def grade_page(grade: Grade) -> Page:
     """Make the page of what each function does, and how many do what they should."""
-    return template.page(
-        "grade",
-        file=grade.file,
-        backend=grade.backend,
-        versions=versions_of(grade.versions),
-        judgements=_verdicts(grade),
-        right=grade.right,
-        total=len(grade.functions),
-        todo=f"; {grade.unwritten} not written yet" if grade.unwritten else "",
-        passed=if_true(grade.passed),
-        unwritten=if_true(grade.unwritten),
-        watched=ONLY_WATCHED if grade.is_watched else None,
-    )
+    return render(GradePage(grade, _remarks(grade)))
 
 
-def _verdicts(grade: Grade) -> list[Verdict]:
-    """Return a verdict for each remark on each function; once, where it is of the whole file."""
-    remarks = {judgement.remarks for judgement in grade.functions}
-    if len(remarks) == 1 and grade.right == 0 and len(grade.functions) > 1:
-        return [Verdict(text, False) for text in remarks.pop()]
-    verdicts: list[Verdict] = []
+def _remarks(grade: Grade) -> list[_Remark]:
+    """Return each remark on each function; once, where it is of the whole file."""
+    texts = {judgement.remarks for judgement in grade.functions}
+    if len(texts) == 1 and grade.right == 0 and len(grade.functions) > 1:
+        return [_Remark("", text, False) for text in texts.pop()]
+    remarks: list[_Remark] = []
     for judgement in grade.functions:
         for text in judgement.remarks:
-            verdicts.append(Verdict(f"{judgement.function}: {text}", judgement.passed))
-    return verdicts
+            remarks.append(_Remark(judgement.function, text, judgement.passed))
+    return remarks
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What somebody should look at in a file."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class ClassPage(PageContent):
+    """Content of the page of a class.
+
+    Attributes:
+        entries: Table with a row for each submission.
+        size: How many students or files count, in words.
+        made_with: Versions and settings.
+        solved: How many have all functions right.
+        ignored: Names of files that were not looked at.
+        is_watched: Whether what some code reads is only watched, not prevented.
+        copies: Submissions with the same code as another.
+        looks: What somebody should look at.
+        unjudged: Submissions that were not judged.
+    """
+
+    template = "classroom.md.j2"
+    entries: Table
+    size: str
+    made_with: str
+    solved: int
+    ignored: Sequence[str]
+    is_watched: bool
+    copies: Sequence[ClassEntry]
+    looks: Sequence[_Look]
+    unjudged: Sequence[ClassEntry]
+    only_watched: str = ONLY_WATCHED
 
 
 def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
@@ -52,24 +109,24 @@ def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Pa
         ignored: Names of files that were not looked at.
     """
     # With a roster, files of nobody on it are not counted.
-    counted = [entry for entry in entries if entry.student] or entries
-    unjudged = [
-        Verdict(f"{entry.name}: {entry.why_not_judged}", False)
-        for entry in entries
-        if not entry.judged
-    ]
-    return template.page(
-        "classroom",
-        rows=count(len(counted), "student" if counted[0].student else "file"),
-        made_with=entries[0].made_with,
-        table=class_table(entries),
+    counted = [entry for entry in entries if entry.student]
+    if not counted:
+        counted = list(entries)
+    looks: list[_Look] = []
+    for entry in entries:
+        looks += [_Look(entry.name, text) for text in entry.looks]
+    content = ClassPage(
+        class_table(entries),
+        count(len(counted), "student" if counted[0].student else "file"),
+        entries[0].made_with,
         solved=sum(entry.solved for entry in counted),
-        ignored=", ".join(ignored) or None,
-        watched=ONLY_WATCHED if any(entry.watched for entry in entries) else None,
-        notes=_notes(entries),
-        unjudged=unjudged,
-        all_judged=None if unjudged else True,
+        ignored=ignored,
+        is_watched=any(entry.watched for entry in entries),
+        copies=[entry for entry in entries if entry.same_as],
+        looks=looks,
+        unjudged=[entry for entry in entries if not entry.judged],
     )
+    return render(content)
 
 
 def class_table(entries: Sequence[ClassEntry]) -> Table:
@@ -86,43 +143,34 @@ def class_table(entries: Sequence[ClassEntry]) -> Table:
     return Table.of(entries, filled, words=filled, wide={"predictions", "alike"})
 
 
-def _notes(entries: Sequence[ClassEntry]) -> list[Text]:
-    """Return which submissions are the same, and what somebody should look at."""
-    notes: list[Text] = []
-    for entry in entries:
-        if entry.same_as:
-            notes.append(Text(f"{entry.name} has the same code as {entry.same_as}."))
-    for entry in entries:
-        notes += [Text(f"{entry.name}: {look}") for look in entry.looks]
-    return notes
+@dataclass(frozen=True)
+class FaultsPage(PageContent):
+    """Content of the page of what tests catch.
 
+    Attributes:
+        examination: Of the tests.
+        trials: Table with a row for each fault.
+    """
 
-# What is said where a student's code is not kept from the files of this machine.
-ONLY_WATCHED = (
-    "This system has no sandbox for a student's code: what it reads is only watched, not prevented "
-    "(docs/teaching.md)."
-)
-_WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
+    template = "faults.md.j2"
+    examination: Examination
+    trials: Table
+
+    @property
+    def failures(self) -> list[str]:
+        """Tests that fail on the healthy arm, each with the beginning of what it says."""
+        failures = self.examination.failures
+        return [_cut(f"{failure.test}: {failure.why}", _SHOWN) for failure in failures]
+
+    @property
+    def idle_tests(self) -> tuple[str, ...]:
+        """Tests that caught none of several faults."""
+        return self.examination.idle if len(self.examination.trials) > 1 else ()
 
 
 def faults_page(examination: Examination) -> Page:
     """Make the page of what tests catch."""
-    failures = examination.failures
-    return template.page(
-        "faults",
-        file=examination.file,
-        tests=count(len(examination.tests), "test"),
-        backend=examination.backend,
-        version=examination.engine_version,
-        trials=None if failures else faults_table(examination),
-        hints=[Text(f"{fault.name}: {fault.hint}.") for fault in examination.missed],
-        idle=_idle_tests(examination),
-        healthy=None if failures else examination.holds,
-        caught=examination.caught,
-        faults=count(len(examination.trials), "fault"),
-        unhealthy=False if failures else None,
-        failures=[Text(_cut(f"{failure.test}: {failure.why}", _SHOWN)) for failure in failures],
-    )
+    return render(FaultsPage(examination, faults_table(examination)))
 
 
 def faults_table(examination: Examination) -> Table:
@@ -135,17 +183,9 @@ def faults_table(examination: Examination) -> Table:
     return Table.of(
         examination.trials,
         columns,
-        "One fault at a time",
         words={"what is wrong", "caught by"},
         emphasis=lambda trial: not trial.caught,
     )
-
-
-def _idle_tests(examination: Examination) -> str | None:
-    """Return the tests that caught none of several faults; None where there are none."""
-    if examination.failures or len(examination.trials) < 2 or not examination.idle:
-        return None
-    return ", ".join(examination.idle)
 
 
 def _catchers(trial: FaultTrial) -> str:

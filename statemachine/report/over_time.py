@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,12 @@ from ..compare import Agreement, Comparison, Series
 from ..compare.perturbed import ChaosFloor
 from ..compare.series import NORMAL, normal_forces, total_forces
 from ..interface import Array
-from ..measures import same_pairs
+from ..measures import distances, same_pairs
 from ..measures.text import figure, quantity, reading, short_time
-from ..page import Figures, Interactive, Traces
+from ..page import Interactive, Traces
 from . import template
-from .finding import long_labels, name_of, traces_of
+from .finding import Event, long_labels, name_of, traces_of
+from .template import slots_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"
@@ -53,40 +54,49 @@ class QuantityChart(Interactive):
     def said(self) -> str:
         """What it shows, for those who do not see it."""
         gap = self.agreement
+        far, settled, tolerance = (
+            quantity(value, gap.unit) for value in (gap.max, gap.settled, gap.tolerance)
+        )
         return SAID.format(
             title=self.title,
-            far=quantity(gap.max, gap.unit),
+            far=far,
             at=short_time(gap.at),
-            settled=quantity(gap.settled, gap.unit),
-            tolerance=quantity(gap.tolerance, gap.unit),
+            settled=settled,
+            tolerance=tolerance,
             since="never" if gap.since is None else f"at {short_time(gap.since)}",
         )
 
     def values(self) -> Traces | None:
-        """Both sides: a position as the way from where the first side began; None without."""
+        """Return both sides: a position as the way from where the first began; None without."""
         curve, scale = self.curve, reading(self.curve.unit)[0]
         if not curve.left.size:
             return None
-        sides = [
-            np.linalg.norm(side - curve.left[0], axis=1) if side.ndim > 1 else side
-            for side in (curve.left, curve.right)
-        ]
-        curves = dict(zip(self.labels, ((curve.time, scale * side) for side in sides), strict=True))
+        title, left, right = self.title, curve.left, curve.right
+        if left.ndim > 1:
+            title = f"{title}, from its start"
+            left, right = distances(left, curve.left[0]), distances(right, curve.left[0])
+        left_label, right_label = self.labels
+        curves = {
+            left_label: (curve.time, scale * left),
+            right_label: (curve.time, scale * right),
+        }
         # What does not matter is not blown up to the height of the chart.
         least = 20 * scale * self.agreement.tolerance
-        title = f"{self.title}, from its start" if curve.left.ndim > 1 else self.title
         return Traces(f"{title} [{self.unit}]", "", "", curves, sides=True, least=least)
 
     def gap(self) -> Traces:
-        """How far apart they are, with the tolerance and the chaos floor."""
+        """Return how far apart they are, with the tolerance and the chaos floor."""
         time, scale = self.curve.time, reading(self.curve.unit)[0]
-        name = "" if self.curve.left.size else f"{self.title}: "
         verdict = "DIFFERS" if self.agreement.verdict == "differs" else self.agreement.verdict
+        title = f"{verdict}, {quantity(self.agreement.max, self.agreement.unit)}"
+        if not self.curve.left.size:  # this is the only chart of the quantity
+            title = f"{self.title}: {title}"
+        curves = {GAP: (time, scale * self.curve.difference)}
         return Traces(
-            f"{name}{verdict}, {quantity(self.agreement.max, self.agreement.unit)}",
-            "",
-            "",
-            {GAP: (time, scale * self.curve.difference)},
+            title,
+            across="",
+            up="",
+            curves=curves,
             log=True,
             sides=True,
             tolerance=scale * self.agreement.tolerance,
@@ -108,7 +118,7 @@ class BothRuns(Interactive):
 
     comparison: Comparison
     start: float
-    events: tuple[Figures, ...]
+    events: tuple[Event, ...]
     charts: tuple[QuantityChart, ...]
     lead: tuple[int, ...]
 
@@ -116,39 +126,84 @@ class BothRuns(Interactive):
 def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[QuantityChart, ...]:
     """A chart for each quantity that is a number throughout; of many, those most beyond."""
     agreements = {agreement.name: agreement for agreement in comparison.agreements}
-    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
-    drawn = [curve for curve in comparison.curves if np.isfinite(curve.difference).all()]
+    bands: dict[str, Array] = {}
+    if floor is not None:
+        bands = {band.name: band.width for band in floor.bands}
+    finite = [curve for curve in comparison.curves if np.isfinite(curve.difference).all()]
     ranked = sorted(
-        drawn, key=lambda curve: (curve.kind != "tip", -agreements[curve.name].tolerances())
+        finite, key=lambda curve: (curve.kind != "tip", -agreements[curve.name].tolerances())
     )
-    return tuple(
-        QuantityChart(
-            name_of(curve.name),
-            curve,
-            agreements[curve.name],
-            long_labels(comparison),
-            foot_of(curve, comparison),
-            bands.get(curve.name),
-        )
-        for curve in drawn
-        if curve in ranked[:CHARTS_SHOWN]
-    )
+    shown = ranked[:CHARTS_SHOWN]
+    charts = []
+    for curve in finite:
+        if curve in shown:
+            chart = QuantityChart(
+                title=name_of(curve.name),
+                curve=curve,
+                agreement=agreements[curve.name],
+                labels=long_labels(comparison),
+                foot=foot_of(curve, comparison),
+                floor=bands.get(curve.name),
+            )
+            charts.append(chart)
+    return tuple(charts)
+
+
+@dataclass(frozen=True)
+class _FootSlots:
+    """The slots of the template "over_time"; a line with a slot that is None is left out.
+
+    Attributes:
+        by: What computed the energies.
+        left: What the left side is called.
+        right: What the right side is called.
+        left_normal: Its largest normal force on the left.
+        right_normal: On the right.
+        left_whole: The largest of the whole force on the left.
+        right_whole: On the right.
+    """
+
+    by: str | None = None
+    left: str | None = None
+    right: str | None = None
+    left_normal: str | None = None
+    right_normal: str | None = None
+    left_whole: str | None = None
+    right_whole: str | None = None
 
 
 def foot_of(curve: Series, comparison: Comparison) -> str:
-    """Under a chart of the energy by what it was computed; of a force its other figure."""
-    (left_label, right_label), traces = long_labels(comparison), traces_of(comparison)
-    by = dict.fromkeys(trace.header.energy_by or trace.header.backend for trace in traces)
-    slots: dict[str, Any] = {"by": " and ".join(by) if curve.kind == "energy" else None}
-    slots |= {"left": left_label if curve.kind == "force" else None, "right": right_label}
-    if curve.kind == "force":
+    """Say under a chart of the energy what computed it; under one of a force its other figure."""
+    if curve.kind == "energy":
+        headers = [trace.header for trace in traces_of(comparison)]
+        by = dict.fromkeys(header.energy_by or header.backend for header in headers)
+        slots = _FootSlots(by=" and ".join(by))
+    elif curve.kind == "force":
         pair = curve.name.removesuffix(NORMAL)
-        for name, forces_of in (("normal", normal_forces), ("whole", total_forces)):
-            left, right = map(forces_of, traces)
-            for side, forces in (("left", left), ("right", same_pairs(left, right))):
-                strongest = float(forces[pair].max()) if pair in forces else 0.0
-                slots[f"{side}_{name}"] = figure(strongest)
-    return " ".join(template.texts("over_time", **slots))
+        left, right = traces_of(comparison)
+        left_label, right_label = long_labels(comparison)
+        left_normal, right_normal = _strongest(pair, normal_forces(left), normal_forces(right))
+        left_whole, right_whole = _strongest(pair, total_forces(left), total_forces(right))
+        slots = _FootSlots(
+            left=left_label,
+            right=right_label,
+            left_normal=left_normal,
+            right_normal=right_normal,
+            left_whole=left_whole,
+            right_whole=right_whole,
+        )
+    else:
+        return ""
+    return " ".join(template.texts("over_time", **slots_of(slots)))
+
+
+def _strongest(pair: str, left: Mapping[str, Array], right: Mapping[str, Array]) -> tuple[str, str]:
+    """Return the largest force between two bodies on the left and on the right, as text."""
+    texts = []
+    for forces in (left, same_pairs(left, right)):
+        strongest = float(forces[pair].max()) if pair in forces else 0.0
+        texts.append(figure(strongest))
+    return texts[0], texts[1]
 
 
 def spans(mask: NDArray[np.bool_], time: Array, step: float, until: float) -> list[list[float]]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ..compare import Agreement, Comparison, SidesRun
 from ..compare.alike import commands_alike
+from ..compare.series import PairContacts, Touch
 from ..measures.text import (
     NONE,
     figure,
@@ -17,12 +18,12 @@ from ..measures.text import (
     sentence,
     short_time,
 )
-from ..page import Block, Figures, Headline, Items, Section, Table, TableCell, Text
+from ..page import Block, Headline, Items, Section, Table, TableCell, Text
 from ..runs import Header, Trace
 from . import template
 from .finding import long_labels, moment, name_of, short_labels, traces_of, window
 from .template import if_true
-from .why import missing
+from .why_answer import missing
 
 _PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 # Of the promises that a backend may emulate, those that move the arm, in plain words.
@@ -43,16 +44,18 @@ def commanded(comparison: Comparison) -> list[Block]:
         return []
     if without_actuation((left, right)):
         return [Text("The actuators of the file are off on both sides: nothing is commanded.")]
-    same = commands_alike(left, right)
-    traces = {"": left} if same else {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
-    columns = {
-        f"{side}{when}": map(figure, trace.ctrl[row].tolist())
-        for side, trace in traces.items()
-        for when, row in (("at the start", 0), ("in the end", -1))
-    }
-    rows = list(zip(actuators, *columns.values(), strict=True))
-    heading = f"What was commanded ({'' if same else 'not '}the same on both sides)"
-    table = Table(("actuator", *columns), rows, "ctrl, by actuator")
+    if commands_alike(left, right):
+        heading = "What was commanded (the same on both sides)"
+        traces = {"": left}
+    else:
+        heading = "What was commanded (not the same on both sides)"
+        traces = {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
+    columns: dict[str, list[str]] = {"actuator": list(actuators)}
+    for side, trace in traces.items():
+        columns[f"{side}at the start"] = [figure(value) for value in trace.ctrl[0].tolist()]
+        columns[f"{side}in the end"] = [figure(value) for value in trace.ctrl[-1].tolist()]
+    rows = list(zip(*columns.values(), strict=True))
+    table = Table(list(columns), rows, "ctrl, by actuator")
     return [Section("", heading, [table], folded=True, detail=True)]
 
 
@@ -63,19 +66,16 @@ def without_actuation(traces: Sequence[Trace]) -> bool:
 
 def contact_words(comparison: Comparison) -> Table:
     """How hard each pair of bodies presses in the end on each side, and how deep it overlaps."""
-    labels, touches = short_labels(comparison), comparison.touches
-    hardest = sorted(
-        touches,
-        key=lambda t: (max(t.left.force, t.right.force), max(t.left.deepest, t.right.deepest)),
-        reverse=True,
-    )[:_PAIRS_SHOWN]
+    touches = comparison.touches
+    hardest = sorted(touches, key=_pressing, reverse=True)[:_PAIRS_SHOWN]
+    left, right = short_labels(comparison)
+    rows = []
+    for touch in hardest:
+        rows.append((touch.pair, left, *_contact_cells(touch.left)))
+        rows.append((touch.pair, right, *_contact_cells(touch.right)))
     return Table(
         ("bodies", "side", "force, N", "with friction, N", "deepest", "at, s", "last touch"),
-        [
-            (touch.pair, label, *_contact_cells(side))
-            for touch in hardest
-            for label, side in zip(labels, (touch.left, touch.right), strict=True)
-        ],
+        rows,
         f"Who presses hardest ({len(hardest)} of {len(touches)} pairs; forces are means over "
         f"{window(comparison)}, depths are of the whole run)",
         words=frozenset({0, 1}),
@@ -83,21 +83,33 @@ def contact_words(comparison: Comparison) -> Table:
     )
 
 
-def _contact_cells(contact: Figures) -> tuple[str, ...]:
+def _pressing(touch: Touch) -> tuple[float, float]:
+    """Return what pairs of bodies are ranked by: force [N], then depth [m], on either side."""
+    force = max(touch.left.force, touch.right.force)
+    return force, max(touch.left.deepest, touch.right.deepest)
+
+
+def _contact_cells(contact: PairContacts) -> tuple[str, ...]:
+    """Return the cells of a pair of bodies on one side."""
     if contact.first is None:
         return NONE, NONE, NONE, NONE, "never touches"
+    last = "in the end"
+    if not contact.ends and contact.last is not None:
+        last = short_time(contact.last)
     return (
         figure(contact.force),
         figure(contact.total),
         quantity(contact.deepest, "m"),
         moment(contact.deepest_at),
-        "in the end" if contact.ends else short_time(contact.last or 0.0),
+        last,
     )
 
 
 def unmatched(run: SidesRun | None) -> list[Block]:
     """What one side has nothing of, what could not be matched, and what was not by name."""
-    lines = [*missing(run.missing), *run.unmatched] if run else []
+    if run is None:
+        return []
+    lines = [*missing(run.missing), *run.unmatched]
     return [Items([sentence(line) for line in lines])] if lines else []
 
 
@@ -148,9 +160,10 @@ def also_open(headline: Headline, played: Comparison | None) -> Headline:
 def _cells(agreement: Agreement | None) -> tuple[str, str]:
     if agreement is None:
         return NONE, NONE
-    note = agreement.note if agreement.kind == "contact" else ""
     verdict = TableCell(agreement.verdict, verdict=agreement.verdict)
-    return verdict, note or quantity(agreement.max, agreement.unit)
+    if agreement.kind == "contact" and agreement.note:
+        return verdict, agreement.note
+    return verdict, quantity(agreement.max, agreement.unit)
 
 
 def emulated(comparison: Comparison) -> list[Block]:
@@ -178,16 +191,16 @@ def emulated(comparison: Comparison) -> list[Block]:
 
 def provenance(comparison: Comparison) -> Table:
     """What made both sides."""
-    headers = comparison.left.trace.header, comparison.right.trace.header
-    left, right = (header.provenance.versions for header in headers)
-    a, b = (facts_of(header) for header in headers)
-    ran = ["recorded, opened here" if h.recorded else "run for this page" for h in headers]
-    rows = [
-        ("ran as", *ran),
-        *((name, left.get(name, NONE), right.get(name, NONE)) for name in left | right),
-        ("rows", f"{comparison.left.rows}", f"{comparison.right.rows}"),
-        *((name, a[name], b[name]) for name in a if a[name] or b[name]),
-    ]
+    left, right = comparison.left.trace.header, comparison.right.trace.header
+    rows = [("ran as", _ran_as(left), _ran_as(right))]
+    versions, others = left.provenance.versions, right.provenance.versions
+    for name in versions | others:
+        rows.append((name, versions.get(name, NONE), others.get(name, NONE)))
+    rows.append(("rows", f"{comparison.left.rows}", f"{comparison.right.rows}"))
+    facts, other_facts = facts_of(left), facts_of(right)
+    for name, fact in facts.items():
+        if fact or other_facts[name]:
+            rows.append((name, fact, other_facts[name]))
     return Table(
         ("what", *long_labels(comparison)),
         rows,
@@ -196,19 +209,27 @@ def provenance(comparison: Comparison) -> Table:
     )
 
 
+def _ran_as(header: Header) -> str:
+    """Say whether a run was made for this page."""
+    return "recorded, opened here" if header.recorded else "run for this page"
+
+
 def facts_of(header: Header) -> dict[str, str]:
-    """What made a run, apart from versions."""
+    """Return what made a run, apart from versions."""
     source = header.provenance
-    substeps = f" in {header.substeps} substeps" if header.substeps > 1 else ""
-    return {
-        "model": source.model_file,
-        "its SHA-256": TableCell(source.model_sha256, code=True),
-        "defaults": header.defaults,
-        "options": ", ".join(f"{name} {value}" for name, value in header.options.items()) or "none",
-        "starts in": header.keyframe or "the default state",
-        "timestep": milliseconds(header.timestep) + substeps,
-        "gravity": numbers(header.gravity) + " m/s²",
-        "seed": "none drawn" if source.seed is None else f"{source.seed}",
-        "energies by": header.energy_by or NONE,
-        "made again by": TableCell(header.command, code=True),
-    }
+    options = ", ".join(f"{name} {value}" for name, value in header.options.items())
+    timestep = milliseconds(header.timestep)
+    if header.substeps > 1:
+        timestep += f" in {header.substeps} substeps"
+    facts: dict[str, str] = {}
+    facts["model"] = source.model_file
+    facts["its SHA-256"] = TableCell(source.model_sha256, code=True)
+    facts["defaults"] = header.defaults
+    facts["options"] = options if options else "none"
+    facts["starts in"] = header.keyframe if header.keyframe else "the default state"
+    facts["timestep"] = timestep
+    facts["gravity"] = f"{numbers(header.gravity)} m/s²"
+    facts["seed"] = "none drawn" if source.seed is None else f"{source.seed}"
+    facts["energies by"] = header.energy_by if header.energy_by else NONE
+    facts["made again by"] = TableCell(header.command, code=True)
+    return facts

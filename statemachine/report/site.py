@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..backends import backend_names, load
 from ..compare import Request, compare, run_sides, witness
-from ..compare.why import explain
+from ..compare.why import WhyRequest, explain
 from ..errors import MissingEngineError
 from ..installed import available
 from ..lessons import LESSONS, Lesson
@@ -113,7 +113,7 @@ def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     asked = scenario(name)
     left = load(asked.model, backend=backends[0])
     right = load(asked.model, backend=backends[1], defaults="engine")
-    page = why.page(explain(left, right, asked))
+    page = why.page(explain(WhyRequest(left, right, asked)))
     return replace(
         page,
         title=f"{name}, engines as they come: why",

@@ -13,12 +13,15 @@ A slot whose value is "" stands for a condition; see `if_true`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from string import Formatter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..lessons.template import blocks_of, filled, text_of
 from ..page import Block, Headline, Items, Page, Table
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 def page(name: str, headline: Headline | None = None, /, **slots: Any) -> Page:
@@ -63,6 +66,14 @@ def _blocks(paragraphs: Sequence[str], slots: Mapping[str, Any]) -> list[Block]:
         if not (isinstance(block, Table) and not block.rows)
         and not (isinstance(block, Items) and not block.texts)
     ]
+
+
+def slots_of(*records: DataclassInstance) -> dict[str, Any]:
+    """Return the fields of records by name, as the slots of a template."""
+    slots: dict[str, Any] = {}
+    for record in records:
+        slots |= {field.name: getattr(record, field.name) for field in fields(record)}
+    return slots
 
 
 def if_true(holds: object) -> str | None:

@@ -64,6 +64,14 @@ def code(value: object) -> Markdown:
     return Markdown(f"{fence}{padding}{text}{padding}{fence}")
 
 
+def prose(text: str) -> Markdown:
+    """Return a sentence as Markdown, in which what stands between backticks is code."""
+    parts: list[str] = []
+    for span in spans(str(text)):
+        parts.append(code(span.text) if span.kind == "code" else escape(span.text))
+    return Markdown("".join(parts))
+
+
 def spans(text: str) -> Iterator[Span]:
     """Yield the spans of a paragraph; of a plain text, code is what stands between backticks."""
     if not isinstance(text, Markdown):

@@ -43,7 +43,7 @@ from ..page import (
     Text,
     Verdict,
 )
-from .markdown import code, escape, parser, plain_text
+from .markdown import code, escape, parser, plain_text, prose
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -179,7 +179,7 @@ FILTERS: dict[str, Callable[..., str | int]] = {
     "joined": _joined,
     "versions": _versions,
     "code": code,
-    "markdown": Markdown,
+    "prose": prose,
 }
 
 

@@ -14,7 +14,8 @@ from ...engines.records import TURNED, ModelDifference
 from ...interface import Model
 from ...measures.text import few
 from ..matching import Matched, match_models
-from ..why.causes import data_of, differences_of, order_of_mocap, order_of_qpos, sensors_of
+from ..why.causes import data_of, differences_of, sensors_of
+from ..why.run_differences import order_of_mocap, order_of_qpos
 from .ledger import Key, Ledger, Value
 
 _CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise

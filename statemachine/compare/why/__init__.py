@@ -1,16 +1,22 @@
 """Why two sides differ: one explanation for files, engines and settings.
 
-- `explain`: the question, and its answer as a record
-- `causes`: what differs, and the line of the file that says it
+- `request`, `explanation`: the question and the answer, as records; `explain` goes from one to the
+  other
+- `causes`: what differs; `run_differences`: in the start, the commands, the order of elements;
+  `written`: the line of the file that says it
 - `settings`: what an engine as it comes sets, and what can be left out
-- `trials`: the runs, each made once; `gap`: what they are measured by, and what touches first
-- `shapley`: shares of a gap among causes, and where the rest comes from
+- `setup`: how each side is run with some causes equalized; `order`: as a function of the user's
+  sees it; `trials`: the runs, each made once
+- `gap`: what runs are measured by, and what touches first; `explained_gap`: the one to divide
+- `shapley`: shares of a gap among causes; `locate`: where the rest comes from
 - `verdict`: what is answered, and whether that answers the question
 """
 
 from __future__ import annotations
 
-from .explain import Explanation, explain
+from .explain import explain
+from .explanation import Explanation, Share
+from .request import WhyRequest
 from .shapley import ADDS_UP
 from .verdict import UNEXPLAINED, GapVerdict
 
@@ -19,5 +25,7 @@ __all__ = [
     "UNEXPLAINED",
     "Explanation",
     "GapVerdict",
+    "Share",
+    "WhyRequest",
     "explain",
 ]

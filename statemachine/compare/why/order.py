@@ -9,13 +9,12 @@ that finds its joints by name finds them in both.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from ...backends import load
 from ...engines import room
-from ...engines.records import BodyPair, Counterparts
+from ...engines.records import BodyPair, Counterparts, Pairs
 from ...installed import DEFAULT
 from ...interface import Array, Data, Model
 from ...rotations import HERE, Placement
@@ -54,14 +53,14 @@ def in_order_of_left(left: Model, right: Model, matched: Matched) -> Model:
         matched: What of the left is what of the right.
     """
     own = room(DEFAULT)
+    solids = [
+        BodyPair(pair.right, pair.left, _inverse(pair.align), pair.moved) for pair in matched.solids
+    ]
     swapped = Counterparts(
         joints=_turned(matched.joints),
         sites=_turned(matched.sites),
         actuators=_turned(matched.actuators),
-        solids=tuple(
-            BodyPair(pair.right, pair.left, _inverse(pair.align), pair.moved)
-            for pair in matched.solids
-        ),
+        solids=tuple(solids),
     )
     rows = [
         *own.differences(right.compiled, left.compiled, swapped),
@@ -80,7 +79,7 @@ def _inverse(align: Placement) -> Placement:
     return HERE if align is HERE else align.inverse
 
 
-def _turned(pairs: Any) -> tuple[tuple[int, int], ...]:
+def _turned(pairs: Pairs) -> Pairs:
     return tuple(sorted((b, a) for a, b in pairs))
 
 
@@ -107,7 +106,7 @@ def seen_in_order_of_left(
     data = room(DEFAULT).data_in_other_order(shown, _elements(shown, matched, mocap_in_order))
     data.ctrl[:] = starts[0]
 
-    def translate(time: float, source: Data) -> Any:
+    def translate(time: float, source: Data) -> Array | None:
         data.show(source)
         before = np.array(data.ctrl)
         wanted = controller(time, data)
@@ -116,12 +115,32 @@ def seen_in_order_of_left(
             data.ctrl[:] = np.asarray(wanted, np.float64)
         elif np.array_equal(before, data.ctrl):  # nor did it write into data.ctrl
             return None
-        return commands_by_number(data.ctrl, slots, starts[1])
+        return _by_number(data.ctrl, slots, starts[1])
 
     return translate
 
 
-def commands_by_number(values: Array, slots: list[tuple[int, int]], start: Array) -> Array:
+def sorted_by_number(
+    controller: Controller, slots: list[tuple[int, int]], start: Array
+) -> Controller:
+    """Return a controller whose list of commands is sorted into ctrl of the right.
+
+    Args:
+        controller: Writes a list of commands.
+        slots: Which of its commands is for which number of the right's ctrl.
+        start: (nu,) ctrl of the right, which what nobody commands keeps.
+    """
+
+    def translate(time: float, data: Data) -> Array | None:
+        ctrl = controller(time, data)
+        if ctrl is None:
+            return None
+        return _by_number(np.asarray(ctrl, np.float64), slots, start)
+
+    return translate
+
+
+def _by_number(values: Array, slots: list[tuple[int, int]], start: Array) -> Array:
     """Return ctrl (nu,) of the right from a list of commands (n,), which may be too short."""
     ctrl = np.array(start)
     for slot, number in slots:

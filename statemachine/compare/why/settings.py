@@ -8,6 +8,7 @@ law of contact, is only located: it is left out on both sides.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ import numpy as np
 from ...engines.records import Dials, ModelDifference, Setting
 from ...interface import JointType, Model
 from ...measures.text import milliseconds, rounded, significant
-from ...page import Figures
 
 # In the order of the tables: the world before the robot.
 TITLES: Mapping[str, str] = {
@@ -45,19 +45,32 @@ NEEDS: Mapping[str, str] = {
 _FINER = 4
 
 
-# What both engines compute, each in its own way, and what can be left out: its name, what a run
-# without it is, and the option of `Model.replace` with the value that leaves it out.
+@dataclass(frozen=True)
+class Feature:
+    """What both engines compute, each in its own way, and what can be left out.
+
+    Attributes:
+        name: What it is called.
+        without: What a run without it is, in words.
+        option: The option of `Model.replace` that leaves it out.
+        value: What that option is given; of "substeps", how many times as many.
+    """
+
+    name: str
+    without: str
+    option: str
+    value: float
+
+
 # What acts now and then comes first. Gravity and the servos are not among them: they drive the
 # motion, and with it goes whatever there is between two sides.
 FEATURES = (
-    Figures(name="contact", without="nothing touches", option="contacts", value=False),
-    Figures(name="limits", without="no joint limits", option="limits", value=False),
-    Figures(name="frictionloss", without="no dry friction", option="frictionloss", value=0.0),
-    Figures(name="damping", without="no damping", option="damping", value=0.0),
-    Figures(name="armature", without="no armature", option="armature", value=0.0),
-    Figures(
-        name="timestep", without=f"steps {_FINER} times finer", option="substeps", value=_FINER
-    ),
+    Feature("contact", "nothing touches", "contacts", False),
+    Feature("limits", "no joint limits", "limits", False),
+    Feature("frictionloss", "no dry friction", "frictionloss", 0.0),
+    Feature("damping", "no damping", "damping", 0.0),
+    Feature("armature", "no armature", "armature", 0.0),
+    Feature("timestep", f"steps {_FINER} times finer", "substeps", _FINER),
 )
 
 
@@ -73,7 +86,7 @@ class OwnSettings:
     """
 
     def __init__(self, dials: Dials, other: Model, actuated: bool) -> None:
-        """Of an engine as it comes.
+        """Find what of an engine as it comes differs from the model.
 
         Args:
             dials: Those of its room.
@@ -81,34 +94,52 @@ class OwnSettings:
             actuated: Whether its motors follow ctrl.
         """
         self._dials, self._other, self._actuated = dials, other, actuated
-        model, self.emulated = dials.model, dials.emulated
-        alike = {
-            "gravity": np.array_equal(model.gravity, other.gravity),
-            "timestep": (model.timestep, model.substeps) == (other.timestep, other.substeps),
-            "armature": not self.emulated.dof_armature.any(),
-            "frictionloss": not self.emulated.dof_frictionloss.any(),
-            "limits": not self.emulated.jnt_limited.any(),
-            "self-collision": not dials.self_pairs,
-            "equality": self.emulated.compiled is None or not self.emulated.compiled.neq,
-        }
+        self.emulated = dials.emulated
+        alike = self._alike_in_the_world() | self._alike_in_the_robot()
         self.names = tuple(name for name in TITLES if not alike.get(name))
 
+    def _alike_in_the_world(self) -> dict[str, bool]:
+        """Tell of gravity and timestep whether the engine has them as the other side."""
+        model, other = self._dials.model, self._other
+        steps, other_steps = (model.timestep, model.substeps), (other.timestep, other.substeps)
+        return {
+            "gravity": np.array_equal(model.gravity, other.gravity),
+            "timestep": steps == other_steps,
+        }
+
+    def _alike_in_the_robot(self) -> dict[str, bool]:
+        """Tell of parts of a robot whether this one has none of them."""
+        emulated = self.emulated
+        return {
+            "armature": not emulated.dof_armature.any(),
+            "frictionloss": not emulated.dof_frictionloss.any(),
+            "limits": not emulated.jnt_limited.any(),
+            "self-collision": not self._dials.self_pairs,
+            "equality": emulated.compiled is None or not emulated.compiled.neq,
+        }
+
     def differences(self, side: int) -> list[ModelDifference]:
-        """The settings as differences; `side` is that of the engine as it comes, 0 or 1."""
-        rows = []
+        """Return the settings as differences; `side` is that of the engine as it comes, 0 or 1."""
+        rows: list[ModelDifference] = []
         for name in self.names:
-            source = self._other if name in ("gravity", "timestep") else self.emulated
-            own, model = self._own_word(name), _word(name, source)
-            if name == "self-collision":
-                model = f"on, {_count(self._dials.self_pairs, 'pair')}"
-            values = ((TITLES[name], *((model, own) if side else (own, model))),)
-            rows.append(ModelDifference(TITLES[name], "engine", "", values))
+            own, model = self._own_word(name), self._model_word(name)
+            left, right = (model, own) if side else (own, model)
+            title = TITLES[name]
+            rows.append(ModelDifference(title, "engine", "", ((title, left, right),)))
         return rows
+
+    def _model_word(self, name: str) -> str:
+        """Return what the model has of a setting, in a few words."""
+        if name == "self-collision":
+            return f"on, {_count(self._dials.self_pairs, 'pair')}"
+        if name in ("gravity", "timestep"):
+            return _word(name, self._other)
+        return _word(name, self.emulated)
 
     def build(
         self, model: Model, emulated: Model, names: frozenset[str], without: frozenset[str]
     ) -> Model:
-        """The engine with some settings at the model's.
+        """Return the engine with some settings at the model's.
 
         Args:
             model: The file as the engine comes.
@@ -134,25 +165,29 @@ class OwnSettings:
         return type(self._dials)(model, emulated).build(settings, values)
 
     def _own_word(self, name: str) -> str:
-        """What the engine has of a setting, in a few words."""
+        """Return what the engine has of a setting, in a few words."""
         match name:
             case "gravity" | "timestep":
                 return _word(name, self._dials.model)
             case "servo":
-                own = "its motors" if _is_driven(self._dials.model) else "motors in all joints"
-                return own if self._actuated else "motors hold"
+                if not self._actuated:
+                    return "motors hold"
+                if _is_driven(self._dials.model):
+                    return "its motors"
+                return "motors in all joints"
             case "surfaces":
                 return f"friction {_span(self._dials.frictions)}, hard"
         return self._dials.words[name]
 
 
 def leave_out(model: Model, features: frozenset[str]) -> Model:
-    """A Model without some features, by `Model.replace`."""
-    options = {
-        feature.option: _FINER * model.substeps if feature.option == "substeps" else feature.value
-        for feature in FEATURES
-        if feature.name in features
-    }
+    """Return a Model without some features, by `Model.replace`."""
+    options: dict[str, float] = {}
+    for feature in FEATURES:
+        if feature.name in features:
+            options[feature.option] = feature.value
+    if "substeps" in options:
+        options["substeps"] = _FINER * model.substeps
     return model.replace(**options) if options else model
 
 
@@ -162,13 +197,17 @@ def _word(name: str, model: Model) -> str:
             return rounded(float(np.linalg.norm(model.gravity)), "m/s²")
         case "timestep":
             text = milliseconds(model.timestep, 3)
-            return f"{text} / {model.substeps}" if model.substeps > 1 else text
+            if model.substeps > 1:
+                return f"{text} / {model.substeps}"
+            return text
         case "armature" | "damping" | "frictionloss":
             return _span(getattr(model, f"dof_{name}"))
         case "servo":
             gains = model.actuator_kp[np.isfinite(model.actuator_kp)]
+            if not gains.size:
+                return "no servos"
             idle = "" if _is_driven(model) else ", else none"
-            return f"kp {_span(gains)}{idle}" if gains.size else "no servos"
+            return f"kp {_span(gains)}{idle}"
         case "limits":
             return f"soft, {int(model.jnt_limited.sum())} joints"
         case "equality" if model.compiled is not None:
@@ -183,13 +222,13 @@ def _count(number: int, thing: str) -> str:
 
 
 def _is_driven(model: Model) -> bool:
-    """Whether each hinge and slide has an actuator of its own."""
+    """Tell whether each hinge and slide has an actuator of its own."""
     kinds = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     return set(np.flatnonzero(kinds)) <= set(model.actuator_jntid)
 
 
 def _span(values: Any) -> str:
-    """The numbers of an array that are not zero: one, or the least and the largest."""
+    """Return the numbers of an array that are not zero: one, or the least and the largest."""
     numbers = np.unique(np.asarray(values)[np.asarray(values) != 0])
     if not numbers.size:
         return "none"

@@ -15,9 +15,8 @@ import numpy as np
 from ...errors import check_name
 from ...interface import Array
 from ...measures.text import command
-from ...page import Figures
 from ...rotations import HERE, Placement
-from .records import SCALAR, Robot
+from .records import SCALAR, Link, Robot, RobotFrame
 from .tree import Group, GroupTree
 
 _NEAR, _TILT = 5e-3, 0.1  # [m] and [rad] within which two axes may be one
@@ -70,7 +69,7 @@ class Matching:
 
 
 def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
-    """A description whose joints, links and frames go by other names.
+    """Return a description whose joints, links and frames go by other names.
 
     Raises:
         UnknownNameError: It has nothing of such a name.
@@ -81,18 +80,21 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     def of(name: str) -> str:
         return names.get(name, name)
 
-    links = tuple(
-        replace(
-            link,
-            name=of(link.name),
-            parent=of(link.parent),
-            joint=link.joint and replace(link.joint, name=of(link.joint.name)),
-        )
-        for link in robot.links
+    def relinked(link: Link) -> Link:
+        joint = link.joint
+        if joint is not None:
+            joint = replace(joint, name=of(joint.name))
+        return replace(link, name=of(link.name), parent=of(link.parent), joint=joint)
+
+    actuators = robot.actuators
+    if actuators is not None:
+        actuators = tuple(replace(drive, joint=of(drive.joint)) for drive in actuators)
+    return replace(
+        robot,
+        links=tuple(relinked(link) for link in robot.links),
+        frames=tuple(RobotFrame(of(f.name), of(f.link), f.place) for f in robot.frames),
+        actuators=actuators,
     )
-    frames = tuple(Figures(name=of(f.name), link=of(f.link), place=f.place) for f in robot.frames)
-    drives = robot.actuators and tuple(replace(a, joint=of(a.joint)) for a in robot.actuators)
-    return replace(robot, links=links, frames=frames, actuators=drives)
 
 
 def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matching:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...interface import Array
-from ...page import Figures
 from ...rotations import HERE, Placement, rotation
 
 Range = tuple[float, float]
@@ -164,6 +163,21 @@ class Actuator:
     forcerange: Range | None
 
 
+@dataclass(frozen=True, eq=False)
+class RobotFrame:
+    """A site of a robot.
+
+    Attributes:
+        name: As in the file.
+        link: Name of the link that it is fixed to.
+        place: In the link's frame.
+    """
+
+    name: str
+    link: str
+    place: Placement
+
+
 Setting = float | str | tuple[float, ...] | None
 
 
@@ -176,8 +190,7 @@ class Robot:
         reader: What read it, with its version: "XML", "mujoco 4.0.0".
         format: URDF or MJCF, or the engine that was asked.
         links: Parents before children; the first is the root.
-        frames: Sites, each with its name, link, and place in the link's frame; a link is a frame
-            too.
+        frames: Sites; a link is a frame too.
         actuators: None where the format has no word for them.
         settings: Of the simulation, by name; None where the format has no word for them.
         defaults: What its engine takes for a setting that a file does not name.
@@ -190,7 +203,7 @@ class Robot:
     reader: str
     format: str
     links: tuple[Link, ...]
-    frames: tuple[Figures, ...]
+    frames: tuple[RobotFrame, ...]
     actuators: tuple[Actuator, ...] | None
     settings: Mapping[str, Setting] | None
     rooted: bool

@@ -19,7 +19,6 @@ from ...errors import ModelError
 from ...installed import require
 from ...interface import JointType
 from ...measures.text import few
-from ...page import Figures
 from ...rotations import HERE
 from ..description.records import (
     Actuator,
@@ -28,6 +27,7 @@ from ..description.records import (
     Link,
     Range,
     Robot,
+    RobotFrame,
     RobotJoint,
     moved,
 )
@@ -122,14 +122,7 @@ def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
         above = names[raw.body_parentid[body]] if body else ""
         links += _links(raw, body, above, actuators)
         names.append(links[-1].name)
-    frames = tuple(
-        Figures(
-            name=raw.site(i).name or f"site {i}",
-            link=names[raw.site_bodyid[i]],
-            place=placed(raw.site_pos[i], raw.site_quat[i]),
-        )
-        for i in range(raw.nsite)
-    )
+    frames = tuple(_frame(raw, site, names) for site in range(raw.nsite))
     return Robot(
         name=name,
         reader=f"mujoco {mujoco.__version__}",
@@ -142,6 +135,15 @@ def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
         touch=shapes.touch_of(empty, 0),
         rooted=True,
         notes=tuple(_notes(raw, links, actuators)),
+    )
+
+
+def _frame(raw: Any, site: int, links: list[str]) -> RobotFrame:
+    """Return a site as a frame; `links` has the name of the last link of each body."""
+    return RobotFrame(
+        name=raw.site(site).name or f"site {site}",
+        link=links[raw.site_bodyid[site]],
+        place=placed(raw.site_pos[site], raw.site_quat[site]),
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -19,8 +20,7 @@ from ...backends._bullet_weights import weighed_as_it_comes
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
-from ...page import Figures
-from ..records import LeftAlone, WayBack
+from ..records import EngineTerm, UncommandedJoint, WayBack
 from .driven import DrivenClient
 from .world import fresh_world, gravity_of, limp, saved_in_memory
 
@@ -29,7 +29,7 @@ _BEFORE, _AFTER = 10, 100
 
 
 def _raw(model: Model, gravity: bool = True, damping: bool = True) -> closing[World]:
-    """The model in a fresh client, as loadURDF leaves it, with the model's gravity."""
+    """Load the model into a fresh client, as loadURDF leaves it, with the model's gravity."""
     plan = cast("PybulletModel", model).plan
     if not damping:
         raw = copy.copy(plan.raw)
@@ -44,35 +44,34 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> closing[Wo
     return closing(world)
 
 
-def terms(model: Model) -> tuple[Figures, ...]:
-    """What the interface's names are on this engine, by looking at a loaded model."""
+def terms(model: Model) -> tuple[EngineTerm, ...]:
+    """Look at a loaded model: what the interface's names are on this engine."""
+    found: list[EngineTerm] = []
     with _raw(model) as world:
-        return tuple(
-            term
-            for terms_of in (_joint_terms, _free_terms, _frame_terms)
-            for tree in world.trees
-            for term in terms_of(world, tree, model)
-        )
+        for terms_of in (_joint_terms, _free_terms, _frame_terms):
+            for tree in world.trees:
+                found += terms_of(world, tree, model)
+    return tuple(found)
 
 
-def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
-    """The numbers of the joints, and of the fixed ones among them."""
+def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[EngineTerm]:
+    """Yield the numbers of the joints, and of the fixed ones among them."""
     joints = model.compiled.dof_jntid[tree.dofs[tree.base :]]
     for index, place in zip(tree.joints, joints, strict=True):
-        thing, slot = f"joint {model.joint_names[place]}", int(model.jnt_qposadr[place])
-        yield Figures(
-            thing=thing, ours=f"qpos[{slot}]", engine=f"joint {index} of body {tree.body}"
+        yield EngineTerm(
+            thing=f"joint {model.joint_names[place]}",
+            ours=f"qpos[{model.jnt_qposadr[place]}]",
+            engine=f"joint {index} of body {tree.body}",
         )
     infos = joint_infos(world.client, tree.body)
     fixed = [f"{info[1].decode()} is {info[0]}" for info in infos if info[3] < 0]
     if fixed:
-        yield Figures(
-            thing="fixed joints", ours="none", engine=f"take an index too: {', '.join(fixed)}"
-        )
+        indices = f"take an index too: {', '.join(fixed)}"
+        yield EngineTerm(thing="fixed joints", ours="none", engine=indices)
 
 
-def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
-    """Of a free body: a quarter turn about z, and a spin about the body's own x."""
+def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[EngineTerm]:
+    """Yield the terms of a free body: a quarter turn about z, and a spin about the body's own x."""
     if not tree.free:
         return
     qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
@@ -83,20 +82,20 @@ def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
     name = model.body_names[tree.root]
     _, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
     _, spin = pb.getBaseVelocity(tree.body, world.client)
-    yield Figures(
+    yield EngineTerm(
         thing=f"{name}, turned by 90° about z",
         ours=f"w x y z: {_figures(qpos[tree.qpos][3:7])}",
         engine=f"x y z w: {_figures(quat)}",
     )
-    yield Figures(
+    yield EngineTerm(
         thing=f"{name}, spinning about its x",
         ours=f"own axes: {_figures(qvel[tree.qvel][3:6])}",
         engine=f"world axes: {_figures(spin)}",
     )
 
 
-def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
-    """How far apart a link's frame and what the engine calls its position are."""
+def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[EngineTerm]:
+    """Yield how far apart a link's frame and what the engine calls its position are."""
     apart = {}
     for body, link in tree.links.items():
         if link >= 0:
@@ -104,7 +103,7 @@ def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
             apart[body] = float(np.linalg.norm(np.subtract(state[0], state[4])))
     if apart:
         body = max(apart, key=lambda link: apart[link])
-        yield Figures(
+        yield EngineTerm(
             thing=f"position of {model.body_names[body]}",
             ours="its frame",
             engine=f"its centre of mass, {apart[body] * 1e3:.1f} mm away",
@@ -115,63 +114,90 @@ def _figures(values: Array) -> str:
     return " ".join(f"{value + 0.0:.4g}" for value in np.round(values, 12))
 
 
-def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
-    """Leave a joint of a freshly loaded arm alone, and read what its motor exerts.
+@dataclass(frozen=True)
+class _Start:
+    """A way to leave a freshly loaded robot alone.
+
+    Attributes:
+        label: What was done to the engine before.
+        gravity: Whether the model's gravity is set.
+        motors: Whether the engine's own motors stay on.
+        damping: Whether the joints are damped.
+    """
+
+    label: str
+    gravity: bool
+    motors: bool
+    damping: bool
+
+
+_STARTS = (
+    _Start("as loadURDF leaves it", gravity=False, motors=True, damping=True),
+    _Start("gravity set", gravity=True, motors=True, damping=True),
+    _Start("gravity set, motors off", gravity=True, motors=False, damping=True),
+    _Start("… and no joint damping", gravity=True, motors=False, damping=False),
+)
+
+
+def left_alone(model: Model, seconds: float, joint: int) -> tuple[UncommandedJoint, ...]:
+    """Run a freshly loaded robot that nobody commands, and read what a joint's motor exerts.
 
     Args:
         model: The model; its gravity is set, where a run says so.
         seconds: Simulated time, in the engine's own timestep.
         joint: Id of a hinge or slide.
     """
-    steps = max(1, round(seconds / ENGINE_TIMESTEP))
-    runs: list[LeftAlone] = []
     with fresh_world() as client:
-        fresh = float(np.linalg.norm(gravity_of(client)))
-    for label, gravity, motors, damping in (
-        ("as loadURDF leaves it", False, True, True),
-        ("gravity set", True, True, True),
-        ("gravity set, motors off", True, False, True),
-        ("… and no joint damping", True, False, False),
-    ):
-        with _raw(model, gravity, damping) as world:
-            # The engine's own timestep, whatever the model's file says.
-            pb.setTimeStep(ENGINE_TIMESTEP, world.client)
-            tree, index = _joint(world, model, joint)
-            if not motors:
-                for driven in tree.joints:
-                    limp(tree.body, world.client, driven)
-            ratio = _explicit(world, tree)
-            speeds = []
-            for _ in range(steps):
-                pb.stepSimulation(world.client)
-                speeds.append(pb.getJointState(tree.body, index, world.client)[1])
-            state = pb.getJointState(tree.body, index, world.client)
-            places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
-            runs.append(
-                LeftAlone(
-                    label=label,
-                    time=steps * ENGINE_TIMESTEP,
-                    position=float(state[0]),
-                    motor=float(state[3]),
-                    explicit=ratio,
-                    gravity=fresh,
-                    widest=float(np.abs(places).max()),
-                    turns=int((np.diff(np.sign(speeds)) != 0).sum()),
-                    steps=steps,
-                )
-            )
-    return tuple(runs)
+        gravity = float(np.linalg.norm(gravity_of(client)))
+    steps = max(1, round(seconds / ENGINE_TIMESTEP))
+    return tuple(_left_alone(model, start, steps, joint, gravity) for start in _STARTS)
+
+
+def _left_alone(
+    model: Model, start: _Start, steps: int, joint: int, gravity: float
+) -> UncommandedJoint:
+    """Run one start for some steps; `gravity` [m/s²] is that of a fresh world."""
+    with _raw(model, start.gravity, start.damping) as world:
+        # The engine's own timestep, whatever the model's file says.
+        pb.setTimeStep(ENGINE_TIMESTEP, world.client)
+        tree, index = _joint(world, model, joint)
+        if not start.motors:
+            for driven in tree.joints:
+                limp(tree.body, world.client, driven)
+        explicit = _explicit(world, tree)
+        speeds: list[float] = []
+        for _ in range(steps):
+            pb.stepSimulation(world.client)
+            speeds.append(pb.getJointState(tree.body, index, world.client)[1])
+        state = pb.getJointState(tree.body, index, world.client)
+        places = _positions(world, tree)
+    turns = np.diff(np.sign(speeds)) != 0
+    return UncommandedJoint(
+        label=start.label,
+        time=steps * ENGINE_TIMESTEP,
+        position=float(state[0]),
+        motor=float(state[3]),
+        explicit=explicit,
+        gravity=gravity,
+        widest=float(np.abs(places).max()),
+        turns=int(turns.sum()),
+        steps=steps,
+    )
+
+
+def _positions(world: World, tree: Tree) -> list[float]:
+    """Return the positions of a tree's joints [rad or m]."""
+    return [state[0] for state in pb.getJointStates(tree.body, tree.joints, world.client)]
 
 
 def _explicit(world: World, tree: Tree) -> float:
-    """The largest eigenvalue of h·D/M where the tree stands."""
-    places = [state[0] for state in pb.getJointStates(tree.body, tree.joints, world.client)]
+    """Return the largest eigenvalue of h·D/M where the tree stands."""
+    places = _positions(world, tree)
     mass = np.array(pb.calculateMassMatrix(tree.body, places, physicsClientId=world.client))
     damping = [0.0] * tree.base
     damping += [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
-    return float(
-        np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real.max() * ENGINE_TIMESTEP
-    )
+    rates = np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real
+    return float(rates.max() * ENGINE_TIMESTEP)
 
 
 def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
@@ -191,7 +217,7 @@ def _as_loaded(model: Model, qpos: Array, ctrl: Array, steps: int) -> Iterator[D
 
 
 def ways_back(model: Model) -> tuple[WayBack, ...]:
-    """Try each of the engine's own ways to go back, in the middle of contact.
+    """Try which of the engine's own ways to go back is exact, in the middle of contact.
 
     Each run starts in a new client from keyframe 0 (or the default pose), squeezes by
     POSITION_CONTROL, goes on, goes back, and goes on again: are the two futures the same?
@@ -199,7 +225,7 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     key = model.keyframes[0] if model.keyframes else None
     qpos, ctrl = (key.qpos, key.ctrl) if key else (model.compiled.qpos0, np.zeros(model.nu))
 
-    runs = []
+    runs: list[Array] = []
     for _ in range(2):
         with _as_loaded(model, qpos, ctrl, 0) as machine:
             runs.append(machine.positions_along(_BEFORE + _AFTER))
@@ -225,9 +251,9 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
         first = machine.positions_along(_AFTER)
         machine.world.put(*state)
         differences[f"written back {moment}"] = _largest(first, machine.positions_along(_AFTER))
-    return tuple(WayBack(name, off) for name, off in differences.items())
+    return tuple(WayBack(name, difference) for name, difference in differences.items())
 
 
 def _largest(first: Array, second: Array) -> float:
-    """The largest difference of a position after any step [rad or m]."""
+    """Return the largest difference of a position after any step [rad or m]."""
     return float(np.abs(first - second).max(initial=0.0))

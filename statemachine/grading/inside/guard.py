@@ -30,7 +30,7 @@ PUBLIC = (
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
     *PUBLIC, "_models", "drawing", "engines", "freshness", "installed", "measures", "model_files",
-    "page", "probes", "processes", "release_names", "releases", "typed_numbers",
+    "page", "probes", "processes", "release_names", "releases", "show", "typed_numbers",
     "witness",
 )  # fmt: skip
 

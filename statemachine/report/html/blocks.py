@@ -43,6 +43,7 @@ from ..terminal import non_breaking
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
 _ROWS = 21  # of the table under a chart
 _ROUNDING = 1e-6  # of a tolerance
+_DIGEST = 64  # characters of a SHA-256
 _SIZE = (4.0, 1.3)  # inches
 _BOX = (0.12, 0.18, 0.85, 0.75)  # of its axes: left, bottom, width, height
 # So that the theme of the page changes the colours.
@@ -67,27 +68,35 @@ def drawn(blocks: Iterable[Block], stage: Html, level: int = 2) -> Html:
 
 def _block(block: Block, stage: Html, level: int) -> Html:
     match block:
-        case Heading(text):
-            return tag("h3", prose(text))
-        case Text(text, (name, heading), small):
-            link = (" ", tag("a", heading, href=f"#{name}"), ".") if name else ()
-            return tag("p", prose(text), *link, class_="foot" if small else None)
-        case Items(texts, ordered):
-            return tag("ol" if ordered else "ul", *(tag("li", prose(text)) for text in texts))
-        case Code(lines):
-            return tag("pre", tag("code", "\n".join(lines)))
-        case Table():
-            return table(block)
-        case Verdict(text, holds):
-            return tag("p", "✓ " if holds else "✗ ", prose(text), class_="verdict")
         case Section():
             return _section(block, stage, level)
         case QuantityChart():
             return quantity_row(block)
         case Interactive():
             return stage
+        case Table():
+            return table(block)
         case Bars() | Traces():
             return _picture(block)
+        case _:
+            return _words(block)
+
+
+def _words(block: Block) -> Html:
+    """Return what is words alone; nothing for a block that a page of this kind does not show."""
+    match block:
+        case Heading(text):
+            return tag("h3", prose(text))
+        case Text(text, (name, heading), small):
+            link = (" ", tag("a", heading, href=f"#{name}"), ".") if name else ()
+            return tag("p", prose(text), *link, class_="foot" if small else None)
+        case Items(texts, ordered):
+            items = [tag("li", prose(text)) for text in texts]
+            return tag("ol" if ordered else "ul", *items)
+        case Code(lines):
+            return tag("pre", tag("code", "\n".join(lines)))
+        case Verdict(text, holds):
+            return tag("p", "✓ " if holds else "✗ ", prose(text), class_="verdict")
         case _:
             return Html("")
 
@@ -106,48 +115,34 @@ def _section(block: Section, stage: Html, level: int) -> Html:
     inside = drawn(block.blocks, stage, level + 1)
     if block.folded:
         return tag("details", tag("summary", block.heading), inside)
-    name = block.name or None
-    labelled = f"{name}-heading" if name else None
+    if not block.name:
+        return tag("section", tag(f"h{level}", block.heading), inside)
+    labelled = f"{block.name}-heading"
     heading = tag(f"h{level}", block.heading, id=labelled)
-    return tag("section", heading, inside, id=name, aria_labelledby=labelled)
+    return tag("section", heading, inside, id=block.name, aria_labelledby=labelled)
 
 
 def headline_as_html(headline: Headline) -> Html:
-    """The answer of a page, above all else."""
-    return tag(
-        "h1",
-        non_breaking(f"{headline.lead}."),
-        *(tag("span", non_breaking(f" {cause}"), class_="cause") for cause in headline.causes),
-        tag("span", non_breaking(f" {headline.end}"), class_="cause end") if headline.end else None,
-        id="finding",
-        tabindex="-1",
-    )
+    """Return the answer of a page, above all else."""
+    spans = [tag("span", non_breaking(f" {cause}"), class_="cause") for cause in headline.causes]
+    if headline.end:
+        spans.append(tag("span", non_breaking(f" {headline.end}"), class_="cause end"))
+    lead = non_breaking(f"{headline.lead}.")
+    return tag("h1", lead, *spans, id="finding", tabindex="-1")
 
 
 def table(block: Table) -> Html:
-    """A table whose first column names its rows, as wide as it needs to be."""
+    """Return a table whose first column names its rows, as wide as it needs to be."""
     looks = ["word" if k in block.words else None for k in range(len(block.headers))]
-    # Columns whose bars go to both sides.
-    signed = {
-        k
-        for row in block.rows
-        for k, cell in enumerate(row)
-        if isinstance(cell, TableCell) and (cell.share or 0.0) < -0.005
-    }
     heads = zip(("word", *looks[1:]), block.headers, strict=True)
     top = tag("tr", *(tag("th", text, scope="col", class_=look) for look, text in heads))
-    rows = [
-        tag(
-            "tr",
-            tag("th", _content(row[0], 0 in signed), scope="row"),
-            *(
-                tag("td", _content(row[k], k in signed), class_=looks[k])
-                for k in range(1, len(row))
-            ),
-            class_="most" if n in block.emphasis else None,
-        )
-        for n, row in enumerate(block.rows)
-    ]
+    signed = _signed_columns(block)
+    rows = []
+    for number, row in enumerate(block.rows):
+        cells = [tag("th", _content(row[0], 0 in signed), scope="row")]
+        for k in range(1, len(row)):
+            cells.append(tag("td", _content(row[k], k in signed), class_=looks[k]))
+        rows.append(tag("tr", *cells, class_="most" if number in block.emphasis else None))
     inside = tag("caption", block.title), tag("thead", top), tag("tbody", *rows)
     return tag(
         "div",
@@ -159,7 +154,18 @@ def table(block: Table) -> Html:
     )
 
 
+def _signed_columns(block: Table) -> set[int]:
+    """Return the columns whose bars go to both sides."""
+    signed = set()
+    for row in block.rows:
+        for k, cell in enumerate(row):
+            if isinstance(cell, TableCell) and cell.share is not None and cell.share < -0.005:
+                signed.add(k)
+    return signed
+
+
 def _content(text: str, signed: bool) -> object:
+    """Return what stands in a cell; `signed` says whether bars of its column go to both sides."""
     if not isinstance(text, TableCell):
         return text
     if text.at is not None:  # the slider goes there when it is pressed
@@ -168,9 +174,9 @@ def _content(text: str, signed: bool) -> object:
         return badge(text.verdict)
     if text.share is not None:
         return _bar(text.share, text, signed)
-    return (
-        tag("code", str(text), class_="digest" if len(text) == 64 else None) if text.code else text
-    )
+    if text.code:
+        return tag("code", str(text), class_="digest" if len(text) == _DIGEST else None)
+    return text
 
 
 def badge(verdict: str) -> Html:
@@ -181,9 +187,10 @@ def badge(verdict: str) -> Html:
 
 def _bar(share: float, text: str, signed: bool) -> Html:
     """A share as a bar from a line of zero, to the left if it is below zero."""
-    length = 100 * min(1.0, abs(share)) / (2 if signed else 1)
-    left = 0.0 if not signed else 50.0 - (length if share < 0 else 0.0)
-    look = "bar signed" if signed else "bar"
+    length, left, look = 100 * min(1.0, abs(share)), 0.0, "bar"
+    if signed:
+        length, look = length / 2, "bar signed"
+        left = 50.0 - length if share < 0 else 50.0
     if abs(share) > 1:
         look += " cut " + ("down" if share < 0 else "up")
     fill = tag("i", style=f"left:{left:.1f}%;width:{length:.1f}%")
@@ -196,27 +203,28 @@ def _bar(share: float, text: str, signed: bool) -> Html:
 
 
 def quantity_row(quantity: QuantityChart) -> Html:
-    """A row of a quantity: how far apart over time, both sides, and the figures on demand."""
-    values, agreement = quantity.values(), quantity.agreement
-    left, right = quantity.labels
-    keys = tag("i", class_="key one"), f"{left} ", tag("i", class_="key two"), right
-    gap = f"how far apart, {quantity.unit}; log axis; dotted: the tolerance"
+    """Return a row of a quantity: how far apart, both sides, and the figures on demand."""
+    verdict = badge(quantity.agreement.verdict)
+    parts = [tag("h3", tag("span", quantity.title, class_="quantity"), verdict), _charts(quantity)]
+    if quantity.foot:
+        parts.append(tag("p", quantity.foot, class_="foot"))
+    summary = tag("summary", f"The figures of {quantity.title}")
+    parts.append(tag("details", summary, data_table(quantity), class_="data"))
+    return tag("section", *parts, class_="quantity-row")
+
+
+def _charts(quantity: QuantityChart) -> Html:
+    """Return how far apart a quantity is over time, and, where it has values, both sides."""
+    caption = f"how far apart, {quantity.unit}; log axis; dotted: the tolerance"
     if quantity.floor is not None:
-        gap += "; grey: the chaos floor"
-    return tag(
-        "section",
-        tag("h3", tag("span", quantity.title, class_="quantity"), badge(agreement.verdict)),
-        tag(
-            "div",
-            _figure(quantity.gap(), gap, quantity.said),
-            _figure(values, joined((f"{values.title}: ", *keys)), values.title) if values else None,
-            class_="charts",
-        ),
-        tag("p", quantity.foot, class_="foot") if quantity.foot else None,
-        tag("details", tag("summary", f"The figures of {quantity.title}"), data_table(quantity),
-            class_="data"),
-        class_="quantity-row",
-    )  # fmt: skip
+        caption += "; grey: the chaos floor"
+    charts = [_figure(quantity.gap(), caption, quantity.said)]
+    values = quantity.values()
+    if values is not None:
+        left, right = quantity.labels
+        keys = tag("i", class_="key one"), f"{left} ", tag("i", class_="key two"), right
+        charts.append(_figure(values, joined((f"{values.title}: ", *keys)), values.title))
+    return tag("div", *charts, class_="charts")
 
 
 def _figure(picture: Traces, caption: str, said: str) -> Html:
@@ -248,23 +256,17 @@ def data_table(quantity: QuantityChart) -> Html:
     worst = largest(quantity.curve.difference)[1]
     rows = np.unique([*rows, worst])
     values = quantity.values()
-    columns = {**(values.curves if values else {}), **quantity.gap().curves}
+    columns = {} if values is None else dict(values.curves)
+    columns |= quantity.gap().curves
     scale = reading(quantity.curve.unit)[0]
-    cells = [
-        (
-            f"{time[row]:.3f}",
-            *(_number(float(y[row]), tolerance * scale) for _, y in columns.values()),
-        )
-        for row in rows.tolist()
-    ]
-    return table(
-        Table(
-            ("time, s", *(f"{name}, {quantity.unit}" for name in columns)),
-            cells,
-            f"{quantity.title}: {len(rows)} of {len(time)} moments, the largest difference bold",
-            emphasis=frozenset(np.flatnonzero(rows == worst).tolist()),
-        )
-    )
+    cells = []
+    for row in rows.tolist():
+        figures = [_number(float(y[row]), tolerance * scale) for _, y in columns.values()]
+        cells.append((f"{time[row]:.3f}", *figures))
+    title = f"{quantity.title}: {len(rows)} of {len(time)} moments, the largest difference bold"
+    heads = ("time, s", *(f"{name}, {quantity.unit}" for name in columns))
+    largest_row = frozenset(np.flatnonzero(rows == worst).tolist())
+    return table(Table(heads, cells, title, emphasis=largest_row))
 
 
 def _number(value: float, tolerance: float) -> str:

@@ -3,55 +3,86 @@
 from __future__ import annotations
 
 import base64
-import itertools
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...drawing import Drawing, Part, lathe
 from ...interface import Array
-from ...page import Figures
 from ...rotations import matrix_from_quat
 from ...runs import Trace
 
 _GREY = (0.6, 0.6, 0.6, 1.0)
 
 
-def mesh_of(drawing: Drawing, most: int = 24_000) -> Figures:
-    """All parts of a drawing but endless planes, with at most so many triangles.
+@dataclass(frozen=True)
+class MeshPart:
+    """A part of a mesh: one body's, of one colour.
 
-    Too many triangles are made fewer by snapping points to a grid, as fine as will do.
+    Attributes:
+        body: Id of the body that carries it.
+        first: Its first index among those of the mesh, of which each face has three.
+        count: How many indices it has.
+        rgb: Red, green and blue, 0 to 1.
+    """
 
-    Returns:
-        vertices: (v, 3) [m], in the frames of their bodies.
-        faces: (f, 3) numbers of vertices.
-        parts: (body, first index, count of indices, red, green, blue) of each part.
+    body: int
+    first: int
+    count: int
+    rgb: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The triangles of a drawing.
+
+    Attributes:
+        vertices: (v, 3) float32 [m], in the frames of their bodies.
+        faces: (f, 3) int64, numbers of vertices.
+        parts: One after the other.
         simplified: How many triangles there were before, if they were too many; else 0.
     """
-    parts = [part for part in drawing.parts if not part.endless]
-    before = sum(len(part.faces) for part in parts)
-    shapes: list[tuple[Any, Any]] = [(part.vertices, part.faces.astype(np.int64)) for part in parts]
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int64]
+    parts: tuple[MeshPart, ...]
+    simplified: int
+
+
+def mesh_of(drawing: Drawing, most: int = 24_000) -> Mesh:
+    """Return all parts of a drawing but endless planes, with at most so many triangles.
+
+    Too many triangles are made fewer by snapping points to a grid, as fine as will do.
+    """
+    drawn = [part for part in drawing.parts if not part.endless]
+    before = sum(len(part.faces) for part in drawn)
+    shapes: list[tuple[Any, Any]] = [(part.vertices, part.faces.astype(np.int64)) for part in drawn]
     cell = max(drawing.extent, 1e-6) / 2000
     while sum(len(faces) for _, faces in shapes) > most:
-        shapes = [_snapped(part, cell) for part in parts]
+        shapes = [_snapped(part, cell) for part in drawn]
         cell *= 1.4
-    corners = itertools.accumulate((len(points) for points, _ in shapes), initial=0)
-    indices = itertools.accumulate((faces.size for _, faces in shapes), initial=0)
-    moved = (faces + corner for (_, faces), corner in zip(shapes, corners, strict=False))
-    none = np.empty((0, 3))
-    return Figures(
-        vertices=np.concatenate([none, *(points for points, _ in shapes)]).astype(np.float32),
-        faces=np.concatenate([none, *moved]).astype(np.int64),
-        parts=[
-            (part.body, index, faces.size, *(round(c, 3) for c in part.rgba[:3]))
-            for part, (_, faces), index in zip(parts, shapes, indices, strict=False)
-        ],
+    vertices, faces = [np.empty((0, 3))], [np.empty((0, 3))]
+    parts: list[MeshPart] = []
+    corner = index = 0
+    for part, (points, triangles) in zip(drawn, shapes, strict=True):
+        red, green, blue = (round(share, 3) for share in part.rgba[:3])
+        parts.append(MeshPart(part.body, index, triangles.size, (red, green, blue)))
+        vertices.append(points)
+        faces.append(triangles + corner)
+        corner += len(points)
+        index += triangles.size
+    return Mesh(
+        vertices=np.concatenate(vertices).astype(np.float32),
+        faces=np.concatenate(faces).astype(np.int64),
+        parts=tuple(parts),
         simplified=before if before > most else 0,
     )
 
 
 def _snapped(part: Part, cell: float) -> tuple[Any, Any]:
-    """Points of one cell of a grid become their mean; faces of no area go."""
+    """Make points of one cell of a grid their mean, and leave out faces of no area."""
     _, number, count = np.unique(
         np.round(part.vertices / cell).astype(np.int64),
         axis=0,
@@ -119,16 +150,17 @@ def quantised(values: Any, low: Any, span: Any) -> Any:
     return np.round(np.clip(scaled, 0.0, 1.0) * 65535)
 
 
-def mesh_as_data(mesh: Figures) -> dict[str, Any]:
-    """A mesh as JSON."""
+def mesh_as_data(mesh: Mesh) -> dict[str, Any]:
+    """Return a mesh as JSON."""
     points = mesh.vertices.astype(np.float64) if len(mesh.vertices) else np.zeros((1, 3))
     low, span = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-9)
     wide = len(points) > 65535
+    parts = [(part.body, part.first, part.count, *part.rgb) for part in mesh.parts]
     return {
         "position": packed(quantised(points, low, span), "u2"),
         "index": packed(mesh.faces.reshape(-1), "u4" if wide else "u2"),
         "wide": wide,
         "low": low.tolist(),
         "span": span.tolist(),
-        "parts": mesh.parts,
+        "parts": parts,
     }

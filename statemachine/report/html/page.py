@@ -6,6 +6,7 @@ import base64
 import hashlib
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,29 +38,22 @@ def report(page: Page, looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK)) -> str:
         looks: What each of both runs is drawn as; the same object twice if both are of one model.
     """
     runs = next((block for block in page.blocks if isinstance(block, BothRuns)), None)
-    stage, data, notes = (Html(""), None, []) if runs is None else staged(runs, looks)
-
-    # What stands above all sections.
-    opening = list(
-        itertools.takewhile(
-            lambda block: (
-                not (isinstance(block, Interactive) or (isinstance(block, Section) and block.name))
-            ),
-            page.blocks,
-        )
-    )
+    stage = _NO_STAGE if runs is None else staged(runs, looks)
+    opening = list(itertools.takewhile(_is_above_sections, page.blocks))
     rest: list[Block] = [*page.blocks[len(opening) :]]
-    if notes:
-        rest.append(Section("picture", "Of the picture", [Items(notes)]))
-    main = tag("main", _header(page, opening, stage, runs), drawn(rest, stage))
+    if stage.notes:
+        rest.append(Section("picture", "Of the picture", [Items(stage.notes)]))
+    main = tag("main", _header(page, opening, stage.markup, runs), drawn(rest, stage.markup))
     footer = tag(
         "footer",
         tag("p", non_breaking(page.origin)),
         tag("p", f"statemachine {__version__}; this file asks for nothing but itself."),
     )
     # Without data for a script there is none.
-    script = "\n".join(template(name) for name in _SCRIPTS)
-    script = "" if data is None else f"(() => {{\n'use strict';\n{script}\n}})();"
+    script, data = "", {}
+    if stage.data is not None:
+        parts = "\n".join(template(name) for name in _SCRIPTS)
+        script, data = f"(() => {{\n'use strict';\n{parts}\n}})();", stage.data
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
@@ -70,36 +64,47 @@ def report(page: Page, looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK)) -> str:
         "title": page.headline.lead if page.headline else page.title,
         "style": Html(template("page.css")),
         "body": joined((main, footer)),
-        "data": data_of(data or {}),
+        "data": data_of(data),
         "script": Html(script),
     }
     return filled("page.html", slots)
 
 
+def _is_above_sections(block: Block) -> bool:
+    """Tell whether a block may stand in the header: it is no part that links lead to."""
+    if isinstance(block, Section):
+        return not block.name
+    return not isinstance(block, Interactive)
+
+
 def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | None) -> Html:
-    name: list[object] = [tag("span", page.title, class_="experiment")]
-    if runs is not None:
-        left, right = (
-            tag("span", tag("i", class_=f"key {look}"), label, class_="side")
-            for look, label in zip(("one", "two"), long_labels(runs.comparison), strict=True)
-        )
-        theme = tag("button", "Dark", id="theme", type="button", hidden=True,
-                    aria_label="Dark colours")  # fmt: skip
-        name = [
-            tag("span", runs.title, class_="experiment"),
-            left,
-            tag("span", "against", class_="against"),
-            right,
-            theme,
-        ]
-    lead = [block for block in opening[:1] if isinstance(block, Text)]
-    return tag(
-        "header",
-        tag("p", *name, class_="kicker"),
-        headline_as_html(page.headline) if page.headline else tag("h1", page.title, id="finding"),
-        *(tag("p", non_breaking(block.text), class_="says") for block in lead),
-        tag("div", drawn(opening[len(lead) :], stage), class_="words"),
-    )
+    """Return the top of a page: what was run, the answer, and what stands above all sections."""
+    name = [tag("span", page.title, class_="experiment")] if runs is None else _name_of(runs)
+    headline = tag("h1", page.title, id="finding")
+    if page.headline is not None:
+        headline = headline_as_html(page.headline)
+    parts = [tag("p", *name, class_="kicker"), headline]
+    if opening and isinstance(opening[0], Text):
+        parts.append(tag("p", non_breaking(opening[0].text), class_="says"))
+        opening = opening[1:]
+    return tag("header", *parts, tag("div", drawn(opening, stage), class_="words"))
+
+
+def _name_of(runs: BothRuns) -> list[Html]:
+    """Return what was run, who against whom, and the button of the theme."""
+    left, right = long_labels(runs.comparison)
+    return [
+        tag("span", runs.title, class_="experiment"),
+        _side("one", left),
+        tag("span", "against", class_="against"),
+        _side("two", right),
+        tag("button", "Dark", id="theme", type="button", hidden=True, aria_label="Dark colours"),
+    ]
+
+
+def _side(look: str, label: str) -> Html:
+    """Return the name of a side, with the colour that it is drawn in."""
+    return tag("span", tag("i", class_=f"key {look}"), label, class_="side")
 
 
 def check_target(path: str | Path) -> Path:
@@ -135,24 +140,39 @@ ARROWS = (
 )
 
 
-def staged(runs: BothRuns, looks: Sequence[Look]) -> tuple[Html, dict[str, Any], list[str]]:
+@dataclass(frozen=True)
+class Stage:
     """Both runs, drawn.
+
+    Attributes:
+        markup: The scene, the slider and the lanes under it.
+        data: What the script reads; None where there is no script.
+        notes: What a reader should know of the picture, in sentences.
+    """
+
+    markup: Html
+    data: dict[str, Any] | None = None
+    notes: Sequence[str] = ()
+
+
+_NO_STAGE = Stage(Html(""))
+
+
+def staged(runs: BothRuns, looks: Sequence[Look]) -> Stage:
+    """Draw both runs.
 
     Args:
         runs: The runs.
         looks: What each is drawn as.
-
-    Returns:
-        The scene, the slider and the lanes under it; the data for the script; and what a reader
-        should know of the picture, in sentences.
     """
     until, site = runs.comparison.until, runs.comparison.tip
     # Of these moments the page tells: they must be among those that can be shown.
     agreements = runs.comparison.agreements
-    moments = {t for a in agreements for t in (a.at, a.since) if t is not None}
+    moments = {agreement.at for agreement in agreements}
+    moments |= {agreement.since for agreement in agreements if agreement.since is not None}
     times, left_out = moments_of(*traces_of(runs.comparison), sorted(moments))
     start = int(np.argmin(np.abs(times - runs.start)))
-    scene, notes, strongest = scene_of(runs, looks, times, left_out, start)
+    scene = scene_of(runs, looks, times, left_out, start)
     compared = runs.charts[0].curve.time if runs.charts else times
     rows = np.clip(np.searchsorted(compared, times + 1e-9, side="right") - 1, 0, None)
     data = {
@@ -162,68 +182,108 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> tuple[Html, dict[str, Any],
         "start": start,
         "quantities": [_quantity_data(chart, rows) for chart in runs.charts],
         "lead": list(runs.lead),
-        "scene": scene,
+        "scene": scene.data,
     }
     now, (left, right) = float(times[start]), long_labels(runs.comparison)
     short_left, short_right = short_labels(runs.comparison)
+    tip, arrows, still = site, "", Html("")
+    if site == "gripperframe":
+        tip = _TOOL
+    elif not site:
+        tip = "a site"
+    if scene.strongest:
+        arrows = non_breaking(ARROWS.format(force=figure(scene.strongest)))
+    if scene.data is None:
+        still = joined(tag("p", note) for note in scene.notes)
+    share = now / until if until else 0.0
+    on_left = non_breaking(f"{until:g} s {on(left)}")
+    on_right = on(right)
+    spoken_time = short_time(now)
     slots = {
         "left": left,
         "right": right,
         "short_left": short_left,
         "short_right": short_right,
-        "on_left": non_breaking(f"{until:g} s {on(left)}"),
-        "on_right": on(right),
-        "tip": _TOOL if site == "gripperframe" else site or "a site",
-        "now": short_time(now),
-        "arrows": non_breaking(ARROWS.format(force=figure(strongest))) if strongest else "",
+        "on_left": on_left,
+        "on_right": on_right,
+        "tip": tip,
+        "now": spoken_time,
+        "arrows": arrows,
         "last": len(times) - 1,
         "start": start,
-        "share": f"{now / until if until else 0.0:.6f}",
-        "still": joined(tag("p", note) for note in notes) if scene is None else "",
+        "share": f"{share:.6f}",
+        "still": still,
         "lanes": _lanes(runs),
     }
-    return filled("stage.html", slots), data, notes
+    return Stage(filled("stage.html", slots), data, scene.notes)
 
 
 def _lanes(runs: BothRuns) -> Html:
-    """For each quantity when it is beyond its tolerance, under the slider and as wide."""
-    until = runs.comparison.until or 1.0
+    """Return for each quantity when it is beyond its tolerance, under the slider and as wide."""
+    until = runs.comparison.until if runs.comparison.until else 1.0
+    lanes = _touch_lanes(runs, until)
+    beyond: list[tuple[str, list[list[float]]]] = []
+    for chart in runs.charts:
+        of_chart = _beyond(chart, until)
+        if of_chart:
+            beyond.append((chart.title, of_chart))
+    beyond.sort(key=lambda quantity: quantity[1][0][0])
+    for name, of_chart in beyond:
+        bars = [_bar(start, end, until) for start, end in of_chart]
+        lanes.append(_lane(name, bars, "quantity"))
+    lanes.append(_time_axis(until))
+    within = len(runs.charts) - len(beyond)
+    said = f"Bars: beyond tolerance. Charts without a bar: {within} of {len(runs.charts)}."
+    lanes.append(tag("p", said, class_="hint"))
+    if beyond:
+        spoken = "; ".join(_spoken(name, of_chart) for name, of_chart in beyond)
+        lanes.append(tag("p", f"Beyond tolerance: {spoken}.", class_="unseen"))
+    return joined(lanes)
 
-    def bar(look: str, start: float, end: float | None = None, **more: str) -> Html:
-        place = f"left:{100 * start / until:.2f}%"
-        wide = "" if end is None else f";width:{100 * max(end - start, 0.0) / until:.2f}%"
-        return tag("i", class_=look, style=place + wide, **more)
 
+def _touch_lanes(runs: BothRuns, until: float) -> list[Html]:
+    """Return a lane with the first touches of each side that has some."""
     lanes = []
+    labels = short_labels(runs.comparison)
     for side, look in enumerate(("one", "two")):
         marks = [
-            bar(f"mark {look}", event.time, title=event.text)
+            tag("i", class_=f"mark {look}", style=_left(event.time, until), title=event.text)
             for event in runs.events
             if event.kind == "touch" and event.side == side
         ]
-        name = f"first touches, {short_labels(runs.comparison)[side]}"
-        key = tag("i", class_=f"mark key-of {look}")
-        lanes += [_lane(name, marks, "touches", " ", key)] if marks else []
-    beyond = [(chart.title, spans) for chart in runs.charts if (spans := _beyond(chart, until))]
-    beyond.sort(key=lambda quantity: quantity[1][0][0])
-    lanes += [
-        _lane(name, [bar("beyond", *span) for span in spans], "quantity") for name, spans in beyond
-    ]
-    within = len(runs.charts) - len(beyond)
-    said = f"Bars: beyond tolerance. Charts without a bar: {within} of {len(runs.charts)}."
+        if marks:
+            key = tag("i", class_=f"mark key-of {look}")
+            lanes.append(_lane(f"first touches, {labels[side]}", marks, "touches", " ", key))
+    return lanes
+
+
+def _bar(start: float, end: float, until: float) -> Html:
+    """Return a bar from a time to another [s]."""
+    width = 100 * max(end - start, 0.0) / until
+    return tag("i", class_="beyond", style=f"{_left(start, until)};width:{width:.2f}%")
+
+
+def _left(time: float, until: float) -> str:
+    """Return the style of what stands at a time [s] of a lane."""
+    return f"left:{100 * time / until:.2f}%"
+
+
+def _time_axis(until: float) -> Html:
+    """Return the axis of time under the lanes."""
     *ticks, last = np.linspace(0.0, until, _TICKS).tolist()
-    times = [tag("span", f"{t:.3g}", style=f"left:{100 * t / until:.2f}%") for t in ticks]
+    times = [tag("span", f"{time:.3g}", style=_left(time, until)) for time in ticks]
     times.append(tag("span", f"{last:.3g}", tag("small", "s"), style="left:100%"))
-    lanes.append(_lane("", [tag("div", *times, class_="times", aria_hidden="true")], "axis"))
-    spoken = "; ".join(
-        f"{name} from {short_time(spans[0][0])}, {sum(b - a for a, b in spans):.3g} s in all"
-        for name, spans in beyond
-    )
-    unseen = tag("p", f"Beyond tolerance: {spoken}.", class_="unseen") if spoken else ""
-    return joined((*lanes, tag("p", said, class_="hint"), unseen))
+    return _lane("", [tag("div", *times, class_="times", aria_hidden="true")], "axis")
+
+
+def _spoken(name: str, of_quantity: Sequence[Sequence[float]]) -> str:
+    """Say when a quantity is beyond its tolerance."""
+    total = sum(end - start for start, end in of_quantity)
+    return f"{name} from {short_time(of_quantity[0][0])}, {total:.3g} s in all"
 
 
 def _lane(name: str, content: Sequence[Html], look: str, *key: object) -> Html:
+    """Return a row under the slider, with the cursor of time unless it is the axis."""
     cursor = tag("i", class_="cursor") if look != "axis" else None
     return tag(
         "div",

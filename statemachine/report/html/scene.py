@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...compare.series import world_forces
 from ...drawing import Drawing
-from ...drawing.scene import Motion, camera_for
+from ...drawing.scene import Camera, Motion, camera_for
 from ...interface import Array, Ints
 from ...measures import common_moments
 from ...runs import Trace
@@ -34,9 +35,19 @@ _CONTACTS = 9_000  # of one side, at all moments together
 _ASPECT = 1.45  # width of the picture through its height; the script has it too
 
 
-# What is drawn, for the script, None if the traces tell no poses; what a reader should know of the
-# picture, in sentences; and the largest contact force that is drawn [N].
-Scene = tuple[dict[str, Any] | None, list[str], float]
+@dataclass(frozen=True)
+class Scene:
+    """Both runs at the moments that are shown.
+
+    Attributes:
+        data: What is drawn, for the script; None if there is nothing to draw.
+        notes: What a reader should know of the picture, in sentences.
+        strongest: The largest contact force that is drawn [N].
+    """
+
+    data: dict[str, Any] | None
+    notes: list[str]
+    strongest: float = 0.0
 
 
 def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
@@ -87,7 +98,7 @@ def scene_of(
     """
     traces, site = traces_of(runs.comparison), runs.comparison.tip
     if any("xpos" not in trace or "xquat" not in trace for trace in traces):
-        return None, ["The traces tell no poses of the bodies: there is nothing to draw."], 0.0
+        return Scene(None, ["The traces tell no poses of the bodies: there is nothing to draw."])
     labels = long_labels(runs.comparison)
     notes, drawings = _drawings(traces, looks, labels)
     shapes = list(dict.fromkeys(drawings))
@@ -100,60 +111,104 @@ def scene_of(
     extent = max(drawing.extent for drawing in drawings)
     places = [rows_at(trace, times) for trace in traces]
     poses = [_between(trace["xpos"], *place) for trace, place in zip(traces, places, strict=True)]
-    finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos in poses])
-    if not len(finite):
-        return None, ["No pose of a body is a finite number: there is nothing to draw."], 0.0
-    middle = np.asarray(drawings[0].center)
-    low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
-    span = np.maximum(np.minimum(finite.max(axis=0), middle + _FAR * extent) - low, 1e-6)
+    box = _box(poses, drawings[0], extent)
+    if box is None:
+        return Scene(None, ["No pose of a body is a finite number: there is nothing to draw."])
     motions = [
-        Motion(drawing, np.clip(_held(pos), low, low + span), _turned(trace["xquat"], *place))
+        Motion(drawing, box.clipped(pos), _turned(trace["xquat"], *place))
         for drawing, pos, trace, place in zip(drawings, poses, traces, places, strict=True)
     ]
-    camera = camera_for(motions, _ASPECT, _NEAR * extent)
     tips = _tips(traces, places, site)
     few = max(2, _CONTACTS // len(times))
     contacts = [
         _contacts(trace, rows, few) for trace, (rows, _) in zip(traces, places, strict=True)
     ]
-    sides = [
-        {
-            "mesh": shapes.index(motion.drawing),
-            "bodies": len(trace.header.bodies),
-            "pos": packed(quantised(motion.xpos, low, span), "u2"),
-            "quat": packed(np.round(motion.xquat * 32767), "i2"),
-            "tip": packed(tips[k], "f4") if tips else "",
-            "contacts": contacts[k][0],
-            **_way(trace, site, times),
-        }
-        for k, (trace, motion) in enumerate(zip(traces, motions, strict=True))
-    ]
+    sides = []
+    for k, motion in enumerate(motions):
+        side = _side_data(motion, shapes.index(motion.drawing), box)
+        side["tip"] = packed(tips[k], "f4") if tips else ""
+        side["contacts"] = contacts[k].as_data()
+        side |= _way(traces[k], site, times)
+        sides.append(side)
     notes += template.texts(
         "html/scene",
         other=labels[1] if places[1][1].any() else None,
-        hidden=left_out or None,
-        few=few if any(more for *_, more in contacts) else None,
+        hidden=left_out if left_out else None,
+        few=few if any(of_side.more for of_side in contacts) else None,
     )
-    ground = [float(part.vertices[0, 2]) for part in drawings[0].parts if part.is_ground]
+    camera = camera_for(motions, _ASPECT, _NEAR * extent)
     data = {
         "moving": _moving(*traces),
-        "low": low.tolist(),
-        "span": span.tolist(),
+        **box.as_data(),
         "extent": extent,
         **_nearness(tips, start, extent),
-        "floor": ground[0] if ground else None,
-        # The script has the angles of the camera about the target, not of its view.
-        "camera": [
-            *camera.target,
-            camera.distance,
-            math.radians(camera.azimuth) - math.pi,
-            -math.radians(camera.elevation),
-        ],
-        "opening": math.radians(camera.fovy),
+        "floor": _floor_height(drawings[0]),
+        **_camera_data(camera),
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
         "sides": sides,
     }
-    return data, notes, max(strongest for _, strongest, _ in contacts)
+    return Scene(data, notes, max(of_side.strongest for of_side in contacts))
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """What part of space is drawn.
+
+    Attributes:
+        low: (3,) its lowest corner [m].
+        span: (3,) the lengths of its edges [m].
+    """
+
+    low: Array
+    span: Array
+
+    def clipped(self, pos: Array) -> Array:
+        """Return positions (n, nbody, 3) that are finite, within the box."""
+        return np.clip(_held(pos), self.low, self.low + self.span)
+
+    def as_data(self) -> dict[str, list[float]]:
+        """Return it for the script."""
+        return {"low": self.low.tolist(), "span": self.span.tolist()}
+
+
+def _box(poses: Sequence[Array], drawing: Drawing, extent: float) -> _Box | None:
+    """Return what has all positions (n, nbody, 3) that are not too far away in it.
+
+    None where none of them is finite.
+    """
+    finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos in poses])
+    if not len(finite):
+        return None
+    middle = np.asarray(drawing.center)
+    low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
+    high = np.minimum(finite.max(axis=0), middle + _FAR * extent)
+    return _Box(low, np.maximum(high - low, 1e-6))
+
+
+def _floor_height(drawing: Drawing) -> float | None:
+    """Return where the floor of a drawing is [m]; None without a floor."""
+    ground = [float(part.vertices[0, 2]) for part in drawing.parts if part.is_ground]
+    return ground[0] if ground else None
+
+
+def _side_data(motion: Motion, mesh: int, box: _Box) -> dict[str, Any]:
+    """Return the poses of a side, and the number of its mesh, for the script."""
+    return {
+        "mesh": mesh,
+        "bodies": motion.xpos.shape[1],
+        "pos": packed(quantised(motion.xpos, box.low, box.span), "u2"),
+        "quat": packed(np.round(motion.xquat * 32767), "i2"),
+    }
+
+
+def _camera_data(camera: Camera) -> dict[str, Any]:
+    """Return a camera for the script, which has its angles about the target, not of its view."""
+    azimuth = math.radians(camera.azimuth) - math.pi
+    elevation = -math.radians(camera.elevation)
+    return {
+        "camera": [*camera.target, camera.distance, azimuth, elevation],
+        "opening": math.radians(camera.fovy),
+    }
 
 
 def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:
@@ -178,8 +233,13 @@ def _drawings(
             return notes, [*drawings, *drawings]
         why_not = look if isinstance(look, str) else None
         drawings.append(bones_of(trace) if isinstance(look, str) else look)
-        left_out = ", ".join(drawings[-1].left_out) or None
-        notes += template.texts("html/scene_side", left_out=left_out, label=label, why_not=why_not)
+        left_out = drawings[-1].left_out
+        notes += template.texts(
+            "html/scene_side",
+            left_out=", ".join(left_out) if left_out else None,
+            label=label,
+            why_not=why_not,
+        )
     return notes, drawings
 
 
@@ -237,26 +297,45 @@ def _way(trace: Trace, tip: str, shown: Array) -> dict[str, str]:
     return {"way": packed(way, "f4"), "behind": packed(behind, "u2")}
 
 
-def _contacts(trace: Trace, rows: Ints, most: int) -> tuple[dict[str, str], float, bool]:
-    """Where contacts are in each row, the strongest first, and the force there [N].
+@dataclass(frozen=True, eq=False)
+class _Contacts:
+    """The contacts of one side at the moments that are shown.
 
-    Returns:
-        These, the largest of the forces, and whether a row has more contacts.
+    Attributes:
+        counts: (n,) how many there are at each moment; None where the trace tells none.
+        where: (c, 6) of each the place [m] and the force [N], in world axes.
+        strongest: The largest of the forces [N].
+        more: Whether there are more at some moment than are drawn.
     """
+
+    counts: Ints | None
+    where: Array
+    strongest: float
+    more: bool
+
+    def as_data(self) -> dict[str, str]:
+        """Return them for the script."""
+        if self.counts is None:
+            return {"count": "", "at": ""}
+        return {"count": packed(self.counts, "u1"), "at": packed(self.where, "f4")}
+
+
+def _contacts(trace: Trace, rows: Ints, most: int) -> _Contacts:
+    """Return the contacts in each row, the strongest first, at most so many."""
     if "contact_row" not in trace:
-        return {"count": "", "at": ""}, 0.0, False
+        return _Contacts(None, np.empty((0, 6)), 0.0, more=False)
     begins = np.searchsorted(trace["contact_row"], rows)
     ends = np.searchsorted(trace["contact_row"], rows, side="right")
     strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
     counts = np.minimum(ends - begins, min(most, 255))
-    chosen = np.concatenate([
-        a + np.argsort(-strength[a:b], kind="stable")[:count]
-        for a, b, count in zip(begins, ends, counts, strict=True)
-    ])  # fmt: skip
-    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], world_forces(trace)[chosen]]))
+    chosen = []
+    for begin, end, count in zip(begins, ends, counts, strict=True):
+        chosen.append(begin + np.argsort(-strength[begin:end], kind="stable")[:count])
+    places = np.concatenate(chosen)
+    where = np.hstack([trace["contact_pos"][places], world_forces(trace)[places]])
+    where = np.nan_to_num(where)
     strongest = float(np.linalg.norm(where[:, 3:], axis=1).max(initial=0.0))
-    more = bool((ends - begins > most).any())
-    return {"count": packed(counts, "u1"), "at": packed(where, "f4")}, strongest, more
+    return _Contacts(counts, where, strongest, more=bool((ends - begins > most).any()))
 
 
 def _moving(left: Trace, right: Trace) -> list[int]:
