@@ -22,7 +22,6 @@ from .commands._common import (
     MISSING,
     NO_OUTPUT,
     PROGRAM,
-    check_rules,
     complain,
 )
 from .errors import EngineWarning, MissingEngineError, StateMachineError, did_you_mean
@@ -175,7 +174,6 @@ def _options(words: list[str]) -> argparse.Namespace:
         from .backends.binary import TRUST
 
         os.environ[TRUST] = "1"  # which workers inherit
-    check_rules(options)
     return options
 
 

@@ -170,6 +170,14 @@ def one_line(words: object) -> str:
     return " ".join(str(words).split())
 
 
+def printable(words: object) -> str:
+    """Return words in one line, with nothing in it that a terminal would do instead of show.
+
+    A name in them may come from a file that somebody else made.
+    """
+    return "".join(c if c.isprintable() else "?" for c in one_line(words))
+
+
 def shown(value: object) -> str:
     """What somebody gave, on one line of a message."""
     text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())

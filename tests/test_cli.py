@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import importlib
 import json
 import os
 import re
@@ -286,8 +284,3 @@ def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path
 def test_help_shows_few_options_and_help_all_every_one(here: Cli, command: str) -> None:
     few, every = here(command, "--help").stdout, here(command, "--help-all").stdout
     assert few.count("\n  --") <= 11 < every.count("\n  --")
-    known = argparse.ArgumentParser()
-    importlib.import_module(f"statemachine.commands.{command}").add(known)
-    rules = known.get_default("rules")
-    named = {name for row in rules for words in (row[0], row[2]) for name in words.split()}
-    assert named <= {action.dest for action in known._actions}

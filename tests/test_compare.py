@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.commands.compare import EXPERIMENTS
+from statemachine.commands._common import EXPERIMENTS
 from statemachine.compare import (
     Request,
     compare,

@@ -13,12 +13,11 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import Uncertainty, chaos_floor, compare, perturbed_runs
-from statemachine.compare.convergence import convergence, verdict_of
+from statemachine.compare.convergence import Convergence, convergence, verdict_of
 from statemachine.compare.matching import match_models
 from statemachine.compare.perturbed import ROUNDING, RUNS, Band, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError, EndedEarlyError, EngineWarning
-from statemachine.page import Figures
 from statemachine.report import compare as report
 from statemachine.report.finding import headline, leading
 from statemachine.report.steps import convergence as page
@@ -270,14 +269,14 @@ def test_a_trace_has_a_floor_where_it_is_played_on_two_sides(here: Cli, tmp_path
 # What vanishes with the timestep
 
 
-def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Figures:
+def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Convergence:
     usual = {"integrator": "implicitfast", "flag": "", "mass": "0.1", "height": "0.3"}
     usual["touch"] = 'contype="0" conaffinity="0"'
     one, two = (model_of(folder, FALLING_BAR.format(**usual | change)) for change in changes)
     return convergence_of(one, two, seconds)
 
 
-def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Figures:
+def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Convergence:
     """What becomes of the gap of two Models with finer steps."""
     return convergence(
         lambda finer: (

@@ -36,6 +36,7 @@ from statemachine.commands import lesson as lesson_command
 from statemachine.errors import BadInputError, StateMachineError
 from statemachine.lessons import LESSONS, PATH, module, template, worlds
 from statemachine.lessons.in_turns import Ratio
+from statemachine.lessons.request import LessonRequest
 from statemachine.lessons.session import CodeRun, LessonRun, load_line, page_of_lesson, take
 from statemachine.page import (
     Code,
@@ -785,11 +786,11 @@ def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
 ) -> None:
     ran = []
 
-    def compute(options: Any, lesson: Any, model: str, values: Any) -> tuple[Page, dict[str, Any]]:
-        ran.append(lesson.name)
-        return Page("t", "o", [Verdict("v", lesson.name != "hold")]), {"mujoco": lesson.name}
+    def take_lesson(request: LessonRequest) -> tuple[Page, dict[str, Any]]:
+        ran.append(request.name)
+        return Page("t", "o", [Verdict("v", request.name != "hold")]), {"mujoco": request.name}
 
-    monkeypatch.setattr(lesson_command, "_compute", compute)
+    monkeypatch.setattr(lesson_command, "_take", take_lesson)
     monkeypatch.setattr(lesson_command, "_last_page", lambda *_: 0)
     assert main(["lesson"]) == 1
     assert ran == [lesson.name for lesson in PATH]
@@ -804,8 +805,8 @@ def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every lesson is one question, for somebody at a terminal."""
     monkeypatch.setattr(
         lesson_command,
-        "_compute",
-        lambda *_: (Page("t", "o", [Question("q", ("a", "b"), 0, "because")]), {}),
+        "_take",
+        lambda _request: (Page("t", "o", [Question("q", ("a", "b"), 0, "because")]), {}),
     )
     monkeypatch.setattr(quiz, "can_ask", lambda: True)
 

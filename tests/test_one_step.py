@@ -10,11 +10,10 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import rerun_of
-from statemachine.compare.one_step import RELATIVE, one_step
+from statemachine.compare.one_step import RELATIVE, OneStep, one_step
 from statemachine.compare.stages import STAGES
 from statemachine.compare.why import WhyRequest, explain
 from statemachine.errors import BadInputError
-from statemachine.page import Figures
 from statemachine.report.steps import one_step as page
 from statemachine.runs import Rerun
 from statemachine.runs.scenarios import scenario
@@ -48,16 +47,16 @@ def stepped(folder: Path, text: str, **how: Any) -> Any:
     return one_step(rerun(one), two, **how)
 
 
-def first(found: Figures) -> str:
+def first(found: OneStep) -> str:
     return found.first.stage if found.first else ""
 
 
-def gap_of(found: Figures, name: str) -> Any:
+def gap_of(found: OneStep, name: str) -> Any:
     (gap,) = (gap for gap in found.stages if gap.stage == name)
     return gap
 
 
-def verdict(found: Figures) -> Any:
+def verdict(found: OneStep) -> Any:
     return page(found, ("one", "two"), "hold").blocks[-1]
 
 

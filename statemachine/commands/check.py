@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..errors import BadInputError
 from ..installed import DEFAULT
+from ..typed_numbers import typed_float, typed_int
 from ._common import (
-    NEEDS,
-    REPEATED,
     SAYS_NO,
-    add_rules,
-    add_table,
-    backend_of,
+    TerminalReporter,
+    add_backend,
+    add_json,
     file_name,
-    json_of,
-    one_backend,
-    refuse,
     resumable,
     show,
+    word_of_one_backend,
 )
+
+if TYPE_CHECKING:
+    from ..grading.request import CheckRequest, ClassRequest, FaultsRequest
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    """Its options."""
+    """Add its options."""
     parser.description = (
         "Call each function of a student's file on several models, in a process of "
         "its own with limits, and say what is wrong with what it does. Several files, or the "
@@ -36,170 +36,197 @@ def add(parser: argparse.ArgumentParser) -> None:
         "Exit code 1: a function does not do what it should; of a class: a file could not be "
         "judged."
     )
-    add_table(
-        parser,
-        (
-            "files",
-            "FILE|FOLDER",
-            "the student's file, like step_loop.py, or the folder that it is in; or those of a "
-            "class, each in the folder or in a folder of its own there",
-            {"nargs": "*"},
-        ),
-        backend_of(f"mujoco or pybullet (default {DEFAULT})"),
-        (
-            "--time-limit",
-            "S",
-            "seconds that each function of FILE may compute (default 5); time in which the "
-            "machine is busy with others does not count, up to 60 s on the clock, or 12 times S",
-            {"default": 5.0},
-        ),
-        (
-            "--csv",
-            "TABLE",
-            "of a class: write the table there after each file; typed again, it judges only "
-            "files that are new or changed",
-            {"type": file_name},
-        ),
-        (
-            "--jobs",
-            "N",
-            "of a class: how many files are judged at once (default: one for two processors)",
-        ),
-        (
-            "--roster",
-            "LIST",
-            "of a class: a CSV file with a row for each student, whose cells (a name, a number) "
-            "are looked for in the names of files; who handed in nothing is a row of the table",
-            {"type": Path},
-        ),
-        (
-            "--tests",
-            "",
-            "of a class: run the test_arm.py in each student's folder on arms with faults, too",
-        ),
-        (
-            "--gradescope",
-            "RESULTS",
-            "of one file, or a folder with one: write Gradescope's results.json, too",
-            {"type": file_name},
-        ),
-        (
-            "--faults",
-            "TESTFILE",
-            "run these tests on the arm with one fault at a time, and say which they catch",
-        ),
-        (
-            "--only",
-            "FAULT",
-            "with --faults: only this fault; may be given several times",
-            REPEATED,
-        ),
-        json_of("judgement"),
+    parser.add_argument(
+        "files",
+        nargs="*",
+        metavar="FILE|FOLDER",
+        help="the student's file, like step_loop.py, or the folder that it is in; or those of a "
+        "class, each in the folder or in a folder of its own there",
     )
-    add_rules(parser, ("only", NEEDS, "faults"))
+    add_backend(parser, f"mujoco or pybullet (default {DEFAULT})")
+    parser.add_argument(
+        "--time-limit",
+        type=typed_float,
+        default=5.0,
+        metavar="S",
+        help="seconds that each function of FILE may compute (default 5); time in which the "
+        "machine is busy with others does not count, up to 60 s on the clock, or 12 times S",
+    )
+    parser.add_argument(
+        "--csv",
+        type=file_name,
+        metavar="TABLE",
+        help="of a class: write the table there after each file; typed again, it judges only "
+        "files that are new or changed",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=typed_int,
+        metavar="N",
+        help="of a class: how many files are judged at once (default: one for two processors)",
+    )
+    parser.add_argument(
+        "--roster",
+        type=Path,
+        metavar="LIST",
+        help="of a class: a CSV file with a row for each student, whose cells (a name, a number) "
+        "are looked for in the names of files; who handed in nothing is a row of the table",
+    )
+    parser.add_argument(
+        "--tests",
+        action="store_true",
+        help="of a class: run the test_arm.py in each student's folder on arms with faults, too",
+    )
+    parser.add_argument(
+        "--gradescope",
+        type=file_name,
+        metavar="RESULTS",
+        help="of one file, or a folder with one: write Gradescope's results.json, too",
+    )
+    parser.add_argument(
+        "--faults",
+        metavar="TESTFILE",
+        help="run these tests on the arm with one fault at a time, and say which they catch",
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="FAULT",
+        help="with --faults: only this fault; may be given several times",
+    )
+    add_json(parser, "judgement")
 
 
 def run(options: argparse.Namespace) -> int:
     """Judge, and show."""
-    refuse(
-        (
-            (not options.files) == (options.faults is None),
-            "expected one of FILE and --faults TESTFILE",
+    if options.only and options.faults is None:
+        raise BadInputError("--only goes with --faults")
+    if bool(options.files) == (options.faults is not None):
+        raise BadInputError("expected one of FILE and --faults TESTFILE")
+    is_class = _is_class(options)
+    if options.gradescope is not None and (options.faults is not None or is_class):
+        raise BadInputError("--gradescope goes with one FILE, or one FOLDER")
+    are_here = all(Path(file).exists() for file in options.files)
+    if _wants_table(options) and not is_class and are_here:
+        raise BadInputError(
+            "--csv, --jobs, --roster and --tests go with several files, or a folder"
         )
-    )
-    from ..grading.classroom import is_one_students
-    from ..runs.whole import check_place
-
-    folder = any(Path(file).is_dir() for file in options.files)
-    table = options.csv or options.roster or options.tests or options.jobs is not None
-    single = options.gradescope or (
-        folder and not table and is_one_students(Path(options.files[0]))
-    )
-    several = len(options.files) > 1 or (folder and not single)
-    refuse(
-        (
-            (options.faults is not None or several) and options.gradescope,
-            "--gradescope goes with one FILE, or one FOLDER",
-        ),
-        (
-            not several and table and all(Path(file).exists() for file in options.files),
-            "--csv, --jobs, --roster and --tests go with several files, or a folder",
-        ),
-    )
     if options.faults is not None:
-        return _faults(options)
-    for target in (options.csv, options.gradescope):
-        if target is not None:
-            check_place(target)
-    return _class(options) if several else _one(options)
+        return _run_faults(options)
+    return _run_class(options) if is_class else _run_one(options)
 
 
-def _backend(options: argparse.Namespace) -> str:
-    """Return the name of the backend that exercises are judged on."""
-    backend = one_backend(options.backend, "check")
-    if backend.defaults == "engine":
-        raise BadInputError(f"exercises are judged on {backend.name}, which keeps the contract")
-    return backend.name
+def _is_class(options: argparse.Namespace) -> bool:
+    """Tell whether files are those of a class, and not one student's."""
+    from ..grading.classroom import is_one_students
+
+    if len(options.files) != 1:
+        return len(options.files) > 1
+    file = Path(options.files[0])
+    if not file.is_dir() or options.gradescope is not None:
+        return False
+    return _wants_table(options) or not is_one_students(file)
 
 
-def _faults(options: argparse.Namespace) -> int:
-    """A student's tests, on an arm with each of the faults."""
-    from ..grading.faults.run import examine
+def _wants_table(options: argparse.Namespace) -> bool:
+    """Tell whether an option of a class is given."""
+    return (
+        options.csv is not None
+        or options.roster is not None
+        or options.tests
+        or options.jobs is not None
+    )
+
+
+def request_of(options: argparse.Namespace) -> CheckRequest:
+    """Return what is to be judged, of one student.
+
+    Raises:
+        BadInputError: A number is out of range, or the backend is not one.
+        UnknownNameError: There is no such backend.
+    """
+    from ..grading.request import CheckRequest
+
+    return CheckRequest(
+        file=options.files[0],
+        backend=word_of_one_backend(options.backend, "check"),
+        time_limit=options.time_limit,
+    )
+
+
+def class_request_of(options: argparse.Namespace) -> ClassRequest:
+    """Return what is to be judged, of a class.
+
+    Raises:
+        BadInputError: A number is out of range, the table cannot be written, or the backend is
+            not one.
+        UnknownNameError: There is no such backend.
+    """
+    from ..grading.request import ClassRequest
+
+    return ClassRequest(
+        paths=tuple(options.files),
+        backend=word_of_one_backend(options.backend, "check"),
+        time_limit=options.time_limit,
+        jobs=options.jobs,
+        table=options.csv,
+        roster=options.roster,
+        tests=options.tests,
+    )
+
+
+def faults_request_of(options: argparse.Namespace) -> FaultsRequest:
+    """Return which tests are to be run.
+
+    Raises:
+        BadInputError: The backend is not one.
+        UnknownNameError: There is no such fault or backend.
+    """
+    from ..grading.request import FaultsRequest
+
+    return FaultsRequest(
+        file=options.faults,
+        backend=word_of_one_backend(options.backend, "check"),
+        only=tuple(options.only),
+    )
+
+
+def _run_faults(options: argparse.Namespace) -> int:
+    """Run a student's tests on an arm with each of the faults."""
+    from ..grading.request import answer_faults
     from ..report.grading import faults_page
-    from ..report.terminal import progress
 
-    with progress("faults") as report:
-        examination = examine(options.faults, _backend(options), options.only, progress=report)
+    examination = answer_faults(faults_request_of(options), TerminalReporter())
     return show(faults_page(examination), examination, options.json)
 
 
-def _one(options: argparse.Namespace) -> int:
-    """One student's file."""
-    from ..grading import classroom, exercise
-    from ..report.grading import grade_page
-    from ..report.terminal import progress
+def _run_one(options: argparse.Namespace) -> int:
+    """Judge one student's file, and write Gradescope's results."""
+    from ..grading.request import answer
+    from ..report.grading import grade_page, gradescope_results
+    from ..runs.whole import check_place, replace_text
 
-    (file,) = options.files
-    folder = Path(file) if Path(file).is_dir() else None
+    if options.gradescope is None:
+        grade = answer(request_of(options), TerminalReporter())
+        return show(grade_page(grade), grade, options.json)
+    check_place(options.gradescope)
     try:
-        if folder:
-            file = classroom.submission_in(folder)
-        with progress("check") as report:
-            grade = exercise.run(file, _backend(options), options.time_limit, report, folder=folder)
-    except BadInputError as error:
-        if options.gradescope:  # the student sees why
-            _gradescope(options.gradescope, None, str(error))
+        grade = answer(request_of(options), TerminalReporter())
+    except BadInputError as error:  # the student sees why
+        replace_text(options.gradescope, gradescope_results(None, str(error)))
         raise
-    if options.gradescope:
-        _gradescope(options.gradescope, grade, "")
+    replace_text(options.gradescope, gradescope_results(grade))
     return show(grade_page(grade), grade, options.json)
 
 
-def _gradescope(target: Path, grade: Any, refusal: str) -> None:
-    from ..report.grading import gradescope_results
-    from ..runs.whole import replace_text
-
-    replace_text(target, gradescope_results(grade, refusal))
-
-
-def _class(options: argparse.Namespace) -> int:
-    """The files of a class."""
-    from ..grading import classroom
+def _run_class(options: argparse.Namespace) -> int:
+    """Judge the files of a class."""
+    from ..grading.request import answer_class
     from ..report.grading import class_page
-    from ..report.terminal import progress
 
-    submitted = classroom.submissions(options.files)
-    if options.roster:
-        submitted = classroom.enrolled(submitted, options.roster)
-    with resumable(options.csv, "judged"), progress(f"{len(submitted)} files") as report:
-        entries = classroom.judge_all(
-            submitted,
-            _backend(options),
-            time_limit=options.time_limit,
-            jobs=options.jobs,
-            table=options.csv,
-            tests=options.tests,
-            progress=report,
-        )
-    show(class_page(entries, classroom.not_looked_at(options.files)), entries, options.json)
-    return 0 if all(entry.judged for entry in entries) else SAYS_NO
+    request = class_request_of(options)
+    with resumable(request.table, "judged"):
+        result = answer_class(request, TerminalReporter())
+    show(class_page(result.entries, result.ignored), result.entries, options.json)
+    return 0 if result.complete else SAYS_NO

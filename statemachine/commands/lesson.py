@@ -4,70 +4,118 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import dropwhile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import BadInputError, MissingEngineError
+from ..installed import DEFAULT
 from ..lessons import BESIDE, LESSONS, PATH, Lesson
-from ..page import Heading
+from ..page import Heading, Page
+from ..typed_numbers import typed_float, typed_int
 from ._common import (
-    LESSON_BACKEND,
+    CONTRACT_BACKENDS,
     MISSING,
     PROGRAM,
     SAYS_NO,
-    Row,
-    add_table,
-    chosen_backends,
+    TerminalReporter,
+    add_backend,
+    add_json,
+    add_menagerie,
     complain,
-    json_of,
-    menagerie,
-    on_each_backend,
-    refuse,
+    number_list,
     show,
 )
 
+if TYPE_CHECKING:
+    from ..lessons.fingertip_request import FingertipRequest
+    from ..lessons.request import LessonRequest
+    from ..report.quiz import Reader
+
 
 def add(parser: argparse.ArgumentParser) -> None:
-    """Its options, and a parser for each lesson."""
+    """Add its options, and a parser for each lesson."""
     parser.description = "Without a name: the lessons of the path, one after the other."
     parser.epilog = "In a terminal each lesson asks for a prediction before it shows the answer."
-    add_table(
-        parser,
-        *_shared(),
-        (
-            "--from",
-            "LESSON",
-            "of the whole path: where to begin, if not at the first",
-            {"dest": "start", "choices": [lesson.name for lesson in PATH]},
-        ),
+    _add_shared(parser)
+    parser.add_argument(
+        "--from",
+        dest="start",
+        choices=[lesson.name for lesson in PATH],
+        metavar="LESSON",
+        help="of the whole path: where to begin, if not at the first",
     )
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
-        _add_lesson(named, lesson)
+        question = lesson.question
+        _add_lesson(named.add_parser(lesson.name, help=question, description=question), lesson)
 
 
-def _shared() -> Iterator[Row]:
-    """Options that come before a lesson's name or after it; the later one counts."""
-    yield from (LESSON_BACKEND, *menagerie(), json_of())
-    yield "--calls", "", "show which of the engine's own functions the code made it run"
-    yield "--no-questions", "", "do not ask for predictions, do not wait"
-    yield "--record", "FILE", "keep your predictions in this file, with a score, to hand in"
+def _add_shared(parser: argparse.ArgumentParser) -> None:
+    """Add the options that come before a lesson's name or after it."""
+    add_backend(parser, CONTRACT_BACKENDS)
+    add_menagerie(parser)
+    add_json(parser)
+    parser.add_argument(
+        "--calls",
+        action="store_true",
+        help="show which of the engine's own functions the code made it run",
+    )
+    parser.add_argument(
+        "--no-questions", action="store_true", help="do not ask for predictions, do not wait"
+    )
+    parser.add_argument(
+        "--record",
+        metavar="FILE",
+        help="keep your predictions in this file, with a score, to hand in",
+    )
 
 
-def _add_lesson(named: Any, lesson: Lesson) -> None:
-    parser = named.add_parser(lesson.name, help=lesson.question, description=lesson.question)
-    rows: list[Row] = [(*row, {"default": argparse.SUPPRESS}) for row in _shared()]
-    rows += lesson.options
+def _add_lesson(parser: argparse.ArgumentParser, lesson: Lesson) -> None:
+    """Add the options of one lesson."""
+    _add_shared(parser)
+    for action in parser._actions:  # a default would undo what stands before the lesson's name
+        if action.dest != "help":
+            action.default = argparse.SUPPRESS
+    for option in lesson.options:
+        _add_option(parser, *option)
     if lesson.plots:
-        rows.append(("--plot", "FILE", "write its pictures: .svg, .png or .pdf"))
-    model = f"the model (default {lesson.model})"
-    add_table(parser, *rows, ("--model", "NAME|FILE", model, {"default": lesson.model}))
+        parser.add_argument("--plot", metavar="FILE", help="write its pictures: .svg, .png or .pdf")
+    parser.add_argument(
+        "--model",
+        default=lesson.model,
+        metavar="NAME|FILE",
+        help=f"the model (default {lesson.model})",
+    )
     parser.set_defaults(run=run, lesson=lesson, plot=None)
+
+
+# Types of a lesson's options, by the metavar.
+_TYPES: dict[str, Callable[[str], object]] = {
+    "N": typed_int,
+    "S": typed_float,
+    "X": typed_float,
+    "X,X,…": number_list,
+}
+
+
+def _add_option(
+    parser: argparse.ArgumentParser,
+    flag: str,
+    metavar: str,
+    says: str,
+    settings: Mapping[str, Any] | None = None,
+) -> None:
+    """Add an option of the table of lessons; one without a metavar is a switch."""
+    if not metavar:
+        parser.add_argument(flag, action="store_true", help=says)
+        return
+    further = dict(settings or {})
+    parser.add_argument(flag, metavar=metavar, type=_TYPES.get(metavar, str), help=says, **further)
 
 
 _OVERVIEW = f"""\
@@ -92,39 +140,83 @@ def overview(_options: argparse.Namespace) -> int:
     return 0
 
 
-def run(options: argparse.Namespace) -> int:
-    """One lesson, on one backend or all."""
+def request_of(options: argparse.Namespace) -> LessonRequest:
+    """Return which lesson is to be taken; JSON has all its parts.
+
+    Raises:
+        BadInputError: --from is given, or an engine as its own users meet it.
+        UnknownNameError: There is no such backend.
+    """
+    from ..lessons.request import LessonRequest
+
     lesson: Lesson = options.lesson
-    refuse(
-        (
-            options.start is not None,
+    if options.start is not None:
+        raise BadInputError(
             f"--from begins the whole path, and {lesson.name} is one lesson of it: type "
-            f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}",
-        ),
-    )
+            f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
+        )
     values = {key: getattr(options, key) for key in lesson.defaults}
-    reader = _reader(options, lesson)
-    page, results = _compute(options, lesson, options.model, values)
+    if options.json:
+        values |= dict.fromkeys(lesson.more, True)
+    return LessonRequest(
+        name=lesson.name,
+        model=options.model,
+        backends=tuple(options.backend or [DEFAULT]),
+        menagerie=options.menagerie,
+        options=values,
+        calls=options.calls,
+    )
+
+
+def path_requests_of(options: argparse.Namespace) -> list[LessonRequest]:
+    """Return the lessons of the path that are to be taken, in their order.
+
+    Raises:
+        BadInputError: An engine is named as its own users meet it.
+        UnknownNameError: There is no such backend.
+    """
+    from ..lessons.request import LessonRequest
+
+    names = [lesson.name for lesson in PATH]
+    first = 0 if options.start is None else names.index(options.start)
+    requests: list[LessonRequest] = []
+    for lesson in PATH[first:]:
+        requests.append(
+            LessonRequest(
+                name=lesson.name,
+                backends=tuple(options.backend or [DEFAULT]),
+                menagerie=options.menagerie,
+                options=dict.fromkeys(lesson.more, True) if options.json else {},
+                calls=options.calls,
+            )
+        )
+    return requests
+
+
+def run(options: argparse.Namespace) -> int:
+    """Take one lesson, on one backend or all."""
+    from ..report.quiz import Stopped
+
+    request = request_of(options)
+    reader = _reader(options, request.lesson)
+    page, results = _take(request)
     if options.plot is not None:
         from ..report.figures import write_pictures
 
         size = write_pictures(page.blocks, Path(options.plot))
         print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
-    if any(values[part] for part in lesson.more) and not options.json:
+    if request.shows_parts and not options.json:
         shown = dropwhile(lambda block: not isinstance(block, Heading), page.blocks)
         page = replace(page, blocks=list(shown))
     names = list(LESSONS)
-    later = names[names.index(lesson.name) + 1 :]
+    later = names[names.index(request.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"
-    from ..report.quiz import Stopped
-
     try:
         return show(page, results, options.json, f"Next: {following}", reader)
     except Stopped:
         return 0
     finally:
-        if options.record:
-            print(reader.summary)
+        _show_summary(reader)
 
 
 _NEXT = f"""\
@@ -140,119 +232,135 @@ Where to go next:
 
 
 def run_path(options: argparse.Namespace) -> int:
-    """All lessons of the path, one after the other."""
-    from ..measures.text import command
-    from ..report import terminal
-    from ..report.as_json import dumps
-    from ..report.quiz import Stopped
-
+    """Take all lessons of the path, one after the other."""
     reader = _reader(options, PATH[0])
-    code, everything = 0, {}
-    names = [lesson.name for lesson in PATH]
-    first = names.index(options.start) if options.start else 0
-    lesson = PATH[first]
+    requests = path_requests_of(options)
+    if options.json:
+        return _print_path(requests)
     try:
-        for number, lesson in enumerate(PATH[first:], start=first + 1):
-            if reader and number > first + 1:
-                reader.go_on(f"lesson {number}: {lesson.question}")
-            if reader:
-                reader.lesson = lesson.name
-            page, everything[lesson.name] = _compute(options, lesson, lesson.model, lesson.defaults)
-            code = code if page.holds else SAYS_NO
-            if not options.json:
-                terminal.show(
-                    replace(page, title=f"{number} of {len(PATH)}, {page.title}"), "", reader
-                )
-        if options.json:
-            print(dumps(everything))
-        elif code == 0:
-            with suppress(Stopped):
-                code = _last_page(options, reader)
-    except (Stopped, KeyboardInterrupt) as stop:
-        if reader:
-            again = command(
-                [PROGRAM, "lesson", "--from", lesson.name],
-                *(("--backend", word, None) for word in options.backend or ()),
-                ("--record", options.record, None),
-            )
-            print(f"\nGo on later with: {again}")
-        if isinstance(stop, KeyboardInterrupt):
-            raise
+        return _show_path(options, requests, reader)
     finally:
-        if options.record:
-            print(reader.summary)
+        _show_summary(reader)
+
+
+def _print_path(requests: Sequence[LessonRequest]) -> int:
+    """Print what came of lessons as JSON."""
+    from ..report.as_json import dumps
+
+    code, everything = 0, {}
+    for request in requests:
+        page, everything[request.name] = _take(request)
+        if not page.holds:
+            code = SAYS_NO
+    print(dumps(everything))
     return code
 
 
-def _last_page(options: argparse.Namespace, reader: Any) -> int:
-    """The fingertip of all engines against the witness, and where to go next."""
+def _show_path(
+    options: argparse.Namespace, requests: Sequence[LessonRequest], reader: Reader | None
+) -> int:
+    """Show lessons, and the last page; where the reader stops, say how to go on."""
+    from ..report import terminal
+    from ..report.quiz import Stopped
+
+    code, lesson = 0, requests[0].lesson
+    try:
+        for number, request in enumerate(requests, start=len(PATH) - len(requests) + 1):
+            lesson = request.lesson
+            if reader is not None:
+                if request is not requests[0]:
+                    reader.go_on(f"lesson {number}: {lesson.question}")
+                reader.lesson = lesson.name
+            page, _ = _take(request)
+            if not page.holds:
+                code = SAYS_NO
+            title = f"{number} of {len(PATH)}, {page.title}"
+            terminal.show(replace(page, title=title), "", reader)
+        if code == 0:
+            with suppress(Stopped):
+                code = _last_page(options, reader)
+    except (Stopped, KeyboardInterrupt) as stop:
+        if reader is not None:
+            print(f"\nGo on later with: {_typed_from(options, lesson)}")
+        if isinstance(stop, KeyboardInterrupt):
+            raise
+    return code
+
+
+def _typed_from(options: argparse.Namespace, lesson: Lesson) -> str:
+    """Return the command that begins the path at a lesson."""
+    from ..measures.text import command
+
+    words = [PROGRAM, "lesson", "--from", lesson.name]
+    for backend in options.backend or ():
+        words += ["--backend", backend]
+    return command(words, ("--record", options.record, None))
+
+
+def last_page_request_of(options: argparse.Namespace) -> FingertipRequest:
+    """Return what is asked on the last page: the fingertip of all engines."""
+    from ..lessons.fingertip_request import FingertipRequest
+
+    return FingertipRequest(backends=("all",), menagerie=options.menagerie)
+
+
+def _last_page(options: argparse.Namespace, reader: Reader | None) -> int:
+    """Show the fingertip of all engines against the witness, and where to go next."""
     from ..lessons.certificate import page
-    from ..lessons.fingertip import certify
+    from ..lessons.fingertip_request import answer
     from ..report import terminal
 
-    code, every = 0, argparse.Namespace(backend=["all"], menagerie=options.menagerie)
-    if reader:
+    code = 0
+    if reader is not None:
         reader.go_on("the last page: the fingertip, checked by another library")
     try:
-        results = on_each_backend(
-            every, "fingertip", "so101", lambda model, _, report: certify(model, progress=report)
-        )
-        certificate = page(results)
+        certificate = page(answer(last_page_request_of(options), TerminalReporter()))
         code = 0 if certificate.holds else SAYS_NO
-        terminal.show(replace(certificate, title=f"The last page: {certificate.title}"), "", reader)
+        title = f"The last page: {certificate.title}"
+        terminal.show(replace(certificate, title=title), "", reader)
     except MissingEngineError as error:  # nobody can compute it here
         complain(error, MISSING)
-    (reader.read if reader else sys.stdout.write)(_NEXT)
-    if reader:
+    if reader is None:
+        sys.stdout.write(_NEXT)
+    else:
+        reader.read(_NEXT)
         reader.show()
     return code
 
 
-def _compute(
-    options: argparse.Namespace, lesson: Lesson, model: str, values: dict[str, Any]
-) -> tuple[Any, dict[str, Any]]:
-    """The page of a lesson, and the results that it was made from, by backend."""
-    from ..lessons.pictures import with_picture
-    from ..lessons.session import page_of_lesson, take
+def _take(request: LessonRequest) -> tuple[Page, dict[str, object]]:
+    """Take a lesson, and return its page and what JSON shows of it, by backend."""
+    from ..lessons.request import answer
+    from ..report.lesson import page
 
-    for backend in chosen_backends(options.backend):
-        if backend.defaults == "engine":
-            raise BadInputError(
-                f"lessons are about engines that keep the contract: type --backend {backend.name}"
-            )
-    if options.json:
-        values |= dict.fromkeys(lesson.more, True)
-    taken = on_each_backend(
-        options,
-        lesson.name,
-        model,
-        lambda loaded, backend, report: take(
-            lesson, loaded, backend, values, model, options.menagerie, report, options.calls
-        ),
-    )
-    page = page_of_lesson(lesson, taken)
-    if model == lesson.model and values == lesson.defaults:
-        page = with_picture(page, lesson.name)
-    if not options.calls:
-        return page, {name: run.result for name, run in taken.items()}
-    from ..report import calls
-
-    recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
-    recorded = calls.recorded_calls(recordings) if recordings else ()
-    silent = [calls.not_asked(name) for name, run in taken.items() if run.calls is None]
-    page = replace(page, blocks=[*page.blocks, *recorded, *silent])
-    return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
+    runs = answer(request, TerminalReporter())
+    results: dict[str, object] = {}
+    for backend, run in runs.items():
+        results[backend] = run.result
+        if request.calls:
+            results[backend] = {"result": run.result, "calls": run.calls}
+    return page(request, runs), results
 
 
-def _reader(options: argparse.Namespace, lesson: Lesson) -> Any:
-    """Who answers the questions of a lesson; None where nobody would."""
-    from ..report.quiz import Reader, can_ask
+def _reader(options: argparse.Namespace, lesson: Lesson) -> Reader | None:
+    """Return who answers the questions of a lesson; None where nobody would.
 
-    asked = can_ask() and not (options.json or options.no_questions)
+    Raises:
+        BadInputError: Predictions are to be kept, and nobody is asked for any.
+    """
+    from ..report.quiz import Reader, RecordedReader, can_ask
+
+    is_asked = can_ask() and not options.json and not options.no_questions
     if options.record is None:
-        return Reader(lesson.name) if asked else None
-    if not asked:
+        return Reader(lesson.name) if is_asked else None
+    if not is_asked:
         raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
+    return RecordedReader(Path(options.record), lesson.name)
+
+
+def _show_summary(reader: Reader | None) -> None:
+    """Print what a reader's file says by now, if their predictions are kept."""
     from ..report.quiz import RecordedReader
 
-    return RecordedReader(Path(options.record), lesson.name)
+    if isinstance(reader, RecordedReader):
+        print(reader.summary)

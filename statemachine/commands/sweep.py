@@ -3,35 +3,53 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..errors import BadInputError
+from ..typed_numbers import typed_float, typed_int
 from ._common import (
-    JOBS,
-    NEEDS,
-    REPEATED,
     SAYS_NO,
-    SECONDS,
-    add_rules,
-    add_table,
-    backend_of,
+    TerminalReporter,
+    add_backend,
+    add_jobs,
+    add_json,
+    add_menagerie,
+    add_model,
+    add_seconds,
     complain,
+    experiments,
     flag_of,
-    json_of,
-    menagerie,
-    model_of,
-    refuse,
     resumable,
     shorten_help,
     show,
 )
-from .compare import experiments
+
+if TYPE_CHECKING:
+    from ..sweep import Sweep
+    from ..sweep.questions import SweepReportRequest, SweepRequest
+
+# Options of a run, which the report of a dataset has no use for, and what they are by default.
+_OF_A_RUN = {
+    "model": None,
+    "vary": [],
+    "seeds": 1,
+    "spread": "1deg,1mm",
+    "samples": 0,
+    "design_seed": 0,
+    "seconds": None,
+    "keyframe": None,
+    "every": 1,
+    "moments": 20,
+    "timeout": 600.0,
+    "jobs": None,
+    "scheduler": None,
+    "extend": False,
+}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    """Its options."""
+    """Add its options."""
     parser.description = (
         "Run an experiment at every combination of settings, from several starts, on\n"
         "every engine, and write a row for each run into a partitioned Parquet dataset.\n"
@@ -53,170 +71,254 @@ def add(parser: argparse.ArgumentParser) -> None:
         "docs/sweeps.md has the columns of the dataset."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    add_table(
-        parser,
-        ("what", "WHAT", "an experiment, or FILE.py:FUNCTION", {"nargs": "?"}),
-        model_of("the model, instead of the experiment's own"),
-        ("--vary", "NAME=VALUES", "what changes; see above", REPEATED),
-        ("--out", "DIR", "the folder of the dataset; a new one, or to go on"),
-        backend_of("an engine, or all; may be repeated (all)"),
-        ("--seeds", "N", "starts for each setting: seeds 0 to N-1 (1)", {"default": 1}),
-        (
-            "--spread",
-            "SIZES",
-            "how far a seed other than 0 puts the start away (1deg,1mm; 0 for not at all)",
-            {"default": "1deg,1mm"},
-        ),
+    parser.add_argument(
+        "what", nargs="?", metavar="WHAT", help="an experiment, or FILE.py:FUNCTION"
     )
-    add_table(
-        parser.add_argument_group("ranges"),
-        ("--samples", "N", "Sobol points of the ranges, a power of 2", {"default": 0}),
-        ("--design-seed", "N", "of what is drawn for them (0)", {"default": 0}),
+    add_model(parser, "the model, instead of the experiment's own")
+    parser.add_argument(
+        "--vary",
+        action="append",
+        default=_OF_A_RUN["vary"],
+        metavar="NAME=VALUES",
+        help="what changes; see above",
     )
-    add_table(
-        parser.add_argument_group("the run"),
-        SECONDS,
-        ("--keyframe", "NAME", "where a FUNCTION starts"),
-        ("--every", "N", "steps for which what a FUNCTION returned holds (1)", {"default": 1}),
-        ("--moments", "N", "of each run that are kept (20)", {"default": 20}),
-        ("--timeout", "S", "that a cell may take (600)", {"default": 600.0}),
+    parser.add_argument(
+        "--out", metavar="DIR", help="the folder of the dataset; a new one, or to go on"
     )
-    add_table(
-        parser.add_argument_group("where"),
-        JOBS,
-        ("--scheduler", "ADDRESS", "of Dask, whose workers run it instead"),
-        ("--extend", "", "let the dataset in DIR grow by values, seeds, engines"),
-        ("--retry-failed", "", "run the cells that failed again; their rows are replaced"),
+    add_backend(parser, "an engine, or all; may be repeated (all)")
+    parser.add_argument(
+        "--seeds",
+        type=typed_int,
+        default=_OF_A_RUN["seeds"],
+        metavar="N",
+        help="starts for each setting: seeds 0 to N-1 (1)",
     )
-    add_table(
-        parser.add_argument_group("from a sweep to an answer"),
-        (
-            "--report",
-            "DIR",
-            "of the dataset in DIR, or of that which was just run: how much each parameter moves a "
-            "quantity of one engine, or the gap between two, and where it is largest",
-            {"nargs": "?", "const": True},
-        ),
-        (
-            "--quantity",
-            "NAME",
-            "a column of the dataset, or one number of it: energy, qpos[0], … (sample_tip of two "
-            "engines, tip[2] of one)",
-        ),
+    parser.add_argument(
+        "--spread",
+        default=_OF_A_RUN["spread"],
+        metavar="SIZES",
+        help="how far a seed other than 0 puts the start away (1deg,1mm; 0 for not at all)",
     )
-    add_table(parser, *menagerie(), json_of("summary, or the report,"))
-    add_rules(parser, ("quantity", NEEDS, "report"))
-    shorten_help(
-        parser,
-        *("what", "model", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs"),
-        *("report", "json"),
+    _add_ranges(parser.add_argument_group("ranges"))
+    _add_run(parser.add_argument_group("the run"))
+    _add_place(parser.add_argument_group("where"))
+    _add_report(parser.add_argument_group("from a sweep to an answer"))
+    add_menagerie(parser)
+    add_json(parser, "summary, or the report,")
+    first = ("what", "model", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs")
+    shorten_help(parser, first=(*first, "report", "json"))
+
+
+def _add_ranges(group: argparse._ArgumentGroup) -> None:
+    """Add the options of ranges from which values are drawn."""
+    group.add_argument(
+        "--samples",
+        type=typed_int,
+        default=_OF_A_RUN["samples"],
+        metavar="N",
+        help="Sobol points of the ranges, a power of 2",
+    )
+    group.add_argument(
+        "--design-seed",
+        type=typed_int,
+        default=_OF_A_RUN["design_seed"],
+        metavar="N",
+        help="of what is drawn for them (0)",
     )
 
 
-# Options that change what is run, or where.
-_OF_A_RUN = (
-    *("model", "vary", "seeds", "spread", "samples", "design_seed", "seconds", "keyframe", "every"),
-    *("moments", "timeout", "jobs", "scheduler", "extend"),
-)
+def _add_run(group: argparse._ArgumentGroup) -> None:
+    """Add the options of each run."""
+    add_seconds(group)
+    group.add_argument("--keyframe", metavar="NAME", help="where a FUNCTION starts")
+    group.add_argument(
+        "--every",
+        type=typed_int,
+        default=_OF_A_RUN["every"],
+        metavar="N",
+        help="steps for which what a FUNCTION returned holds (1)",
+    )
+    group.add_argument(
+        "--moments",
+        type=typed_int,
+        default=_OF_A_RUN["moments"],
+        metavar="N",
+        help="of each run that are kept (20)",
+    )
+    group.add_argument(
+        "--timeout",
+        type=typed_float,
+        default=_OF_A_RUN["timeout"],
+        metavar="S",
+        help="that a cell may take (600)",
+    )
+
+
+def _add_place(group: argparse._ArgumentGroup) -> None:
+    """Add the options that say where it runs, and what is done with a dataset that is there."""
+    add_jobs(group)
+    group.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of Dask, whose workers run it instead"
+    )
+    group.add_argument(
+        "--extend",
+        action="store_true",
+        help="let the dataset in DIR grow by values, seeds, engines",
+    )
+    group.add_argument(
+        "--retry-failed",
+        action="store_true",
+        help="run the cells that failed again; their rows are replaced",
+    )
+
+
+def _add_report(group: argparse._ArgumentGroup) -> None:
+    """Add the options of the report."""
+    group.add_argument(
+        "--report",
+        nargs="?",
+        const=True,
+        metavar="DIR",
+        help="of the dataset in DIR, or of that which was just run: how much each parameter moves "
+        "a quantity of one engine, or the gap between two, and where it is largest",
+    )
+    group.add_argument(
+        "--quantity",
+        metavar="NAME",
+        help="a column of the dataset, or one number of it: energy, qpos[0], … (sample_tip of two "
+        "engines, tip[2] of one)",
+    )
+
+
+def request_of(options: argparse.Namespace) -> SweepRequest:
+    """Return the sweep that is to be run.
+
+    Raises:
+        BadInputError: A value is out of range.
+        UnknownNameError: There is no such experiment.
+    """
+    from ..sweep.questions import SweepRequest
+
+    return SweepRequest(
+        sweep=_sweep_of(options),
+        folder=options.out,
+        jobs=options.jobs,
+        scheduler=options.scheduler,
+        extend=options.extend,
+        retry_failed=options.retry_failed,
+    )
+
+
+def _sweep_of(options: argparse.Namespace) -> Sweep:
+    """Return what is run in a sweep."""
+    from ..sweep import Sweep
+
+    return Sweep(
+        what=options.what,
+        vary=options.vary,
+        backends=options.backend or ("all",),
+        seeds=options.seeds,
+        samples=options.samples,
+        design_seed=options.design_seed,
+        model=options.model,
+        menagerie=options.menagerie,
+        seconds=options.seconds,
+        every=options.every,
+        keyframe=options.keyframe,
+        spread=options.spread,
+        moments=options.moments,
+        timeout=options.timeout,
+    )
+
+
+def report_request_of(options: argparse.Namespace, folder: str) -> SweepReportRequest:
+    """Return what is asked of a dataset.
+
+    Args:
+        options: Those of the command.
+        folder: Of the dataset.
+
+    Raises:
+        BadInputError: Three engines are named.
+        UnknownNameError: There is no such quantity.
+    """
+    from ..sweep.questions import SweepReportRequest
+
+    backends = tuple(name for name in options.backend or () if name != "all")
+    return SweepReportRequest(folder, options.quantity, backends)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run what is missing, and say what there is, or what moves a quantity of it."""
-    _check(options)
-    if options.report not in (None, True):
-        answer, page = _report(options, options.report)
-        return show(page, answer, options.json)
-    from ..report import sweep_report as words
-    from ..report.terminal import progress
-    from ..sweep import prepared, run_sweep
+    _check_options(options)
+    if options.report is None:
+        return _run_sweep(options, None)
+    if options.report is True:
+        return _run_sweep(options, report_request_of(options, options.out))
+    from ..report.sweep_report import page
+    from ..sweep.questions import answer_report
 
-    ready = prepared(_asked(options))
-    for line in ready.said:
-        complain(line, 0)
-    out = Path(options.out)
-    but = ", without --retry-failed," * options.retry_failed
-    with resumable(out, "done", but), progress(f"{len(ready)} cells") as bar:
-        summary = run_sweep(
-            ready,
-            out,
-            jobs=options.jobs,
-            scheduler=options.scheduler,
-            extend=options.extend,
-            retry_failed=options.retry_failed,
-            progress=bar,
-        )
-    if not (options.report and options.json):
-        show(words.summary_page(summary), summary, options.json)
-    if options.report:
-        try:
-            answer, page = _report(options, out)
-        except BadInputError as error:
-            if not summary.failed:
-                raise
-            return complain(error, SAYS_NO)  # there is nothing that it could be about
-        show(page, {"summary": summary, "report": answer}, options.json)
-    return SAYS_NO if summary.failed else 0
+    effects = answer_report(report_request_of(options, options.report))
+    return show(page(effects), effects, options.json)
 
 
-def _asked(options: argparse.Namespace) -> Any:
-    from ..sweep import Sweep
-
-    typed = vars(options)
-    given = {field.name: typed[field.name] for field in fields(Sweep) if field.name in typed}
-    return Sweep(backends=options.backend or ("all",), **given)
-
-
-def _check(options: argparse.Namespace) -> None:
-    """Whether what is asked for goes together, before anything is run.
+def _check_options(options: argparse.Namespace) -> None:
+    """Check that what is typed goes together.
 
     Raises:
         BadInputError: It does not.
     """
     runs = options.what is not None and options.out is not None
-    there = options.report not in (None, True)
-    given = [name for name in _OF_A_RUN if getattr(options, name) != options.usual[name]]
-    named = {name for name in options.backend or () if name != "all"}
-    refuse(
-        (
-            "" in (options.out, options.report),
-            "the folder of a sweep has no name: say --out DIR, or --report DIR",
-        ),
-        (
-            options.report is None and not runs,
-            "a sweep wants WHAT and --out DIR; the report of a dataset --report DIR",
-        ),
-        (
-            options.report is True and not runs,
-            "--report wants the folder of a dataset, or WHAT and --out DIR to run",
-        ),
-        (
-            there and (options.what, options.out) != (None, None),
-            "--report DIR is of a dataset that is there; with WHAT and --out it takes no folder",
-        ),
-        (
-            there and options.retry_failed,
-            "--retry-failed is of a sweep that runs: say WHAT and --out DIR",
-        ),
-        *(
-            (there and name in given, f"{flag_of(name)} is of a run, and --report DIR runs nothing")
-            for name in _OF_A_RUN
-        ),
-        (
-            options.report is not None and len(named) > 2,
-            "a report is of one engine, or of the gap between two: name one or two with --backend",
-        ),
-    )
-    if options.quantity is not None:
-        from ..sweep.quantities import parse_quantity
-
-        parse_quantity(options.quantity)
+    if options.quantity is not None and options.report is None:
+        raise BadInputError("--quantity goes with --report")
+    if "" in (options.out, options.report):
+        raise BadInputError("the folder of a sweep has no name: say --out DIR, or --report DIR")
+    if options.report is None and not runs:
+        raise BadInputError(
+            "a sweep wants WHAT and --out DIR; the report of a dataset --report DIR"
+        )
+    if options.report is True and not runs:
+        raise BadInputError("--report wants the folder of a dataset, or WHAT and --out DIR to run")
+    if options.report not in (None, True):
+        _check_options_of_report(options)
 
 
-def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
-    """Return the report of a dataset, and its page."""
-    from ..report import sweep_report as words
-    from ..sweep.analysis import effects
+def _check_options_of_report(options: argparse.Namespace) -> None:
+    """Check that no option of a run goes with the report of a dataset that is there.
 
-    backends = [name for name in options.backend or () if name != "all"]
-    answer = effects(folder, options.quantity, backends)
-    return answer, words.page(answer)
+    Raises:
+        BadInputError: One does.
+    """
+    if options.what is not None or options.out is not None:
+        raise BadInputError(
+            "--report DIR is of a dataset that is there; with WHAT and --out it takes no folder"
+        )
+    if options.retry_failed:
+        raise BadInputError("--retry-failed is of a sweep that runs: say WHAT and --out DIR")
+    for name, default in _OF_A_RUN.items():
+        if getattr(options, name) != default:
+            raise BadInputError(f"{flag_of(name)} is of a run, and --report DIR runs nothing")
+
+
+def _run_sweep(options: argparse.Namespace, asked: SweepReportRequest | None) -> int:
+    """Run a sweep, and show its summary and what is asked of it then."""
+    from ..report.sweep_report import page, summary_page
+    from ..sweep.questions import answer, answer_report
+
+    request = request_of(options)
+    otherwise = ", without --retry-failed," if request.retry_failed else ""
+    with resumable(Path(request.folder), "done", otherwise):
+        summary = answer(request, TerminalReporter())
+    failed = SAYS_NO if summary.failed else 0
+    if asked is None or not options.json:
+        show(summary_page(summary), summary, options.json)
+    if asked is None:
+        return failed
+    try:
+        effects = answer_report(asked)
+    except BadInputError as error:
+        if not summary.failed:
+            raise
+        return complain(error, SAYS_NO)  # there is nothing that it could be about
+    show(page(effects), {"summary": summary, "report": effects}, options.json)
+    return failed

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, did_you_mean, refuse
+from ..errors import BadInputError, did_you_mean
 from ..interface import Data, Model
 from ..interface.options import as_vector
 from ..measures.text import count, few
@@ -94,23 +94,23 @@ Function = Callable[..., Any]
 _TAKES = ("model", "data")  # by position
 
 
-def is_function(spec: str) -> bool:
-    """Whether a word is FILE.py or FILE.py:NAME."""
-    return Path(_place(spec)[0]).suffix == ".py"
+def is_function(spec: str | Function) -> bool:
+    """Tell whether something is a function, or a word FILE.py or FILE.py:NAME."""
+    return callable(spec) or Path(_place(spec)[0]).suffix == ".py"
 
 
 def function_scenario(
-    spec: str,
+    spec: str | Function,
     every: int = 1,
     keyframe: str | None = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> Scenario:
-    """What the function (model, data) that "FILE.py:NAME" says does on any robot.
+    """Return what a function (model, data) of the user's does on any robot.
 
-    Each controller has the file's names to itself: it is run anew for each.
+    Each controller of "FILE.py:NAME" has the file's names to itself: it is run anew for each.
 
     Args:
-        spec: A file and a function of it; without a name, `controller`.
+        spec: The function; or a file and a function of it, without a name `controller`.
         every: The function is called at the first of so many steps, and its ctrl holds.
         keyframe: Where it starts; None for the default state.
         parameters: Further keyword arguments of the function.
@@ -119,12 +119,19 @@ def function_scenario(
         BadInputError: There is no such file or function, or the file fails; the controller
             raises it where the function fails, or returns what is not ctrl.
     """
-    path, name = _place(spec)
+    path, name = function_place(spec)
     given = dict(parameters or {})
-    _imported(path, name, given)  # that it fails is said before anything is loaded
+
+    def imported() -> Function:
+        if isinstance(spec, str):
+            return _imported(path, name, given)
+        _check_takes(spec, name, path, given)
+        return spec
+
+    imported()  # that it fails is said before anything is loaded
 
     def controller_of(model: Model, _seed: int) -> Controller:
-        function = _imported(path, name, given)
+        function = imported()
         numbers = itertools.count()
 
         def controller(time: float, data: Data) -> Any:
@@ -136,7 +143,7 @@ def function_scenario(
 
         return controller
 
-    called = Path(spec).name
+    called = Path(spec).name if isinstance(spec, str) else name
     steps = "every step" if every == 1 else f"every {count(every, 'step')}"
     begins = "the default state" if keyframe is None else f"the keyframe {keyframe!r}"
     says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
@@ -169,8 +176,17 @@ def parameters_of(spec: str) -> tuple[str, ...]:
 
 
 def function_file(spec: str) -> Path:
-    """The file that "FILE.py:NAME" names."""
+    """Return the file that "FILE.py:NAME" names."""
     return _place(spec)[0]
+
+
+def function_place(spec: str | Function) -> tuple[Path, str]:
+    """Return the file and the name of a function of the user's."""
+    if isinstance(spec, str):
+        return _place(spec)
+    code = getattr(inspect.unwrap(spec), "__code__", None)
+    path = Path(code.co_filename if code is not None else type(spec).__name__)
+    return path, getattr(spec, "__name__", type(spec).__name__)
 
 
 def _place(spec: str) -> tuple[Path, str]:
@@ -184,10 +200,18 @@ def _place(spec: str) -> tuple[Path, str]:
 def _imported(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
     """A function of a file, which is run for it, that can be called like this."""
     function = _function(path, name)
-    takes, _ = misfit(function, *_TAKES, **parameters)
-    given = ", ".join((*_TAKES, *parameters))
-    refuse((takes, f"{name} of {path.name} takes {takes}, and is called with ({given})"))
+    _check_takes(function, name, path, parameters)
     return function
+
+
+def _check_takes(function: Function, name: str, path: Path, parameters: Mapping[str, Any]) -> None:
+    """Check that a function can be called with a Model, a Data and these parameters."""
+    takes, _ = misfit(function, *_TAKES, **parameters)
+    if takes:
+        called_with = ", ".join((*_TAKES, *parameters))
+        raise BadInputError(
+            f"{name} of {path.name} takes {takes}, and is called with ({called_with})"
+        )
 
 
 def _function(path: Path, name: str) -> Function:
