@@ -23,7 +23,7 @@ from statemachine.lessons.fingertip import random_qpos
 from statemachine.lessons.speed import SpeedResult
 from statemachine.models import models_dir
 from statemachine.page import Verdict
-from statemachine.runs.header import provenance
+from statemachine.runs.provenance import provenance
 
 from .conftest import (
     around,

@@ -36,7 +36,7 @@ from statemachine.robots import (
 )
 from statemachine.robots.records import read_table, write_table
 from statemachine.runs import record_scenario
-from statemachine.runs.header import model_files
+from statemachine.runs.provenance import model_files
 from statemachine.runs.scenarios import scenario
 
 from .conftest import (

@@ -27,7 +27,7 @@ from ..measures import (
 )
 from ..measures.text import on
 from ..runs import Header, Trace, model_file
-from ..runs.header import Provenance, model_files
+from ..runs.provenance import Provenance, model_files
 from .labels import labels_of, notes_on
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 

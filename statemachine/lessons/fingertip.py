@@ -25,7 +25,7 @@ from ..models import AnyPath
 from ..page import only_on_pages
 from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ..runs.robot import carried_by
 from ..witness import OWN_READING, labels
 from ._readings import Tip, tips_of

@@ -9,7 +9,7 @@ from ..errors import BadInputError
 from ..interface import Model
 from ..measures.text import degrees, duration
 from ..runs.drive import Progress, part_of
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ..runs.robot import is_the_arm
 from . import LESSONS, forward, gravity, objects, replay, state, time
 from ._falling import SERVO

@@ -13,7 +13,7 @@ from ..interface import INPUTS, Data, JointType, Model, forward, make_data, rese
 from ..measures.text import count, millimetres
 from ..page import Block, Table
 from ..runs.drive import Progress
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._readings import read_derived, read_stored
 from .session import CodeRun, Options

@@ -13,7 +13,7 @@ from ..interface.options import as_count
 from ..measures.text import count, duration
 from ..page import Block, Table
 from ..runs.drive import Progress
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from .in_turns import Ratio, in_turns
 from .session import CodeRun, Options
 from .template import by_engine, differences

@@ -11,7 +11,7 @@ from ..interface import JointType, Model, make_data, reset
 from ..measures.text import grouped, listed
 from ..page import Block, Slots, Table
 from ..runs.drive import Progress
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from .session import CodeRun, Options
 from .template import differences
 

@@ -14,7 +14,7 @@ from ..interface import Data, Model, step
 from ..measures.text import count, duration
 from ..page import Block
 from ..runs.drive import Progress, steps_in
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from .session import CodeRun, Options
 from .template import by_engine
 

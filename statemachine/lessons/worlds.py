@@ -18,7 +18,7 @@ from ..measures.text import count, duration
 from ..page import Block, Table, Traces
 from ..processes import free_memory, resident_memory
 from ..runs.drive import Progress, part_of
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ..worlds import make_worlds, reset, step
 from .in_turns import Ratio, in_turns
 from .session import CodeRun, Options

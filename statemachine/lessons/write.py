@@ -26,7 +26,7 @@ from ..interface.options import as_scalar
 from ..measures.text import count, position
 from ..page import Block, Table
 from ..runs.drive import Progress
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ._readings import read_derived
 from ._robot import coordinate, with_joint
 from .session import CodeRun, Options

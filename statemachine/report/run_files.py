@@ -17,7 +17,7 @@ from ..interface import Model
 from ..models import AnyPath
 from ..page import Page
 from ..runs import Trace
-from ..runs.header import provenance
+from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from ..runs.whole import check_place, replace_text
 from . import film as films

@@ -30,7 +30,7 @@ from ..models import SUFFIXES, AnyPath
 from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
-from ..runs.header import model_digest, model_files
+from ..runs.provenance import model_digest, model_files
 from .gaps import STEPS
 from .records import (
     BackendRow,

@@ -14,7 +14,7 @@ from ..errors import TraceError, refuse
 from ..interface import OPTIONS, JointType
 from ..interface.options import HUGE
 from ..release_names import engine_of
-from .provenance import Provenance, model_digest, model_files, provenance  # noqa: F401
+from .provenance import Provenance
 
 SCHEMA = 1
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.

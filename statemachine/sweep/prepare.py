@@ -22,7 +22,7 @@ from ..interface.options import checked_options
 from ..models import resolve
 from ..runs.controllers import is_function, parameters_of
 from ..runs.drive import check_length, cost_of_a_second, steps_in
-from ..runs.header import model_digest
+from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
 from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc, with_kinds
 from .request import OptionValue, PreparedSweep, Sweep, beyond_ranges, options_at, start_at

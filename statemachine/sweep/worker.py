@@ -32,7 +32,7 @@ from ..models import resolve
 from ..processes.parallel import settle
 from ..runs.controllers import function_file
 from ..runs.drive import check_length, drive, steps_in
-from ..runs.header import model_digest
+from ..runs.provenance import model_digest
 from ..runs.recorder import energies
 from ..runs.scenarios import Scenario
 from .design import Value, digest

@@ -16,7 +16,7 @@ from ...measures.text import milliseconds
 from ...release_names import engine_of
 from ...runs import Trace
 from ...runs.drive import Progress, silent
-from ...runs.header import provenance
+from ...runs.provenance import provenance
 from .. import perturbed
 from ..labels import files_apart
 from ..matching import Matched, match_alike, match_models, missing_parts

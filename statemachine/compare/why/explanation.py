@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...measures import Deviation
-from ...runs.header import Provenance
+from ...runs.provenance import Provenance
 from ..matching import Only
 from .gap import FirstTouch, Measure
 from .locate import Localisation
