@@ -21,7 +21,6 @@ from .template import differences, emulated
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
-_RESTORED = len((*INPUTS, "time"))  # what a reset restores
 
 # Lines of the code after which the Data is looked at.
 _MADE = "data = sm.make_data(model)"
@@ -231,11 +230,12 @@ def _touches(model: Model, data: Data, body: int | None) -> tuple[int, int]:
 
 def slots(result: ResetResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
+    restores_all = set(result.restored) == {*INPUTS, "time"}
     held = [scene.name for scene in result.scenes if scene.held]
     return {
         "simulated": f"{result.simulated:g} s",
         "steps": count(result.steps, "step"),
-        "same": len(result.restored) == _RESTORED and result.same_future,
+        "same": restores_all and result.same_future,
         "emulated": emulated(result, "zeros when fresh"),
         "held": ", ".join(held),
         **_keyframe_slots(result),

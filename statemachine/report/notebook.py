@@ -22,6 +22,7 @@ from ..lessons.pictures import with_picture
 from ..lessons.session import fitted, page_of_lesson, take
 from ..page import (
     LETTERS,
+    Bars,
     Block,
     Code,
     Heading,
@@ -30,12 +31,15 @@ from ..page import (
     Markdown,
     Page,
     Picture,
+    Pipeline,
     Printed,
     Question,
     RobotPicture,
     Section,
+    Slots,
     Table,
     Text,
+    Traces,
     Verdict,
 )
 from .film import inline
@@ -275,6 +279,23 @@ def _place_of_answer(question: Question, blocks: Sequence[Block]) -> int:
 def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
     """Write one block; "" if there is nothing to show."""
     match block:
+        case Section():
+            return _section(block, picture)
+        case Interactive():
+            return ""
+        case RobotPicture():
+            return _robot_picture(block, picture)
+        case Traces() | Slots() | Pipeline() | Bars():
+            where = picture(block)
+            return f"![{_escaped(block.title)}]({where})" if where else ""
+    return _words(block)
+
+
+def _words(
+    block: Heading | Text | Items | Code | Printed | Question | Table | Verdict,
+) -> str:
+    """Write a block that has no pictures."""
+    match block:
         case Heading(text):
             return f"**{_escaped(text)}**"
         case Text(text, (_, heading)):
@@ -291,15 +312,6 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return _table(block)
         case Verdict(text, holds):
             return f"{'✓' if holds else '✗'} {_escaped(text)}"
-        case Section():
-            return _section(block, picture)
-        case Interactive():
-            return ""
-        case RobotPicture():
-            return _robot_picture(block, picture)
-        case _:
-            where = picture(block)
-            return f"![{_escaped(block.title)}]({where})" if where else ""
 
 
 def _items(block: Items) -> str:

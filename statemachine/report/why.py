@@ -37,23 +37,30 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         said: Lines to say before anything else.
     """
     title, *further = [*missing(result.missing), answer(result)]
+    slots = _origin(result) | _hints(result) | _verdict(result)
     return template.page(
         "why",
         title=title,
-        experiment=result.experiment,
-        left=result.labels[0],
-        right=result.labels[1],
-        seconds=result.seconds,
-        runs=result.runs,
-        took=short_time(result.took),
-        moments=result.moments,
         first=_first_lines(result, [*further, *said]),
         causes=causes(result),
         changes=steps(result),
         parts=three_parts(result)[1:],
-        **_hints(result),
-        **_verdict(result),
+        **slots,
     )
+
+
+def _origin(result: Explanation) -> Slots:
+    """Return what was run, and how long it took."""
+    left, right = result.labels
+    return {
+        "experiment": result.experiment,
+        "left": left,
+        "right": right,
+        "seconds": result.seconds,
+        "runs": result.runs,
+        "took": short_time(result.took),
+        "moments": result.moments,
+    }
 
 
 def _first_lines(result: Explanation, said: Sequence[str]) -> list[Text]:
@@ -65,25 +72,38 @@ def _first_lines(result: Explanation, said: Sequence[str]) -> list[Text]:
 
 def _hints(result: Explanation) -> Slots:
     """Return where to look for what is not explained."""
-    verdict = result.verdict
     engines = {side.backend for side in result.provenance}
     files = {side.model_sha256 for side in result.provenance}
+    slots: Slots = {"both": if_true(len(engines) > 1 and len(files) > 1)}
+    return slots | _where_the_rest_may_be(result, engines) | _what_is_between(result, engines)
+
+
+def _is_found(result: Explanation) -> bool:
+    """Tell whether all that is not explained was localised."""
+    return result.located > UNEXPLAINED >= result.unexplained
+
+
+def _where_the_rest_may_be(result: Explanation, engines: set[str]) -> Slots:
+    """Return what the rest of the gap may come from, where the question is not answered."""
+    slots: Slots = {"refused": None, "engines": None, "files": None}
+    if result.verdict.holds or not result.verdict.divides:
+        return slots
     names = [row.name for row in refused(result)]
-    stays = verdict.divides and not verdict.holds
-    all_found = result.located > UNEXPLAINED >= result.unexplained
-    between = all_found and verdict.divides and len(engines) > 1
-    by_contact = "contact" in {place.name for place in result.found_in}
-    may_be_refused = stays and bool(names)
-    may_be_engines = stays and not names and not all_found and len(engines) > 1
-    may_be_files = stays and not names and len(engines) == 1
-    return {
-        "refused": ", ".join(names[:4]) if may_be_refused else None,
-        "engines": if_true(may_be_engines),
-        "files": if_true(may_be_files),
-        "between": if_true(between),
-        "soft": if_true(between and DEFAULT in engines and by_contact),
-        "both": if_true(len(engines) > 1 and len(files) > 1),
-    }
+    if names:
+        slots["refused"] = ", ".join(names[:4])
+    elif len(engines) == 1:
+        slots["files"] = if_true(True)
+    elif not _is_found(result):
+        slots["engines"] = if_true(True)
+    return slots
+
+
+def _what_is_between(result: Explanation, engines: set[str]) -> Slots:
+    """Return what is said of a gap between engines that was localised."""
+    is_between = result.verdict.divides and _is_found(result) and len(engines) > 1
+    by_contact = any(place.name == "contact" for place in result.found_in)
+    is_soft = is_between and by_contact and DEFAULT in engines
+    return {"between": if_true(is_between), "soft": if_true(is_soft)}
 
 
 def _verdict(result: Explanation) -> Slots:
@@ -96,46 +116,55 @@ def causes(result: Explanation) -> list[Block]:
     """Say how far apart the sides are, and how much of it each difference explains."""
     able = [row for row in result.shares if not row.note]
     small = without_effect(result, able)
+    slots = (
+        _how_far_apart(result)
+        | _what_has_no_part(result)
+        | _how_it_was_divided(result, able)
+        | _what_could_not_be_run(result)
+        | _chaos(result)
+    )
     return template.blocks(
         "why_causes",
-        **_how_far_apart(result),
-        **_what_is_said_without_parts(result),
         table=table(result, able, small),
         more=few([row.name for row in small], 6) or None,
         located=_located(result),
-        hardly_move=", ".join(result.still) or None,
-        **_how_it_was_divided(result, able),
-        **_what_could_not_be_run(result),
-        **_chaos(result),
+        **slots,
     )
 
 
 def _how_far_apart(result: Explanation) -> Slots:
     """Return the gap that is explained, and the gaps in other quantities."""
     gap = result.first[result.quantity]
-    others = [
-        f"{name.replace(',', '')} {quantity(other.worst, other.unit)}"
-        for name, other in result.first.items()
-        if name != result.quantity
-    ]
+    worst, rms, end = (quantity(size, gap.unit) for size in (gap.worst, gap.rms, gap.end))
     return {
         "what": _SINGULAR.get(result.quantity, result.quantity),
         "at": short_time(gap.at),
-        "worst": quantity(gap.worst, gap.unit),
-        "rms": quantity(gap.rms, gap.unit),
-        "end": quantity(gap.end, gap.unit),
+        "worst": worst,
+        "rms": rms,
+        "end": end,
         "explained": result.quantity,
-        "elsewhere": "; ".join(others) or None,
+        "elsewhere": _elsewhere(result),
         "between": if_true(result.between),
     }
 
 
-def _what_is_said_without_parts(result: Explanation) -> Slots:
-    """Return what is said where nothing differs, or where a difference is only read."""
+def _elsewhere(result: Explanation) -> str | None:
+    """Return the gaps in other quantities; None if there are none."""
+    gaps = [
+        f"{name.replace(',', '')} {quantity(gap.worst, gap.unit)}"
+        for name, gap in result.first.items()
+        if name != result.quantity
+    ]
+    return "; ".join(gaps) or None
+
+
+def _what_has_no_part(result: Explanation) -> Slots:
+    """Return what is said where nothing differs, or where a difference cannot show."""
     anything = result.shares or result.found_in or result.unread
     return {
         "same": if_true(not anything),
         "unread": few(list(result.unread), 6) or None,
+        "hardly_move": ", ".join(result.still) or None,
     }
 
 
@@ -186,48 +215,69 @@ def _feature(place: Localisation, still: str) -> Slots:
 
 
 def _how_it_was_divided(result: Explanation, able: Sequence[Share]) -> Slots:
-    """Return how the parts were computed, and how they are read."""
-    method = result.method
-    has_shares = method != "nothing"
+    """Return how the parts were computed, and how they are read.
+
+    Args:
+        result: The explanation.
+        able: The causes that can be equalized.
+    """
+    slots: Slots = {
+        "add_up": None,
+        "all_sets": if_true(result.method == "all sets"),
+        "orders": None,
+        "beyond": if_true(any(is_beyond(row) for row in able)),
+    }
+    if result.method == "one at a time":
+        slots["add_up"] = f"{100 * ADDS_UP:g} %"
+    if result.method == "drawn orders":
+        slots["orders"] = result.orders
+    return slots | _how_parts_are_read(result, able)
+
+
+def _how_parts_are_read(result: Explanation, able: Sequence[Share]) -> Slots:
+    """Return what is said of the columns of the table.
+
+    Args:
+        result: The explanation.
+        able: The causes that can be equalized.
+    """
+    if result.method == "nothing":
+        return {"shares": None, "several": None, "no_figure": None}
     lacks_figures = any(row.alone is None or row.last is None for row in able)
     return {
-        "add_up": f"{100 * ADDS_UP:g} %" if method == "one at a time" else None,
-        "all_sets": if_true(method == "all sets"),
-        "orders": result.orders if method == "drawn orders" else None,
-        "shares": if_true(has_shares),
-        "several": if_true(has_shares and len(able) > 1),
-        "no_figure": if_true(has_shares and lacks_figures),
-        "beyond": if_true(any(is_beyond(row) for row in able)),
+        "shares": if_true(True),
+        "several": if_true(len(able) > 1),
+        "no_figure": if_true(lacks_figures),
     }
 
 
 def _what_could_not_be_run(result: Explanation) -> Slots:
     """Return what cannot be equalized, and which sets of causes could not be run."""
     rows = refused(result)
+    such_as = result.impossible[0] if result.impossible else ()
     return {
         "refused_too": if_true(rows),
         "refused": Items([f"{capital(row.name)}: {row.note}." for row in rows]),
         "impossible": len(result.impossible) or None,
-        "such_as": ", ".join(next(iter(result.impossible), ())),
+        "such_as": ", ".join(such_as),
     }
 
 
 def _chaos(result: Explanation) -> Slots:
     """Return what rounding and chaos make of the gap."""
+    slots: Slots = {"draws": result.draws, "clear": f"{CLEAR:g}"}
+    slots |= dict.fromkeys(("negligible", "chaos", "noise", "noise_part", "quiet"))
     floor = amount(result, result.floor)
-    is_rounding = result.gap <= result.negligible
-    divides, noisy = result.verdict.divides, is_noisy(result)
-    may_be_chance = not divides and not is_rounding
-    is_quiet = divides and not noisy and result.floor > 0
-    return {
-        "negligible": amount(result, result.negligible) if is_rounding else None,
-        "chaos": floor if may_be_chance else None,
-        "draws": result.draws,
-        "clear": f"{CLEAR:g}",
-        "noise": floor if noisy else None,
-        "noise_part": percent(result.floor / result.gap) if noisy else None,
-        "quiet": floor if is_quiet else None,
-    }
+    if result.gap <= result.negligible:
+        slots["negligible"] = amount(result, result.negligible)
+    elif not result.verdict.divides:
+        slots["chaos"] = floor
+    if is_noisy(result):
+        slots["noise"] = floor
+        slots["noise_part"] = percent(result.floor / result.gap)
+    elif result.verdict.divides and result.floor > 0:
+        slots["quiet"] = floor
+    return slots
 
 
 def steps(result: Explanation) -> list[Block]:
@@ -240,20 +290,22 @@ def steps(result: Explanation) -> list[Block]:
         if has_effect(row):
             lines += _changes(row)
     some_are_left = 0 < len(lines) < len(able)
-    stays = None
-    if lines and result.brought is not None:
-        stays = amount(result, result.brought)
-    return template.blocks(
-        "why_changes",
-        any=if_true(lines),
-        engine=_engine_as_it_comes(result) if lines else None,
-        changes=Items(lines),
-        left=stays,
-        quantity=result.quantity,
-        redundant=", ".join(result.redundant) or None,
-        others=if_true(some_are_left and len(result.first) > 1),
-        **_chosen_integrator(result),
-    )
+    slots: Slots = {
+        "any": if_true(lines),
+        "changes": Items(lines),
+        "quantity": result.quantity,
+        "redundant": ", ".join(result.redundant) or None,
+        "others": if_true(some_are_left and len(result.first) > 1),
+    }
+    slots |= _with_everything_changed(result) if lines else {"left": None, "engine": None}
+    slots |= _chosen_integrator(result)
+    return template.blocks("why_changes", **slots)
+
+
+def _with_everything_changed(result: Explanation) -> Slots:
+    """Return what of the gap stays, and the engine whose settings can be changed at once."""
+    left = None if result.brought is None else amount(result, result.brought)
+    return {"left": left, "engine": _engine_as_it_comes(result)}
 
 
 def _changes(row: Share) -> list[str]:

@@ -120,19 +120,29 @@ def _by_place(result: Explanation) -> str:
     place = max(result.found_in, key=lambda place: place.share)
     if kind == "one engine" and place.values:
         kind = "one engine, integrator"
-    left, right = NONE, NONE
-    if kind == "switched":
-        # The feature is on on one side alone, and the gap closes where both are without it.
-        left, right = values_of(next(row for row in result.shares if row.name == place.name))
+    names = [row.name for row in refused(result)]
+    left, right = _switch(result, place.name)
+    cause = f"the {place.name}" if place.values else place.name
     return ANSWERS[kind].format(
-        cause=f"the {place.name}" if place.values else place.name,
+        cause=cause,
         left=left,
         right=right,
         part=percent(place.share),
         without=place.without,
         gap=amount(result, result.gap),
-        refused=", ".join(row.name for row in refused(result)[:2]),
+        refused=", ".join(names[:2]),
     )
+
+
+def _switch(result: Explanation, name: str) -> tuple[str, str]:
+    """Return a feature's values where it is on on one side alone.
+
+    The gap closes where both sides are without it. Of other features nothing is said.
+    """
+    for row in result.shares:
+        if row.name == name:
+            return values_of(row)
+    return NONE, NONE
 
 
 def refused(result: Explanation) -> list[Share]:

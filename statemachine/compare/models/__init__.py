@@ -14,8 +14,8 @@ from __future__ import annotations
 import os
 import platform
 import warnings
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,21 +27,118 @@ from ...engines.description import urdf
 from ...engines.description.match import renamed
 from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
+from ...engines.records import ModelDifference
 from ...errors import EngineWarning, StateMachineError, UnsupportedError
 from ...installed import DEFAULT
 from ...model_files import checked_file
 from ...models import resolve
+<<<<<<< HEAD
 from ...page import Figures
 from ...release_names import engine_of, is_release
+=======
+from ...releases import engine_of, is_release
+from ..matching import Matched
+>>>>>>> wt-b1
 from .compiled import compiled, enter_rest
-from .diff import diff
-from .ledger import Ledger
+from .diff import PoseGap, diff
+from .ledger import Key, Ledger, ReadingAgreement, ReadingDifference
 
 __all__ = [
+    "ModelsComparison",
+    "ReadingSide",
     "Robot",
     "compare",
     "read",
 ]
+
+
+@dataclass(frozen=True)
+class ReadingSide:
+    """A robot as it was read.
+
+    Attributes:
+        robot: The robot, by the names of the other side.
+        mass: Of the robot in all [kg], what stands still in the world apart.
+        is_emulated: Whether the engine that read it emulates the contract in a run.
+        is_mjcf: Whether its file is no URDF.
+        unlike_its_users: What a run behind the contract has that the engine's users do not have;
+            "" if there is nothing, or no such run.
+        notes: What the reader notes, in sentences.
+    """
+
+    robot: Robot = field(metadata={"json": False})
+    mass: float = field(metadata={"json": False})
+    is_emulated: bool = field(metadata={"json": False})
+    is_mjcf: bool = field(metadata={"json": False})
+    unlike_its_users: str = field(metadata={"json": False})
+    notes: tuple[str, ...]
+
+    @property
+    def file(self) -> str:
+        """The file, with its folder."""
+        return self.robot.name
+
+    @property
+    def format(self) -> str:
+        """The format: "URDF", "MJCF", "MJB", or "engine" for what an engine made of a file."""
+        return self.robot.format
+
+    @property
+    def reader(self) -> str:
+        """What read it, with its version."""
+        return self.robot.reader
+
+    @property
+    def links(self) -> int:
+        """How many links it has."""
+        return len(self.robot.links)
+
+    @property
+    def joints(self) -> int:
+        """How many joints it has."""
+        return len(self.robot.joints)
+
+    @property
+    def shapes(self) -> int:
+        """How many shapes it touches with."""
+        return sum(len(link.shapes) for link in self.robot.links)
+
+
+@dataclass(frozen=True)
+class ModelsComparison:
+    """Every difference between two readings of a robot.
+
+    Attributes:
+        left: The left side.
+        right: The right side.
+        differences: The weightiest subjects first, and in each the weightiest difference.
+        agreements: How well the rest agrees.
+        posed: Whether the same positions give the same poses.
+        notes: What a reader should know, in sentences.
+        digits: Figures that agree to so many counted as equal.
+        versions: Of what computed it.
+        skipped: What was not compared, in sentences.
+    """
+
+    left: ReadingSide
+    right: ReadingSide
+    differences: tuple[ReadingDifference, ...]
+    agreements: tuple[ReadingAgreement, ...]
+    posed: PoseGap
+    notes: tuple[str, ...]
+    digits: int
+    versions: Mapping[str, str]
+    skipped: tuple[str, ...]
+
+    @property
+    def mass(self) -> tuple[float, float]:
+        """The mass of each robot in all [kg], what stands still in the world apart."""
+        return self.left.mass, self.right.mass
+
+    @property
+    def equal(self) -> bool:
+        """Whether everything was compared, and nothing was found that matters."""
+        return not self.skipped and not any(row.matters for row in self.differences)
 
 
 def read(
@@ -49,7 +146,7 @@ def read(
     engine: str | None = None,
     menagerie: str | os.PathLike[str] | None = None,
 ) -> Robot:
-    """A description.
+    """Read a robot as its file describes it, or as an engine has it.
 
     Args:
         model: A name or a file, as `load` takes it.
@@ -95,8 +192,8 @@ def compare(
     digits: int = 6,
     seed: int = 0,
     menagerie: str | os.PathLike[str] | None = None,
-) -> Figures:
-    """Every difference between two descriptions.
+) -> ModelsComparison:
+    """Find every difference between two readings.
 
     Args:
         left: A name or a file.
@@ -108,36 +205,22 @@ def compare(
         seed: Of the poses at which both are compared.
         menagerie: A folder to look names up in.
 
-    Returns:
-        left, right: The sides: the file with its folder; its format, URDF, MJCF, MJB
-            or the engine that it was loaded into; what read it; how many links, joints and shapes
-            it has; notes of the reader.
-        differences: The weightiest subjects first, and in each the weightiest difference.
-        agreements: How well the rest agrees.
-        posed: Whether the same positions give the same poses.
-        mass: Of each robot in all [kg], what stands still in the world apart.
-        notes: What a reader should know, in sentences.
-        digits: Figures that agree to so many counted as equal.
-        versions: Of what computed it.
-        skipped: What was not compared, in sentences.
-        equal: Whether everything was compared, and nothing was found that matters.
-
     Raises:
         UnknownNameError: No such model, engine, joint or frame.
         MissingEngineError, ModelError, ModelFileError, UnsupportedError: As `read`.
     """
-    robots = [read(m, e, menagerie) for m, e in zip((left, right), engines, strict=True)]
+    names, engine_names = (left, right), (engines[0] or DEFAULT, engines[1] or DEFAULT)
+    robots = [read(name, engine, menagerie) for name, engine in zip(names, engines, strict=True)]
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
-    formats, skipped = [robot.format for robot in robots], list[str]()
-    compilers = [engine or DEFAULT for engine in engines]
-    differences, matched = {}, None
-    if all(engine_of(name) == DEFAULT for name in compilers) and formats != ["URDF"] * 2:
+    skipped: list[str] = []
+    differences: Mapping[Key, Sequence[ModelDifference]] = {}
+    matched: Matched | None = None
+    formats = [robot.format for robot in robots]
+    by_default = all(engine_of(name) == DEFAULT for name in engine_names)
+    if by_default and formats != ["URDF", "URDF"]:
+        paths = [resolve(name, menagerie) for name in names]
         try:
-            models = [
-                load(resolve(m, menagerie), backend=name, defaults="engine")
-                for m, name in zip((left, right), compilers, strict=True)
-            ]
-            differences, matched = compiled(models, rename or {}, trees[0])
+            differences, matched = _compiled(paths, engine_names, rename or {}, trees[0])
         except StateMachineError as error:
             why = str(error).splitlines()[0]
             skipped.append(f"what only a compiled model tells was not compared: {why}")
@@ -145,50 +228,66 @@ def compare(
     posed, notes = diff(book, trees[0], trees[1], frames, seed)
     if matched:
         skipped += enter_rest(book, matched, robots, max(tree.reach for tree in trees))
+    left_mass, right_mass = (robot.mass for robot in robots)
+    left_side = _side(trees[0].robot, left_mass, engines[0], resolve(left, menagerie))
+    right_side = _side(robots[1], right_mass, engines[1], resolve(right, menagerie))
+    return ModelsComparison(
+        left=left_side,
+        right=right_side,
+        differences=book.ordered(),
+        agreements=tuple(book.agreements()),
+        posed=posed,
+        notes=tuple(dict.fromkeys(notes)),
+        digits=digits,
+        versions=_versions(robots),
+        skipped=tuple(skipped),
+    )
+
+
+def _compiled(
+    paths: Sequence[Path],
+    engines: Sequence[str],
+    names: Mapping[str, str],
+    tree: GroupTree,
+) -> tuple[Mapping[Key, Sequence[ModelDifference]], Matched]:
+    """Compile two files, and find what they differ in by their compiled models."""
+    models = [
+        load(path, backend=engine, defaults="engine")
+        for path, engine in zip(paths, engines, strict=True)
+    ]
+    return compiled(models, names, tree)
+
+
+def _versions(robots: Sequence[Robot]) -> dict[str, str]:
+    """Return the versions of what computed a comparison."""
     versions = {
         "statemachine": __version__,
         "numpy": np.__version__,
         "python": platform.python_version(),
     }
-    # A URDF was read by no engine.
-    readers = [robot.reader.partition(" ") for robot in robots if robot.format != "URDF"]
-    versions |= {engine: version for engine, _, version in readers}
-    left_side, right_side = [
-        Figures(
-            file=robot.name,
-            format=robot.format,
-            reader=robot.reader,
-            links=len(robot.links),
-            joints=len(robot.joints),
-            shapes=sum(len(link.shapes) for link in robot.links),
-            _mass=mass,
-            _driven=bool(robot.actuators),
-            _emulated=bool(engine) and room(engine_of(engine)).emulated,
-            _written=resolve(model, menagerie).suffix.lower() != ".urdf",
-            _unlike=_unlike_its_users(resolve(model, menagerie), engine),
-            notes=robot.notes,
-        )
-        for robot, mass, engine, model in zip(
-            (trees[0].robot, robots[1]),
-            (r.mass for r in robots),
-            engines,
-            (left, right),
-            strict=True,
-        )
-    ]
-    rows = book.ordered()
-    return Figures(
-        left=left_side,
-        right=right_side,
-        differences=rows,
-        agreements=tuple(book.agreements()),
-        posed=posed,
-        mass=tuple(robot.mass for robot in robots),
-        notes=tuple(dict.fromkeys(notes)),
-        digits=digits,
-        versions=versions,
-        skipped=tuple(skipped),
-        equal=not skipped and not any(row.matters for row in rows),
+    for robot in robots:
+        if robot.format != "URDF":  # which was read by no engine
+            engine, _, version = robot.reader.partition(" ")
+            versions[engine] = version
+    return versions
+
+
+def _side(robot: Robot, mass: float, engine: str | None, path: Path) -> ReadingSide:
+    """Return a robot as it was read.
+
+    Args:
+        robot: The robot, by the names of the other side.
+        mass: Of the robot in all [kg].
+        engine: That it was asked of; None for the file itself.
+        path: The file.
+    """
+    return ReadingSide(
+        robot,
+        mass,
+        is_emulated=engine is not None and room(engine_of(engine)).emulated,
+        is_mjcf=path.suffix.lower() != ".urdf",
+        unlike_its_users=_unlike_its_users(path, engine),
+        notes=robot.notes,
     )
 
 

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...engines.description.match import Matching, Pair
-from ...engines.description.records import CollisionShape, RobotJoint
+from ...engines.description.records import CollisionShape, Inertial, RobotJoint
 from ...engines.description.shapes import angle_between, bounds_of, laid_on, likest
 from ...engines.description.tree import GRAVITY, GroupTree
 from ...interface import Array
 from ...measures.text import few, rounded
-from ...rotations import HERE
-from .ledger import Key, Ledger, plain
+from ...rotations import HERE, Placement
+from .ledger import Figure, Key, Ledger, Value, plain
 
 _SIDES = ("-x", "-y", "-z", "+x", "+y", "+z")
 _STILL = "stands still"
@@ -27,7 +26,9 @@ _CONTACT = {
     "priority": "priority",
     "margin": "margin",
     "gap": "margin",
-    **dict.fromkeys(("solref", "solimp", "solmix"), "softness"),
+    "solref": "softness",
+    "solimp": "softness",
+    "solmix": "softness",
 }
 
 
@@ -39,51 +40,117 @@ def of_joints(
     tree: GroupTree,
     reach: float,
 ) -> None:
-    """Where a hinge or a slide is and how it is turned, at zero, in the parent's frame."""
-    a, b = joints
-    where, body = a.name, pair.left.name
-    place: list[Key] = [("body", body, "place"), ("body", body, "zero")]
+    """Enter where a hinge or a slide is and how it is turned, at zero, in the parent's frame."""
     # The first one's frame as the second one would have it, in the second one's own.
     off = pair.right.place.inverse @ above.align @ pair.left.place @ pair.align.inverse
-    anchor, axis, hinge = b.anchor, b.axis, a.kind == "hinge"
-    shift, turn = off.of(anchor) - anchor, off.angle(HERE)
-    far = max(float(np.linalg.norm(off.of(tip) - tip)) for tip in _tips(tree, pair))
-    effect = f"moves what it carries by up to {rounded(far, 'm')}" if far else ""
-    moves = partial(book.measure, share=max(far / reach, turn / math.pi), effect=effect, keys=place)
+    _of_joint_frame(book, pair, joints, above, _FrameShift(off, _tips(tree, pair), reach))
+    _of_axis(book, pair, joints, reach)
+
+
+@dataclass(frozen=True, eq=False)
+class _FrameShift:
+    """How far the frame of a joint is off.
+
+    Attributes:
+        off: The first one's frame, in the second one's own.
+        tips: (3,) points that the joint carries at zero [m], in the second one's frame.
+        reach: How far the robot reaches [m], which distances are set against.
+    """
+
+    off: Placement
+    tips: Sequence[Array]
+    reach: float
+
+    @property
+    def turn(self) -> float:
+        """By how much it is turned [rad]."""
+        return self.off.angle(HERE)
+
+    @property
+    def share(self) -> float:
+        """How much it matters, from 0 to 1."""
+        return max(self._far / self.reach, self.turn / math.pi)
+
+    @property
+    def effect(self) -> str:
+        """What it does."""
+        far = self._far
+        return f"moves what it carries by up to {rounded(far, 'm')}" if far else ""
+
+    @property
+    def _far(self) -> float:
+        """How far the farthest of the points is moved by it [m]."""
+        return max(float(np.linalg.norm(self.off.of(tip) - tip)) for tip in self.tips)
+
+
+def _of_joint_frame(
+    book: Ledger,
+    pair: Pair,
+    joints: tuple[RobotJoint, RobotJoint],
+    above: Pair,
+    frame: _FrameShift,
+) -> None:
+    """Enter where the frame of a joint is, and how it is turned."""
+    a, b = joints
+    where, off, reach = a.name, frame.off, frame.reach
+    is_hinge = a.kind == "hinge"
+    shift, turn = off.of(b.anchor) - b.anchor, frame.turn
     # Turned about its axis, or moved along it, it only has its zero elsewhere.
-    aside = off.mat @ axis - axis if hinge else shift - (shift @ axis) * axis
-    sine = off.mat[[2, 0, 1], [1, 2, 0]] - off.mat[[1, 2, 0], [2, 0, 1]]
-    zero = math.copysign(turn, float(sine @ axis)) if hinge else float(shift @ axis)
-    small = book.tolerance * (2 * math.pi if hinge else reach)
+    along = float(shift @ b.axis)
+    aside = off.mat @ b.axis - b.axis if is_hinge else shift - along * b.axis
+    zero = _signed_turn(off, b.axis, turn) if is_hinge else along
+    small = book.tolerance * (2 * math.pi if is_hinge else reach)
+    keys = [("body", pair.left.name, "place"), ("body", pair.left.name, "zero")]
+    effect, share = frame.effect, frame.share
     if abs(zero) > small and float(np.linalg.norm(aside)) <= small:
-        unit = "rad" if hinge else "m"
-        moves("places", where, "zero position", abs(zero), unit, 0.0, (0.0, zero))
-        shift, turn = (shift, 0.0) if hinge else (aside, turn)
-    values = [plain(p.pos) for p in (above.align @ pair.left.place, pair.right.place)]
+        unit = "rad" if is_hinge else "m"
+        figure = Figure("places", where, "zero position", unit, effect, keys=keys)
+        book.measure(figure, abs(zero), 0.0, (0.0, zero), share=share)
+        if is_hinge:
+            turn = 0.0
+        else:
+            shift = aside
+    values = plain((above.align @ pair.left.place).pos), plain(pair.right.place.pos)
+    origin = Figure("places", where, "origin", "m", effect, keys=keys)
     size = float(np.linalg.norm(shift))
-    moves("places", where, "origin", size, "m", reach, values, slack=2)
-    moves("places", where, "frame turned", turn, "rad", math.pi, slack=4)
-    # The axis itself, in the frame of the second one's link.
-    mine = pair.align.mat @ a.axis
+    book.measure(origin, size, reach, values, slack=2, share=share)
+    turned = Figure("places", where, "frame turned", "rad", effect, keys=keys)
+    book.measure(turned, turn, math.pi, slack=4, share=share)
+
+
+def _signed_turn(off: Placement, axis: Array, turn: float) -> float:
+    """Return by how much a frame is turned about an axis, with its sign.
+
+    Args:
+        off: The turned frame.
+        axis: (3,) unit vector.
+        turn: The angle of the frame [rad], not negative.
+    """
+    sine = off.mat[[2, 0, 1], [1, 2, 0]] - off.mat[[1, 2, 0], [2, 0, 1]]
+    return math.copysign(turn, float(sine @ axis))
+
+
+def _of_axis(book: Ledger, pair: Pair, joints: tuple[RobotJoint, RobotJoint], reach: float) -> None:
+    """Enter how an axis is turned, in the frame of the second one's link, and how far beside."""
+    a, b = joints
+    mine, axis = pair.align.mat @ a.axis, b.axis
     tilt = math.atan2(float(np.linalg.norm(np.cross(mine, axis))), float(mine @ axis))
-    book.measure(
-        *("places", where, "axis", tilt, "rad", math.pi, (plain(mine), plain(axis))),
-        slack=4,
-        share=tilt / math.pi,
-        effect="turns the other way" if abs(tilt - math.pi) < 1e-3 else "",
-        keys=[("joint", where, "axis")],
-    )
-    beside = float(np.linalg.norm(np.cross(axis, pair.align.of(a.anchor) - anchor)))
-    if hinge and beside > 2 * book.tolerance * reach:
-        book.differ(
-            *("places", where, "axis beside", (0.0, beside), "m", beside),
-            share=beside / reach,
-            keys=[("joint", where, "anchor")],
-        )
+    effect = "turns the other way" if abs(tilt - math.pi) < 1e-3 else ""
+    figure = Figure("places", a.name, "axis", "rad", effect, keys=[("joint", a.name, "axis")])
+    values = plain(mine), plain(axis)
+    book.measure(figure, tilt, math.pi, values, slack=4, share=tilt / math.pi)
+    beside = float(np.linalg.norm(np.cross(axis, pair.align.of(a.anchor) - b.anchor)))
+    if a.kind == "hinge" and beside > 2 * book.tolerance * reach:
+        keys = [("joint", a.name, "anchor")]
+        figure = Figure("places", a.name, "axis beside", "m", keys=keys)
+        book.differ(figure, (0.0, beside), beside, share=beside / reach)
 
 
 def _tips(tree: GroupTree, pair: Pair) -> list[Array]:
-    """Points that a pair carries at zero, in the second one's frame: its frames and masses."""
+    """Return points that a pair carries at zero, in the second one's frame.
+
+    They are the origins of its frames, and its centres of mass.
+    """
     world = tree.poses()
     home = pair.align @ world[pair.left.number].inverse
     beyond = {pair.left.number}
@@ -106,37 +173,27 @@ def of_frames(
     named: Mapping[str, str],
     reach: float,
 ) -> Iterator[str]:
-    """Frames that are fixed to a link, in the frame of the second one's part; and what to note."""
+    """Enter frames that are fixed to a link, in the frame of the second one's part.
+
+    Yields:
+        What to note of them.
+    """
     tops = {pair.left.name: pair.right.name for pair in matching.pairs}
     worlds = [tree.robot.links[0].name if tree.robot.rooted else "" for tree in (left, right)]
     for name, other in named.items():
-        (at, place), (there, their) = left.frames[name], right.frames[other]
         if tops.get(name) == other or name == worlds[0] or other == worlds[1]:
             continue  # compared as the frame of its joint
+        at, place = left.frames[name]
+        there, their_place = right.frames[other]
         pair = matching.of(at)
         label = name if name == other else f"{name}, {other}"
         site = name.removesuffix(" (site)")
-        if pair is None or pair.right.number != there:
-            if pair is not None or there in {p.right.number for p in matching.pairs}:
-                on = left.groups[at].name, right.groups[there].name
-                keys = [("site", site, "owner")]
-                book.differ("tool frame", label, "is fixed to", on, keys=keys)
-            continue
-        ours = pair.align @ place
-        far, turn = ours.distance(their), ours.angle(their)
-        values, keys = (plain(ours.pos), plain(their.pos)), [("site", site, "place")]
-        book.measure(
-            *("tool frame", label, "origin", far, "m", reach, values),
-            slack=2,
-            share=far / reach,
-            keys=keys,
-        )
-        book.measure(
-            *("tool frame", label, "axes", turn, "rad", math.pi),
-            slack=4,
-            share=turn / math.pi,
-            keys=keys,
-        )
+        if pair is not None and pair.right.number == there:
+            _of_frame(book, label, site, (pair.align @ place, their_place), reach)
+        elif pair is not None or there in {p.right.number for p in matching.pairs}:
+            owners = left.groups[at].name, right.groups[there].name
+            figure = Figure("tool frame", label, "is fixed to", keys=[("site", site, "owner")])
+            book.differ(figure, owners)
     paired = {group.name for pair in matching.pairs for group in (pair.left, pair.right)}
     for tree, known, which in ((left, {*named}, "left"), (right, {*named.values()}, "right")):
         alone = [name for name in tree.frames if name not in known | paired | {"world"}]
@@ -144,136 +201,219 @@ def of_frames(
             yield f"only the {which} has the frames {few(alone, 8)} (--frame LEFT=RIGHT pairs two)"
 
 
+def _of_frame(
+    book: Ledger, label: str, site: str, places: tuple[Placement, Placement], reach: float
+) -> None:
+    """Enter where a frame is, and how it is turned.
+
+    Args:
+        book: The list.
+        label: What the frame is called there.
+        site: Name of the site that it is of the first compiled model.
+        places: Of both, in the frame of the second one's part.
+        reach: How far the robot reaches [m].
+    """
+    ours, theirs = places
+    far, turn = ours.distance(theirs), ours.angle(theirs)
+    keys = [("site", site, "place")]
+    origin = Figure("tool frame", label, "origin", "m", keys=keys)
+    values = plain(ours.pos), plain(theirs.pos)
+    book.measure(origin, far, reach, values, slack=2, share=far / reach)
+    axes = Figure("tool frame", label, "axes", "rad", keys=keys)
+    book.measure(axes, turn, math.pi, slack=4, share=turn / math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class _Masses:
+    """What the rigid parts of a pair weigh, in the frame of the second one.
+
+    Attributes:
+        name: Of the part.
+        left, right: Mass, centre of mass and inertia of each.
+        joint: The joint that carries the second; None where it is fixed.
+        inertia: M_ii of that joint [kg m² or kg]; 0 where it is unknown.
+        load: Largest torque or force [N·m or N] of what the joint carries; 0 where it is unknown.
+        matters: Whether the part can move: what is fixed to the world moves nothing by its mass.
+    """
+
+    name: str
+    left: Inertial
+    right: Inertial
+    joint: RobotJoint | None
+    inertia: float
+    load: float
+    matters: bool
+
+    @property
+    def heavier(self) -> float:
+        """The larger of the two masses [kg]."""
+        return max(self.left.mass, self.right.mass)
+
+    @property
+    def is_on_hinge(self) -> bool:
+        """Whether a hinge carries it."""
+        return self.joint is not None and self.joint.kind == "hinge"
+
+
 def of_masses(
     book: Ledger, pair: Pair, left: GroupTree, right: GroupTree, reach: float
 ) -> Iterator[str]:
-    """Mass, centre of mass and inertia, each as the rigid part's composite; and what to note.
+    """Enter mass, centre of mass and inertia, each as the rigid part's composite.
 
     The share of an inertia is that of M_ii, about the axis of the joint that carries it.
+
+    Yields:
+        What to note of them.
     """
-    mine, theirs = pair.left.inertial.seen_from(pair.align), pair.right.inertial
-    # A part that is fixed to the world moves nothing by its mass.
-    still = [
-        tree.robot.rooted and group.parent < 0
-        for tree, group in ((left, pair.left), (right, pair.right))
-    ]
-    heavy = max(mine.mass, theirs.mass)
-    if (not mine.mass and still[0]) or (not theirs.mass and still[1]):
-        if heavy:
-            silent = "right" if mine.mass else "left"
-            yield f"the {silent} gives its base no mass, the other {heavy:.4g} kg; it stands still"
-        return
-    where, joint, matters = pair.left.name, pair.right.joint, not all(still)
-    hinge = joint is not None and joint.kind == "hinge"
-    felt = zip(left.felt(pair.left.number), right.felt(pair.right.number), strict=True)
-    inertia, load = (max((v for v in values if v > 0), default=0.0) for values in felt)
-    book.enter(
-        *("mass", where, "", (mine.mass, theirs.mass), "kg"),
-        slack=2,
-        matters=matters,
-        effect="{share:.1%} of the larger" if matters else _STILL,
-        keys=[("body", where, "mass")],
+    left_is_fixed = left.robot.rooted and pair.left.parent < 0
+    right_is_fixed = right.robot.rooted and pair.right.parent < 0
+    left_inertia, left_load = left.felt(pair.left.number)
+    right_inertia, right_load = right.felt(pair.right.number)
+    seen_from_right = pair.left.inertial.seen_from(pair.align)
+    masses = _Masses(
+        name=pair.left.name,
+        left=seen_from_right,
+        right=pair.right.inertial,
+        joint=pair.right.joint,
+        inertia=_larger(left_inertia, right_inertia),
+        load=_larger(left_load, right_load),
+        matters=not (left_is_fixed and right_is_fixed),
     )
-    if not heavy and not mine.tensor.any() and not theirs.tensor.any():
+    heavier = masses.heavier
+    left_says_nothing = not masses.left.mass and left_is_fixed
+    right_says_nothing = not masses.right.mass and right_is_fixed
+    if left_says_nothing or right_says_nothing:
+        if heavier:
+            silent = "right" if masses.left.mass else "left"
+            yield (
+                f"the {silent} gives its base no mass, the other {heavier:.4g} kg; it stands still"
+            )
         return
-    apart = float(np.linalg.norm(mine.com - theirs.com))
-    weight = heavy * GRAVITY * apart
-    book.measure(
-        *("centre of mass", where, "", apart, "m", reach, (plain(mine.com), plain(theirs.com))),
-        slack=4,
-        share=weight / max(load, weight) if load and hinge and weight else apart / reach,
-        effect=f"up to {weight:.2g} N·m" if hinge else "" if matters else _STILL,
-        matters=matters,
-        keys=[("body", where, "centre of mass")],
-    )
-    off = mine.tensor - theirs.tensor
+    effect = "{share:.1%} of the larger" if masses.matters else _STILL
+    keys = [("body", masses.name, "mass")]
+    figure = Figure("mass", masses.name, "", "kg", effect, masses.matters, keys)
+    book.enter(figure, (masses.left.mass, masses.right.mass), slack=2)
+    if heavier or masses.left.tensor.any() or masses.right.tensor.any():
+        _of_centres(book, masses, reach)
+        _of_inertias(book, masses)
+
+
+def _larger(left: float, right: float) -> float:
+    """Return the larger of two sizes, of those above zero; 0 if none is."""
+    return max((size for size in (left, right) if size > 0), default=0.0)
+
+
+def _of_centres(book: Ledger, masses: _Masses, reach: float) -> None:
+    """Enter the centres of mass."""
+    ours, theirs = masses.left.com, masses.right.com
+    apart = float(np.linalg.norm(ours - theirs))
+    weight = masses.heavier * GRAVITY * apart
+    share, effect = apart / reach, ""
+    if masses.is_on_hinge:
+        effect = f"up to {weight:.2g} N·m"
+        if masses.load and weight:
+            share = weight / max(masses.load, weight)
+    elif not masses.matters:
+        effect = _STILL
+    keys = [("body", masses.name, "centre of mass")]
+    figure = Figure("centre of mass", masses.name, "", "m", effect, masses.matters, keys)
+    book.measure(figure, apart, reach, (plain(ours), plain(theirs)), slack=4, share=share)
+
+
+def _of_inertias(book: Ledger, masses: _Masses) -> None:
+    """Enter the principal moments; where these are the same, how far the axes are turned."""
+    off = masses.left.tensor - masses.right.tensor
     size = float(np.abs(np.linalg.eigvalsh(off)).max())
-    moments = [np.linalg.eigvalsh(body.tensor)[::-1] for body in (mine, theirs)]
-    most = max(float(moments[0][0]), float(moments[1][0]))
-    effect, share = "" if matters else _STILL, size / most if most else 1.0
-    if joint is not None and hinge and inertia:
-        effect, share = "{share:.2%} of M_ii", abs(float(joint.axis @ off @ joint.axis)) / inertia
-    turned = np.allclose(*moments, rtol=16 * book.tolerance, atol=0)
-    book.measure(
-        *("inertia", where, "axes" if turned else "moments", size, "kg m²", most),
-        (None, None) if turned else (plain(moments[0]), plain(moments[1])),
-        slack=8,
-        share=share,
-        effect=effect,
-        matters=matters,
-        keys=[("body", where, "inertia")],
-    )
+    ours = np.linalg.eigvalsh(masses.left.tensor)[::-1]
+    theirs = np.linalg.eigvalsh(masses.right.tensor)[::-1]
+    most = max(float(ours[0]), float(theirs[0]))
+    effect, share = "" if masses.matters else _STILL, size / most if most else 1.0
+    joint = masses.joint
+    if joint is not None and joint.kind == "hinge" and masses.inertia:
+        effect = "{share:.2%} of M_ii"
+        share = abs(float(joint.axis @ off @ joint.axis)) / masses.inertia
+    is_turned = np.allclose(ours, theirs, rtol=16 * book.tolerance, atol=0)
+    name = "axes" if is_turned else "moments"
+    values = (None, None) if is_turned else (plain(ours), plain(theirs))
+    keys = [("body", masses.name, "inertia")]
+    figure = Figure("inertia", masses.name, name, "kg m²", effect, masses.matters, keys)
+    book.measure(figure, size, most, values, slack=8, share=share)
 
 
 def of_shapes(book: Ledger, pair: Pair, left: GroupTree, right: GroupTree, reach: float) -> None:
-    """Shape by shape. Their share is that of how far they stand out, against the robot's reach."""
+    """Enter what touches, shape by shape.
+
+    The share of a figure is that of how far the shapes stand out, against the robot's reach.
+    """
     ours = [replace(s, place=pair.align @ s.place) for s in pair.left.shapes]
     theirs = list(pair.right.shapes)
+    usual = left.robot.touch or right.robot.touch
     for shape, other in _paired(ours, theirs):
-        known = shape or other
-        assert known is not None
-        label = f"{pair.left.name}: {known.name or (other or known).name or known.kind}"
-        if shape is None or other is None:
-            book.differ(
-                *("shapes", label, "shape"),
-                [side.kind if side else "nothing" for side in (shape, other)],
-                share=0.5 if ours and theirs else 1.0,
-                keys=[("geom", known.label, "extra shape")],
-            )
+        if shape is not None and other is not None:
+            label = f"{pair.left.name}: {shape.name or other.name or shape.kind}"
+            _of_shape(book, label, shape, other, reach)
+            _of_contact(book, label, shape, other, usual)
             continue
-        _solids(book, label, shape, other, reach)
-        usual = left.robot.touch or right.robot.touch
-        for name, called in _CONTACT.items():
-            values = shape.contact.get(name), other.contact.get(name)
-            if None not in values or usual.get(name, ()) not in values:
-                book.enter("contact", label, name, values, keys=[("geom", shape.label, called)])
+        alone = shape or other
+        assert alone is not None
+        label = f"{pair.left.name}: {alone.name or alone.kind}"
+        kinds = [side.kind if side else "nothing" for side in (shape, other)]
+        keys = [("geom", alone.label, "extra shape")]
+        share = 0.5 if ours and theirs else 1.0
+        book.differ(Figure("shapes", label, "shape", keys=keys), kinds, share=share)
 
 
-def _solids(
+def _of_contact(
+    book: Ledger,
+    label: str,
+    shape: CollisionShape,
+    other: CollisionShape,
+    usual: Mapping[str, tuple[float, ...]],
+) -> None:
+    """Enter how a shape touches, where that is said by both or is not what is usual."""
+    for name, called in _CONTACT.items():
+        values = shape.contact.get(name), other.contact.get(name)
+        if None not in values or usual.get(name, ()) not in values:
+            book.enter(Figure("contact", label, name, keys=[("geom", shape.label, called)]), values)
+
+
+def _of_shape(
     book: Ledger, label: str, shape: CollisionShape, other: CollisionShape, reach: float
 ) -> None:
-    """What a shape is, how large, and where."""
-    keys: list[Key] = [("geom", shape.label, word) for word in ("shape", "hull", "place")]
-    same = keys[:2]
-    book.enter("shapes", label, "type", (shape.kind, other.kind), share=0.5, keys=same)
+    """Enter what a shape is, how large, and where."""
+    same: list[Key] = [("geom", shape.label, "shape"), ("geom", shape.label, "hull")]
+    keys: list[Key] = [*same, ("geom", shape.label, "place")]
+    book.enter(Figure("shapes", label, "type", keys=same), (shape.kind, other.kind), share=0.5)
     if shape.kind != other.kind:
         return
     if shape.size and other.size:
-        book.enter(
-            *("shapes", label, "size", (shape.size, other.size), "m"),
-            slack=2,
-            against=reach,
-            keys=same,
-        )
-    bounds = bounds_of(shape), bounds_of(other)
-    if len(bounds[0]) == len(bounds[1]) == 6:
-        figures = {"middle": [plain((ends[:3] + ends[3:]) / 2) for ends in bounds]}
+        figure = Figure("shapes", label, "size", "m", keys=same)
+        book.enter(figure, (shape.size, other.size), slack=2, against=reach)
+    bounds, other_bounds = bounds_of(shape), bounds_of(other)
+    if len(bounds) == len(other_bounds) == 6:
+        middle, other_middle = (plain((ends[:3] + ends[3:]) / 2) for ends in (bounds, other_bounds))
+        figures: dict[str, Sequence[Value]] = {"middle": (middle, other_middle)}
         if shape.kind == "mesh":
-            ends = zip(plain(bounds[0]), plain(bounds[1]), strict=True)
-            figures |= {f"ends at {side}": list(x) for side, x in zip(_SIDES, ends, strict=True)}
-            book.enter(
-                *("shapes", label, "volume", (shape.volume, other.volume), "m³"),
-                slack=16,
-                keys=same,
-            )
-        for figure, values in figures.items():
-            book.enter(
-                *("shapes", label, figure, values, "m"),
-                scale=reach,
-                slack=4,
-                against=reach,
-                keys=keys,
-            )
+            figure = Figure("shapes", label, "volume", "m³", keys=same)
+            book.enter(figure, (shape.volume, other.volume), slack=16)
+            ends = zip(_SIDES, plain(bounds), plain(other_bounds), strict=True)
+            figures |= {f"ends at {side}": (end, other_end) for side, end, other_end in ends}
+        for name, values in figures.items():
+            figure = Figure("shapes", label, name, "m", keys=keys)
+            book.enter(figure, values, scale=reach, slack=4, against=reach)
     # The ends of a mesh tell how it is turned.
     turn = 0.0 if shape.kind == "mesh" else angle_between(shape, other)
-    share = turn / math.pi / 10
-    book.measure("shapes", label, "turned", turn, "rad", math.pi, slack=8, share=share, keys=keys)
+    figure = Figure("shapes", label, "turned", "rad", keys=keys)
+    book.measure(figure, turn, math.pi, slack=8, share=turn / math.pi / 10)
 
 
 def _paired(
     ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]
 ) -> list[tuple[CollisionShape | None, CollisionShape | None]]:
-    """Each shape with that of its name, the rest by kind and place; in the axes of the first."""
+    """Pair each shape with that of its name, the rest by kind and place.
+
+    The second ones are in the axes of the first.
+    """
     pairs = likest(ours, theirs)
     rest = [other for i, other in enumerate(theirs) if i not in pairs.values()]
     paired = [

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...engines.records import ModelDifference
 from ...measures.text import grouped
-from ...page import Figures
 
 Value = float | str | tuple[float, ...] | None
 Key = tuple[str, str, str]
@@ -44,234 +44,343 @@ _ORDER = tuple(SUBJECTS)
 
 
 def plain(vector: Iterable[float]) -> tuple[float, ...]:
-    """A vector as a value of a difference."""
-    return tuple(map(float, vector))
+    """Return a vector as a value of a difference."""
+    return tuple(float(entry) for entry in vector)
 
 
 def digits_of(relative: float) -> int:
-    """To how many decimal digits two numbers agree that are apart by this share."""
+    """Return to how many decimal digits two numbers agree that are apart by this share."""
     if relative <= 0:
         return 17
     return max(0, min(17, math.floor(1 - math.log10(2 * relative))))
 
 
+@dataclass(frozen=True)
+class Figure:
+    """A figure that two readings have, of an element of the robot.
+
+    Attributes:
+        subject: A key of `SUBJECTS`.
+        where: The joint, link or frame.
+        name: What of it.
+        unit: SI unit; "" of a number without one, or of words.
+        effect: What a difference does, as far as that was computed; "{share}" in it is its share.
+        matters: Whether a difference makes the two readings differ; else it is said for the record.
+        keys: What the compiled models call it.
+    """
+
+    subject: str
+    where: str
+    name: str
+    unit: str = ""
+    effect: str = ""
+    matters: bool = True
+    keys: Sequence[Key] = ()
+
+
+@dataclass(frozen=True)
+class ReadingDifference:
+    """A figure that is not the same in two readings.
+
+    Attributes:
+        subject: A key of `SUBJECTS`.
+        where: The joint, link or frame.
+        figure: What of it.
+        left, right: Its values in SI units; None where a file does not say.
+        unit: Theirs.
+        size: How far they are apart, in `unit`; None where that is not a number.
+        share: How much it matters, from 0 to 1; of what, each comparing function says.
+        effect: What it does, as far as that was computed.
+        matters: Whether it makes the two readings differ; else it is said for the record.
+        causes: The differences of the compiled models that it is a figure of, as `why.explain`
+            names them; none where only a reading tells of it.
+        refused: Why the right cannot be brought to the left in it; "" where it can, or where only a
+            reading tells of it.
+    """
+
+    subject: str
+    where: str
+    figure: str
+    left: Value
+    right: Value
+    unit: str
+    size: float | None
+    share: float
+    effect: str
+    matters: bool
+    causes: tuple[str, ...]
+    refused: str
+
+
+@dataclass(frozen=True)
+class ReadingAgreement:
+    """Figures of a subject that are the same in two readings, within rounding.
+
+    Attributes:
+        subject: A key of `SUBJECTS`.
+        count: How many they are.
+        worst: The largest difference, in `unit`.
+        unit: SI unit of the figures.
+        where: The joint, link or frame of the largest difference.
+        digits: To how many digits they agree; 17 is every bit of a float64.
+    """
+
+    subject: str
+    count: int
+    worst: float
+    unit: str
+    where: str
+    digits: int
+
+
+@dataclass(frozen=True)
+class _Equal:
+    """A figure that is the same within rounding.
+
+    Attributes:
+        relative: How far its values are apart, as a part of what they are set against.
+        size: How far, in their unit.
+        where: The joint, link or frame.
+    """
+
+    relative: float
+    size: float
+    where: str
+
+
+@dataclass(frozen=True)
+class _Distance:
+    """How far two values are apart.
+
+    Attributes:
+        size: In their unit; infinite where that is not a number.
+        scale: What it is set against to be rounding.
+        share: How much it matters, from 0 to 1.
+    """
+
+    size: float
+    scale: float = 0.0
+    share: float = 1.0
+
+
 class Ledger:
     """Takes pairs of figures and sorts them into what differs and what agrees.
 
-    Args:
-        digits: Figures that agree to so many are rounded, not different.
-        compiled: What the compiled models differ in, by key.
-        complete: Whether these are all that can differ. A figure with a key that is not among them
-            then only sums up others, and is left out.
-
     Attributes:
         tolerance: The relative difference up to which two figures are rounded.
+        differences: What differs, in the order in which it was entered.
         entered: Keys of what was entered as a difference.
+        compiled: What the compiled models differ in, by key.
+        complete: Whether these are all that can differ.
     """
 
     def __init__(
         self, digits: int, compiled: Mapping[Key, Sequence[ModelDifference]], complete: bool
     ) -> None:
+        """Begin an empty list.
+
+        Args:
+            digits: Figures that agree to so many are rounded, not different.
+            compiled: What the compiled models differ in, by key.
+            complete: Whether these are all that can differ. A figure with a key that is not among
+                them then only sums up others, and is left out.
+        """
         self.tolerance = 0.5 * 10.0 ** (1 - digits)
-        self.differences: list[Figures] = []
+        self.differences: list[ReadingDifference] = []
         self.entered = set[Key]()
         self.compiled, self.complete = compiled, complete
-        self._equal: dict[tuple[str, str], list[tuple[float, float, str]]] = {}
+        self._equal: dict[tuple[str, str], list[_Equal]] = {}
 
     def differ(
         self,
-        subject: str,
-        where: str,
-        figure: str,
+        figure: Figure,
         values: Sequence[Value],
-        unit: str = "",
         size: float | None = None,
         *,
         share: float = 1.0,
-        effect: str = "",
-        matters: bool = True,
-        keys: Sequence[Key] = (),
     ) -> None:
         """Enter a figure that is not the same.
 
         Args:
-            subject: A key of `SUBJECTS`.
-            where: The joint, link or frame.
-            figure: What of it.
-            values: `left` and `right` of the difference, SI units; None where a file does not say.
-            unit: Theirs.
-            size: How far they are apart, in `unit`; None where that is not a number.
+            figure: What it is.
+            values: Of the left and of the right; None where a file does not say.
+            size: How far they are apart, in the unit of the figure; None where that is not a
+                number.
             share: How much it matters, from 0 to 1; of what, each comparing function says.
-            effect: What it does, as far as that was computed; "{share}" in it is its share.
-            matters: Whether it makes the two readings differ; else it is said for the record.
-            keys: Of these the difference has `causes`: the differences of the compiled models
-                that it is a figure of, as `why.explain` names them, none where only a reading tells
-                of it; and `refused`: why the right cannot be brought to the left in it, "" where
-                it can, or where only a reading tells of it.
         """
-        share = float(matters) * (1.0 if math.isnan(share) else min(max(share, 0.0), 1.0))
-        left, right = ["unlimited" if v in (math.inf, -math.inf) else v for v in values]
-        size = None if size is None or not math.isfinite(size) else size
-        known = [difference for key in keys for difference in self.compiled.get(key, ())]
-        if self.complete and keys and not known and keys[0][0] != "site":  # a link is a frame too
+        known = [row for key in figure.keys for row in self.compiled.get(key, ())]
+        is_of_compiled = bool(figure.keys) and figure.keys[0][0] != "site"  # a link is a frame too
+        if self.complete and is_of_compiled and not known:
             return
-        self.entered.update(keys)
-        self.differences.append(
-            Figures(
-                subject=subject,
-                where=where,
-                figure=figure,
-                left=left,
-                right=right,
-                unit=unit,
-                size=size,
-                share=share,
-                effect=effect.format(share=share),
-                matters=matters,
-                causes=tuple(dict.fromkeys(difference.title for difference in known)),
-                refused=next((row.refused for row in known if row.refused), ""),
-            )
+        self.entered.update(figure.keys)
+        if size is not None and not math.isfinite(size):
+            size = None
+        share = _share(figure, share)
+        left, right = (_without_infinity(value) for value in values)
+        effect = figure.effect.format(share=share)
+        causes = tuple(dict.fromkeys(row.title for row in known))
+        refused = next((row.refused for row in known if row.refused), "")
+        difference = ReadingDifference(
+            subject=figure.subject,
+            where=figure.where,
+            figure=figure.name,
+            left=left,
+            right=right,
+            unit=figure.unit,
+            size=size,
+            share=share,
+            effect=effect,
+            matters=figure.matters,
+            causes=causes,
+            refused=refused,
         )
+        self.differences.append(difference)
 
     def measure(
         self,
-        subject: str,
-        where: str,
-        figure: str,
+        figure: Figure,
         size: float,
-        unit: str,
         scale: float,
         values: Sequence[Value] = (None, None),
         *,
         slack: float = 1.0,
         share: float = 1.0,
-        effect: str = "",
-        matters: bool = True,
-        keys: Sequence[Key] = (),
     ) -> None:
         """Enter how far two things are apart, as a difference or as an agreement.
 
         Args:
-            subject: A key of `SUBJECTS`.
-            where: Whose it is.
-            figure: What of it.
-            size: How far.
-            unit: Of size and values.
+            figure: What it is.
+            size: How far, in the unit of the figure.
             scale: What it is set against.
             values: The two; None, if they say nothing to a reader.
             slack: How many roundings may have come together.
             share: How much a difference matters, from 0 to 1.
-            effect: What it does.
-            matters: Whether it makes the two readings differ.
-            keys: What the compiled models call it.
         """
-        relative = size / scale if scale and math.isfinite(size) else math.inf if size else 0.0
+        relative = _relative(size, scale)
         if relative > self.tolerance * slack:
-            self.differ(
-                *(subject, where, figure, values, unit, size),
-                share=share,
-                effect=effect,
-                matters=matters,
-                keys=keys,
-            )
+            self.differ(figure, values, size, share=share)
         else:
-            self._equal.setdefault((subject, unit), []).append((relative, size, where))
+            equal = self._equal.setdefault((figure.subject, figure.unit), [])
+            equal.append(_Equal(relative, size, figure.where))
 
     def enter(
         self,
-        subject: str,
-        where: str,
-        figure: str,
+        figure: Figure,
         values: Sequence[Value],
-        unit: str = "",
         *,
         scale: float = 0.0,
         slack: float = 1.0,
         against: float = 0.0,
         share: float | None = None,
-        effect: str = "",
-        matters: bool = True,
-        keys: Sequence[Key] = (),
     ) -> None:
         """Enter a figure of both, None where one does not say.
 
         Args:
-            subject: A key of `SUBJECTS`.
-            where: Whose it is.
-            figure: What of it.
+            figure: What it is.
             values: Of both, each a number, several, or words.
-            unit: Theirs.
             scale: What a difference is set against to be rounding, if it is more than they are.
             slack: How many roundings may have come together.
             against: What its share is of; 0: of the larger one.
             share: How much a difference matters, if that is something else.
-            effect: What it does.
-            matters: Whether it makes the two readings differ.
-            keys: What the compiled models call it.
         """
         known = [value for value in values if value is not None]
-        arrays = [np.atleast_1d(np.asarray(value)) for value in known]
-        part = 1.0  # its share, unless that is given
+        if len(known) < 2 and not any(known):
+            return  # what is not said is no zero, but nothing lacks where the other has none
         if len(known) < 2:
-            if not any(known):
-                return  # what is not said is no zero, but nothing lacks where the other has none
-            size = abs(known[0]) if isinstance(known[0], float | int) else math.inf
-            part = size / against if size and against else 1.0
-            scale = 0.0
-        elif arrays[0].dtype.kind == "U" or arrays[0].shape != arrays[1].shape:
-            size, unit, scale = 0.0 if known[0] == known[1] else math.inf, "", 0.0
+            apart = _of_one(known[0], against)
+        elif _are_numbers(known[0], known[1]):
+            apart = _of_numbers(known[0], known[1], against, scale)
         else:
-            with np.errstate(invalid="ignore"):
-                apart = np.where(arrays[0] == arrays[1], 0.0, arrays[0] - arrays[1])
-            size = float(np.abs(apart).max() if apart.size == 2 else np.linalg.norm(apart))
-            most = max(float(np.linalg.norm(array)) for array in arrays)
-            usual = max(float(np.ptp(array)) for array in arrays) if apart.size == 2 else most
-            part = size / (against or usual) if 0 < most < math.inf else 1.0
-            scale = max(most, scale)
-        self.measure(
-            *(subject, where, figure, size, unit, scale, values),
-            slack=slack,
-            share=part if share is None else share,
-            effect=effect,
-            matters=matters,
-            keys=keys,
-        )
+            figure = replace(figure, unit="")
+            apart = _Distance(0.0 if known[0] == known[1] else math.inf)
+        share = apart.share if share is None else share
+        self.measure(figure, apart.size, apart.scale, values, slack=slack, share=share)
 
-    def agreements(self) -> Iterator[Figures]:
-        """Figures that are the same, within rounding, by subject and unit.
-
-        Returns:
-            subject: A key of `SUBJECTS`.
-            count: How many.
-            worst: The largest difference, in `unit`; where: whose that is.
-            digits: To how many digits they agree; 17 is every bit of a float64.
-        """
-        for (subject, unit), entries in sorted(
-            self._equal.items(), key=lambda item: _ORDER.index(item[0][0])
-        ):
-            relative = max(entry[0] for entry in entries)
-            _, size, where = max(entries, key=lambda entry: entry[1])
-            yield Figures(
+    def agreements(self) -> Iterator[ReadingAgreement]:
+        """Yield figures that are the same, within rounding, by subject and unit."""
+        entries = sorted(self._equal.items(), key=lambda item: _ORDER.index(item[0][0]))
+        for (subject, unit), equal in entries:
+            relative = max(figure.relative for figure in equal)
+            worst = max(equal, key=lambda figure: figure.size)
+            yield ReadingAgreement(
                 subject=subject,
-                count=len(entries),
-                worst=size,
+                count=len(equal),
+                worst=worst.size,
                 unit=unit,
-                where=where,
+                where=worst.where,
                 digits=digits_of(relative),
             )
 
-    def ordered(self) -> tuple[Figures, ...]:
-        """The differences, by subject; the subject with the weightiest one first."""
+    def ordered(self) -> tuple[ReadingDifference, ...]:
+        """Return the differences, by subject; the subject with the weightiest one first."""
         by_subject = grouped((row.subject, row.share + row.matters) for row in self.differences)
         weight = {subject: max(weights) for subject, weights in by_subject.items()}
-        return tuple(
-            sorted(
-                self.differences,
-                key=lambda row: (
-                    -round(weight[row.subject], 3),
-                    _ORDER.index(row.subject),
-                    not row.matters,
-                    -round(row.share, 6),
-                ),
-            )
-        )
+
+        def place(row: ReadingDifference) -> tuple[float, int, bool, float]:
+            heaviest = -round(weight[row.subject], 3)
+            return heaviest, _ORDER.index(row.subject), not row.matters, -round(row.share, 6)
+
+        return tuple(sorted(self.differences, key=place))
+
+
+def _share(figure: Figure, share: float) -> float:
+    """Return how much a difference matters, from 0 to 1; 1 where that is not a number."""
+    if not figure.matters:
+        return 0.0
+    if math.isnan(share):
+        return 1.0
+    return float(min(max(share, 0.0), 1.0))
+
+
+def _without_infinity(value: Value) -> Value:
+    return "unlimited" if value in (math.inf, -math.inf) else value
+
+
+def _relative(size: float, scale: float) -> float:
+    """Return a size as a part of what it is set against."""
+    if not size:
+        return 0.0
+    if scale and math.isfinite(size):
+        return size / scale
+    return math.inf
+
+
+def _are_numbers(left: Value, right: Value) -> bool:
+    """Tell whether two values are as many numbers."""
+    a, b = np.atleast_1d(np.asarray(left)), np.atleast_1d(np.asarray(right))
+    return a.dtype.kind != "U" and a.shape == b.shape
+
+
+def _of_one(value: Value, against: float) -> _Distance:
+    """Return the distance where one side does not say.
+
+    Args:
+        value: That of the other.
+        against: What the share is of; 0: of the value.
+    """
+    if not isinstance(value, float | int):
+        return _Distance(math.inf)
+    size = abs(value)
+    return _Distance(size, share=size / against if size and against else 1.0)
+
+
+def _of_numbers(left: Value, right: Value, against: float, scale: float) -> _Distance:
+    """Return the distance of two numbers, or of as many.
+
+    Args:
+        left: Of the left.
+        right: Of the right.
+        against: What the share is of; 0: of the larger one.
+        scale: What a difference is set against to be rounding, if it is more than they are.
+    """
+    a, b = (np.atleast_1d(np.asarray(value)) for value in (left, right))
+    with np.errstate(invalid="ignore"):
+        apart = np.where(a == b, 0.0, a - b)
+    size = float(np.linalg.norm(apart))
+    most = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
+    usual = most
+    if apart.size == 2:  # a range
+        size = float(np.abs(apart).max())
+        usual = max(float(np.ptp(a)), float(np.ptp(b)))
+    share = size / (against or usual) if 0 < most < math.inf else 1.0
+    return _Distance(size, max(most, scale), share)

@@ -44,7 +44,7 @@ NONE = frozenset[str]()
 
 
 @dataclass(frozen=True)
-class SideRun:
+class RunKey:
     """What makes one run.
 
     Attributes:
@@ -216,7 +216,7 @@ class Setup:
 
     def runs_of(
         self, equalized: frozenset[str], without: frozenset[str] = NONE, integrator: str = ""
-    ) -> tuple[SideRun, SideRun]:
+    ) -> tuple[RunKey, RunKey]:
         """Return the runs of both sides.
 
         Args:
@@ -225,7 +225,7 @@ class Setup:
             integrator: Another one, on the sides that have several.
         """
         left, right = (
-            SideRun(
+            RunKey(
                 side,
                 self._acting(side, equalized),
                 without,
@@ -253,7 +253,7 @@ class Setup:
         """Tell whether a cause moves the numbers of ctrl that a function of the user's writes."""
         return self.scenario.own and _has_extra_actuator(cause)
 
-    def model(self, run: SideRun) -> Model:
+    def model(self, run: RunKey) -> Model:
         """Return the Model of a run.
 
         Raises:
@@ -290,7 +290,7 @@ class Setup:
             if title in equalized and self._causes[title].kind == "engine"
         )
 
-    def rerun(self, run: SideRun, model: Model) -> Rerun:
+    def rerun(self, run: RunKey, model: Model) -> Rerun:
         """Return how a Model of `model` is run."""
         start = self._starts[run.side]
         qpos, qvel = start.qpos, start.qvel
@@ -344,7 +344,7 @@ class Setup:
         if not reads_in_order or model.compiled is None:
             controller = self.scenario.controller(model, self.seed)
             return self._from_start(sorted_by_number(controller, slots, self._starts[1].ctrl))
-        left = self.model(SideRun(0, self._acting(0, equalized)))
+        left = self.model(RunKey(0, self._acting(0, equalized)))
         controller = seen_in_order_of_left(
             lambda shown: self.scenario.controller(shown, self.seed),
             in_order_of_left(left, model, matched),

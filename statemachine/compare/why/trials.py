@@ -25,10 +25,10 @@ from ..matching import Matched
 from ..perturbed import Uncertainty, perturbed_run
 from .gap import Curves, FirstTouch, Measure, Ruler, first_touch
 from .request import WhyRequest
-from .setup import NONE, Setup, SideRun
+from .setup import NONE, RunKey, Setup
 
 _LOST = "its process ended before it was done, twice"
-_AS_THEY_COME = (SideRun(0), SideRun(1))
+_AS_THEY_COME = (RunKey(0), RunKey(1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Trials:
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(matched, traces[0], traces[1], request.quantity)
         self.ended, self._repeated = "", 0
-        self._trials: dict[SideRun, Trial] = {}
+        self._trials: dict[RunKey, Trial] = {}
         for run, trace in zip(_AS_THEY_COME, traces, strict=True):
             self._trials[run] = self._measured(run.side, self.setup.models[run.side], trace)
             self.ended = self.ended or trace.header.ended
@@ -116,7 +116,7 @@ class Trials:
 
     def extent(self, quantity: str, without: frozenset[str] = NONE) -> float:
         """Return how far the left moves from where it starts, with or without some features."""
-        curves = self._curves(SideRun(0, NONE, without))
+        curves = self._curves(RunKey(0, NONE, without))
         if not curves:
             return 0.0
         start = {name: curve[:1] for name, curve in curves.items()}
@@ -141,7 +141,7 @@ class Trials:
             return 1
         return forks_for(number, self._took, self._jobs)
 
-    def _curves(self, run: SideRun) -> Curves | None:
+    def _curves(self, run: RunKey) -> Curves | None:
         """Return a run; None, with a reason in `ended`, if it did not reach the end."""
         if run not in self._trials:
             self._trials[run] = self._trial(run)
@@ -151,7 +151,7 @@ class Trials:
             self.ended = trial.reason or self.ended
         return trial.curves
 
-    def _trial(self, run: SideRun) -> Trial:
+    def _trial(self, run: RunKey) -> Trial:
         """Make a run."""
         was_begun = False
         try:
@@ -182,7 +182,7 @@ class Trials:
 
         Only then a gap can have causes.
         """
-        first, again = self._trials[SideRun(0)].curves, self._trial(SideRun(0)).curves
+        first, again = self._trials[RunKey(0)].curves, self._trial(RunKey(0)).curves
         self._repeated = 1
         self._ran()
         if first is None or again is None:
