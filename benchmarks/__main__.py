@@ -21,7 +21,7 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import NULL, Ratio, interleaved
 from statemachine import __version__, releases
-from statemachine.compare.why import explain
+from statemachine.compare.why import WhyRequest, explain
 from statemachine.compare.why.causes import built
 from statemachine.lessons.in_turns import in_turns
 from statemachine.runs import recorder
@@ -427,7 +427,7 @@ def why_in_forks(name: str, rounds: int) -> list[Ratio]:
     hold = scenario("hold")
 
     def explained(jobs: int) -> None:
-        explain(left, right, hold, seconds=1.0, budget=20, finer=True, jobs=jobs)
+        explain(WhyRequest(left, right, hold, seconds=1.0, budget=20, finer=True, jobs=jobs))
 
     return interleaved(
         partial(explained, 1),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import statemachine as sm
 from statemachine.errors import MissingEngineError, TraceError
-from statemachine.runs import export_csv, read, record, write
+from statemachine.runs import RunStart, export_csv, read, record, write
 
 from ._tally import ROOT, Tally, environment
 
@@ -35,7 +35,7 @@ while True:
 def run(seed: int, tries: int) -> Tally:
     """Kill writers of each kind of file at random moments."""
     draw, tally = random.Random(seed), Tally()
-    trace = record(sm.load("so101/scene_box"), seconds=0.2, keyframe="held")
+    trace = record(sm.load("so101/scene_box"), seconds=0.2, start=RunStart(keyframe="held"))
     with tempfile.TemporaryDirectory() as name:
         source = write(trace, Path(name) / "source.npz")
         kinds = [".npz", ".csv"]

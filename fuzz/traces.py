@@ -17,7 +17,7 @@ import numpy as np
 
 import statemachine as sm
 from statemachine.errors import MissingEngineError, TraceError
-from statemachine.runs import Trace, files, record, write
+from statemachine.runs import RunMetadata, RunStart, Trace, files, record, write
 
 from ._tally import Tally
 
@@ -29,7 +29,12 @@ _ODD = (None, True, -1, 10**400, 2**63, 1e308, float("nan"), "", "\ud800", "x" *
 def run(seed: int, tries: int) -> Tally:
     """Damage files of one trace, and read them."""
     draw, tally = random.Random(seed), Tally()
-    trace = record(sm.load("so101/scene_box"), seconds=0.1, keyframe="held", experiment="box")
+    trace = record(
+        sm.load("so101/scene_box"),
+        seconds=0.1,
+        start=RunStart(keyframe="held"),
+        metadata=RunMetadata(experiment="box"),
+    )
     with tempfile.TemporaryDirectory() as folder:
         sources = [write(trace, Path(folder) / "box.npz")]
         with suppress(MissingEngineError):

@@ -7,153 +7,26 @@ in a package of robots ("menagerie:unitree_g1").
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 import re
 import stat
-import sys
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import redirect_stdout
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 from xml.parsers import expat
 
-from .errors import (
-    BadInputError,
-    MissingEngineError,
-    ModelError,
-    ModelFileError,
-    check_name,
-    one_line,
-    refuse,
-    shown,
-    unknown_name,
-)
+from .errors import BadInputError, ModelError, ModelFileError, shown, unknown_name
 from .typed_numbers import typed_float
 
 AnyPath = str | os.PathLike[str]
 
-# Robots by name, through packages that know where public models are.
-#
-# `menagerie:NAME` or `menagerie:NAME/ENTRY` is of mujoco-menagerie, `robot_descriptions:NAME`, or
-# NAME alone where it ends in "_description", of robot_descriptions. Each package downloads a robot
-# when it is first used, and keeps it in a folder of its own on this machine.
-
-_MENAGERIE, _DESCRIPTIONS = "menagerie:", "robot_descriptions:"
-_ANSWERS_WITHIN = 5.0  # s; a slower network counts as no network
-_GITHUB = "https://github.com"
-# Git asks nobody, and gives up a transfer that stands still [bytes/s, s].
-_GIT = {
-    "GIT_TERMINAL_PROMPT": "0",
-    "GIT_HTTP_LOW_SPEED_LIMIT": "1",
-    "GIT_HTTP_LOW_SPEED_TIME": "30",
-}
+# What names that a package of robots is asked for begin with.
+NAMED = ("menagerie:", "robot_descriptions:")
 
 
 def is_named(text: str) -> bool:
-    """Whether a text is a name that a package is to be asked for."""
-    return text.startswith((_MENAGERIE, _DESCRIPTIONS)) or (
-        text.endswith("_description") and "/" not in text
-    )
-
-
-def file_of(text: str) -> Path:
-    """The file of a robot that is given by such a name; downloaded if it is not there yet.
-
-    Raises:
-        MissingEngineError: The package is not installed.
-        UnknownNameError: It has no such robot.
-        ModelFileError: No robot is named, or it is not on this machine and cannot be had, or it
-            has no MJCF or URDF.
-    """
-    if text in (_MENAGERIE, _DESCRIPTIONS):
-        raise ModelFileError(f"{text!r} names no robot: type {text}NAME")
-    if text.startswith(_MENAGERIE):
-        return _of_menagerie(text.removeprefix(_MENAGERIE))
-    return _of_descriptions(text.removeprefix(_DESCRIPTIONS))
-
-
-def _of_menagerie(text: str) -> Path:
-    package = _package("mujoco_menagerie", "menagerie", text)
-    name, _, entry = text.partition("/")
-    check_name("robot in mujoco-menagerie", name, package.names())
-    robot = package.get(name)
-    if entry:
-        check_name(f"model of {name} in mujoco-menagerie", entry, robot.entry_names)
-    cache = package.Cache()
-    if not cache.root and not cache.is_cached(robot):
-        _need_network(name, cache.base_url)
-    try:
-        return Path(robot.xml(entry or None)).absolute()
-    except (package.MenagerieError, OSError) as error:
-        raise _not_had(name, error) from error
-
-
-def _of_descriptions(name: str) -> Path:
-    package = _package("robot_descriptions", "robots", name)
-    check_name("robot in robot_descriptions", name, package.DESCRIPTIONS)
-    if f"robot_descriptions.{name}" not in sys.modules and not _is_cloned(package, name):
-        _need_network(name, _GITHUB)
-    before = {key: os.environ.get(key) for key in _GIT}
-    os.environ.update({key: value for key, value in _GIT.items() if before[key] is None})
-    try:
-        with redirect_stdout(sys.stderr):  # it says what it clones
-            module = importlib.import_module(f"robot_descriptions.{name}")
-    except Exception as error:  # whatever git, the network or the module says
-        raise _not_had(name, error) from error
-    finally:
-        for key in (key for key, value in before.items() if value is None):
-            os.environ.pop(key, None)
-    for kind in ("MJCF_PATH", "URDF_PATH"):
-        if path := getattr(module, kind, None):
-            return Path(path).absolute()
-    raise ModelFileError(f"robot_descriptions has neither MJCF nor URDF of {name}")
-
-
-def _is_cloned(package: Any, name: str) -> bool:
-    """Whether the repository of a robot is on this machine, as far as the package tells."""
-    home = os.environ.get("ROBOT_DESCRIPTIONS_CACHE", "~/.cache/robot_descriptions")
-    try:
-        known = importlib.import_module("robot_descriptions._repositories").REPOSITORIES
-        folder = known[package.DESCRIPTIONS[name].repository].cache_path
-    except (ImportError, AttributeError, KeyError):
-        return False
-    return (Path(home).expanduser() / folder / ".git").exists()
-
-
-def _package(module: str, extra: str, name: str) -> ModuleType:
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingEngineError(
-            f"{name!r} is a robot of the package {module}, which is not installed here: "
-            f"pip install 'statemachine-sim[{extra}]'",
-            engine=module,
-        ) from error
-
-
-def _need_network(name: str, url: str) -> None:
-    """Ask the host once, briefly: a download would try for minutes."""
-    try:
-        urllib.request.urlopen(
-            urllib.request.Request(url, method="HEAD"), timeout=_ANSWERS_WITHIN
-        ).close()
-    except urllib.error.HTTPError:
-        return  # somebody answers
-    except (OSError, ValueError) as error:
-        raise _not_had(name, getattr(error, "reason", error)) from error
-
-
-def _not_had(name: str, error: object) -> ModelFileError:
-    reason = one_line(error) or type(error).__name__
-    return ModelFileError(
-        f"{name} is not on this machine and could not be downloaded ({reason[:200]}). Without a "
-        "network give the path of a model file, or a folder with --menagerie"
-    )
+    """Return whether a text is a name that a package of robots is to be asked for."""
+    return text.startswith(NAMED) or (text.endswith("_description") and "/" not in text)
 
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -235,6 +108,8 @@ def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
     """Find the file of a model, whatever is in it; see `resolve`."""
     text = _as_text(name)
     if is_named(text) and (menagerie is None or ":" in text):
+        from .robot_packages import file_of
+
         return file_of(text)
     try:
         path = Path(text).expanduser()
@@ -242,15 +117,7 @@ def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
     except (OSError, RuntimeError) as error:  # too long a name, no such user, no permission
         raise ModelFileError(f"{text[:80]!r} cannot be a model file: {error}") from None
     if path.suffix.lower() in SUFFIXES:
-        if path.is_file():
-            return path.absolute()
-        if menagerie is None and text.removesuffix(".xml") in model_names():
-            return models_dir() / text  # the name as pages print it
-        if menagerie is not None and (Path(menagerie).expanduser() / text).is_file():
-            return (Path(menagerie).expanduser() / text).absolute()  # the same, of a menagerie
-        kind = what_is_there(path)
-        what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
-        raise ModelFileError(f"model file {text} {what}")
+        return path.absolute() if path.is_file() else _file_of_a_known_model(text, menagerie)
     if menagerie is not None:
         return _in_menagerie(text, Path(menagerie).expanduser())
     ours = text if "/" in text else f"{text}/{text}"
@@ -258,28 +125,38 @@ def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
         return models_dir() / f"{ours}.xml"
     if path.suffix.lower() == _XACRO_SUFFIX and path.is_file():
         raise ModelError(_is_xacro(path))
-    refuse(
-        (path.is_dir(), f"{text} is a folder: name a file in it ({', '.join(SUFFIXES)})"),
-        (path.is_file(), f"model file {text} does not end in {', '.join(SUFFIXES)}"),
-        error=ModelFileError,
-    )
+    if path.is_dir():
+        raise ModelFileError(f"{text} is a folder: name a file in it ({', '.join(SUFFIXES)})")
+    if path.is_file():
+        raise ModelFileError(f"model file {text} does not end in {', '.join(SUFFIXES)}")
     if os.environ.get("MENAGERIE") and "/" in text:
         return _in_menagerie(text, Path(os.environ["MENAGERIE"]).expanduser())
     raise unknown_name("model", text, model_names())
+
+
+def _file_of_a_known_model(text: str, menagerie: AnyPath | None) -> Path:
+    """Return the file of a model whose name has the suffix of a file, as pages print it.
+
+    Raises:
+        ModelFileError: There is no such model, of ours or in the menagerie.
+    """
+    if menagerie is None and text.removesuffix(".xml") in model_names():
+        return models_dir() / text
+    if menagerie is not None and (Path(menagerie).expanduser() / text).is_file():
+        return (Path(menagerie).expanduser() / text).absolute()
+    kind = what_is_there(Path(text).expanduser())
+    what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
+    raise ModelFileError(f"model file {text} {what}")
 
 
 def _as_text(name: AnyPath) -> str:
     text = os.fspath(name) if isinstance(name, os.PathLike) else name
     if not isinstance(text, str):
         raise TypeError(f"a model is given by its name or a path; got {shown(name)}")
-    refuse(
-        ("\0" in text or not text.strip(), f"{text!r} is neither the name of a model nor a path"),
-        (
-            any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)),
-            f"{text!r} is not UTF-8, and engines open no file of such a name",
-        ),
-        error=ModelFileError,
-    )
+    if "\0" in text or not text.strip():
+        raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
+    if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):
+        raise ModelFileError(f"{text!r} is not UTF-8, and engines open no file of such a name")
     return text
 
 

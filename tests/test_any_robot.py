@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine import errors, models
+from statemachine import errors, models, robot_packages
 from statemachine.cli import main
 from statemachine.compare import compare
 from statemachine.lessons import LESSONS
@@ -345,7 +345,7 @@ def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) ->
         asked.append(timeout)
         raise urllib.error.URLError("Name or service not known")
 
-    monkeypatch.setattr(models.urllib.request, "urlopen", urlopen)
+    monkeypatch.setattr(robot_packages.urllib.request, "urlopen", urlopen)
     return asked
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.cli import main
-from statemachine.runs import read, record, write
+from statemachine.runs import RunMetadata, RunStart, read, record, write
 
 from .conftest import assert_has, written, written_all
 
@@ -210,8 +210,17 @@ def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(
     for side in ("l", "r"):
         model, options = sm.load(f"{side}.xml").replace(timestep=0.004), {"timestep": 0.004}
         wave, push = (lambda time, _d: [np.sin(6 * time)]), (lambda _t, _d: [0.5])
-        write(record(model, wave, 0.6, keyframe="k", options=options), f"{side}.npz")
-        write(record(model, push, 0.6, options=options), f"{side}_push.npz")
+        write(
+            record(
+                model,
+                wave,
+                0.6,
+                start=RunStart(keyframe="k"),
+                metadata=RunMetadata(options=options),
+            ),
+            f"{side}.npz",
+        )
+        write(record(model, push, 0.6, metadata=RunMetadata(options=options)), f"{side}_push.npz")
 
     def why(*words: str) -> tuple[int, dict[str, Any]]:
         return main(["compare", *words, "--why", "--no-chaos", "--json"]), json.loads(

@@ -19,7 +19,9 @@ from statemachine.errors import (
     ForeignDataError,
     StaleReadError,
 )
-from statemachine.freshness import Scratch, gaps, table, worth_telling
+from statemachine.freshness.age import Scratch
+from statemachine.freshness.gaps import gaps, worth_telling
+from statemachine.freshness.rows import table
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.measures import Gap
 from statemachine.report.as_json import plain
@@ -227,7 +229,7 @@ def test_data_is_untouched_and_so_is_its_future(box: Model) -> None:
 def test_every_scratch_is_closed(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Data] = []
     monkeypatch.setattr(
-        "statemachine.freshness.make_data",
+        "statemachine.freshness.age.make_data",
         lambda model: made.append(sm.make_data(model)) or made[-1],
     )
     with opened(arm) as (model, data):

@@ -14,13 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from statemachine import load
-from statemachine.compare.models import compare, read
-from statemachine.compare.models.ledger import digits_of
+from statemachine.compare.models import ModelsComparison, compare, read
+from statemachine.compare.models.ledger import ReadingDifference, digits_of
 from statemachine.engines.description.tree import GroupTree
 from statemachine.errors import ModelError, UnknownNameError
 from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
-from statemachine.page import Figures
 from statemachine.rotations import angle_between
 
 from .conftest import assert_has, opened, refused, written, written_all
@@ -43,13 +42,13 @@ def pair(tmp_path: Path) -> Pair:
     return write
 
 
-def _compared(folder: Path, texts: dict[str, str]) -> Figures:
+def _compared(folder: Path, texts: dict[str, str]) -> ModelsComparison:
     """What two files of these texts differ in."""
     one, two = (written_all(folder, texts) / name for name in texts)
     return compare(one, two)
 
 
-def _differ(result: Figures) -> list[Figures]:
+def _differ(result: ModelsComparison) -> list[ReadingDifference]:
     return [each for each in result.differences if each.matters]
 
 
@@ -534,7 +533,7 @@ PLAIN = {
 }
 
 
-def _pendula(folder: Path, **changes: str) -> list[Figures]:
+def _pendula(folder: Path, **changes: str) -> list[ReadingDifference]:
     sides = {"one.xml": PLAIN, "two.xml": PLAIN | changes}
     texts = {name: PENDULUM.format(**side) for name, side in sides.items()}
     return _differ(_compared(folder, texts))

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from statemachine.compare.models import compare
-from statemachine.page import Figures
+from statemachine.compare.models.ledger import ReadingDifference
 
 from .conftest import Cli, assert_has, written_all
 from .explained import ALONE, ARM, Case, changed
 
 
-def _listed(folder: Path, right: str, left: str = ARM) -> list[Figures]:
+def _listed(folder: Path, right: str, left: str = ARM) -> list[ReadingDifference]:
     written_all(folder, {"left.xml": left, "right.xml": right})
     rows = compare(folder / "left.xml", folder / "right.xml").differences
     return [row for row in rows if row.matters]

@@ -10,10 +10,11 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import rerun_of
-from statemachine.compare.one_step import RELATIVE, OneStep, one_step
+from statemachine.compare.one_step import RELATIVE, OneStep, StageGap, one_step
 from statemachine.compare.stages import STAGES
 from statemachine.compare.why import WhyRequest, explain
 from statemachine.errors import BadInputError
+from statemachine.page import Verdict
 from statemachine.report.steps import one_step as page
 from statemachine.runs import Rerun
 from statemachine.runs.scenarios import scenario
@@ -41,7 +42,7 @@ def rerun(model: sm.Model, seconds: float = 0.5) -> Rerun:
     return Rerun(model, lambda _: lambda _time, _data: (0.6, -0.9), seconds)
 
 
-def stepped(folder: Path, text: str, **how: Any) -> Any:
+def stepped(folder: Path, text: str, **how: Any) -> OneStep:
     """The robot, and the same with another text."""
     one, two = model_of(folder, LINKS_AND_BALL, "one.xml"), model_of(folder, text, "two.xml")
     return one_step(rerun(one), two, **how)
@@ -51,13 +52,15 @@ def first(found: OneStep) -> str:
     return found.first.stage if found.first else ""
 
 
-def gap_of(found: OneStep, name: str) -> Any:
+def gap_of(found: OneStep, name: str) -> StageGap:
     (gap,) = (gap for gap in found.stages if gap.stage == name)
     return gap
 
 
-def verdict(found: OneStep) -> Any:
-    return page(found, ("one", "two"), "hold").blocks[-1]
+def verdict(found: OneStep) -> Verdict:
+    last = page(found, ("one", "two"), "hold").blocks[-1]
+    assert isinstance(last, Verdict)
+    return last
 
 
 def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> None:

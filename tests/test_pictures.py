@@ -43,7 +43,7 @@ from statemachine.report.plot import (
     of_trace,
     write_plot,
 )
-from statemachine.runs import Trace, record, shipped, write
+from statemachine.runs import RunMetadata, Trace, record, shipped, write
 from statemachine.runs.header import INPUTS
 
 from .conftest import (
@@ -72,7 +72,12 @@ def sides() -> tuple[sm.Model, Trace, Trace]:
     """Two runs of one model that part at once, and far."""
     model = sm.load("so101/scene")
     one, two = (
-        record(model, lambda _t, _d, told=told: np.array(told), 0.5, experiment="swing")
+        record(
+            model,
+            lambda _t, _d, told=told: np.array(told),
+            0.5,
+            metadata=RunMetadata(experiment="swing"),
+        )
         for told in (FIRST, SECOND)
     )
     return model, one, two
@@ -398,7 +403,12 @@ def _drawing(place: Path) -> list[int]:
 def compared() -> tuple[Trace, Trace, Any]:
     """Hold on MuJoCo, and as PyBullet was recorded."""
     two = shipped("hold", "pybullet")
-    one = record(sm.load("so101/scene"), lambda _t, _d: np.array(FIRST), 2.0, experiment="hold")
+    one = record(
+        sm.load("so101/scene"),
+        lambda _t, _d: np.array(FIRST),
+        2.0,
+        metadata=RunMetadata(experiment="hold"),
+    )
     return one, two, compare(one, two)
 
 

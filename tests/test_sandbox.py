@@ -8,8 +8,10 @@ import sys
 import threading
 import time
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,9 +26,12 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found 
 
 
 def _python(
-    code: str, cpu: float = 20.0, wall: float = 120.0, **more: object
+    code: str, cpu: float = 20.0, wall: float = 120.0, **more: Any
 ) -> sandbox.ProcessOutcome:
-    return sandbox.run([sys.executable, "-c", code], cpu=cpu, wall=wall, **more)  # type: ignore[arg-type]
+    """Run some code under limits, and with other arguments of `sandbox.run`."""
+    named = {field.name for field in fields(sandbox.Limits)}
+    further = {name: more.pop(name) for name in named & more.keys()}
+    return sandbox.run([sys.executable, "-c", code], sandbox.Limits(cpu, wall, **further), **more)
 
 
 def test_what_a_command_says_and_how_it_ends(tmp_path: Path) -> None:
@@ -113,7 +118,7 @@ def test_no_other_process_is_touched() -> None:
 
 @POSIX
 def test_a_program_that_is_not_there() -> None:
-    done = sandbox.run(["no-such-program"], cpu=5, wall=60)
+    done = sandbox.run(["no-such-program"], sandbox.Limits(cpu=5, wall=60))
     assert done.code == 1
     assert "no-such-program: " in done.stderr
 

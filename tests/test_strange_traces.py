@@ -18,7 +18,7 @@ from statemachine.compare import Agreement, Comparison, compare, witness
 from statemachine.errors import ModelFileError, TraceError
 from statemachine.interface import JointType
 from statemachine.report import compare as report
-from statemachine.runs import Trace, model_file, read, record, write
+from statemachine.runs import RunMetadata, RunStart, Trace, model_file, read, record, write
 from statemachine.runs.whole import check_place, replace_file
 
 from .conftest import Cli, assert_has, refused, shown, written_all
@@ -27,7 +27,12 @@ from .small_models import TWO_NAMELESS, model_of
 
 @pytest.fixture(scope="module")
 def box() -> Trace:
-    return record(sm.load("so101/scene_box"), seconds=0.3, keyframe="held", experiment="box")
+    return record(
+        sm.load("so101/scene_box"),
+        seconds=0.3,
+        start=RunStart(keyframe="held"),
+        metadata=RunMetadata(experiment="box"),
+    )
 
 
 def changed(trace: Trace, header: dict[str, Any] | None = None, **columns: Any) -> Trace:
@@ -189,7 +194,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     )
     one, other = (tmp_path / name / "one.xml" for name in ("robots", "elsewhere"))
     written_all(tmp_path, {"robots/one.xml": text, "elsewhere/empty.txt": ""})
-    trace = record(sm.load(one), seconds=0.2, experiment="swing")
+    trace = record(sm.load(one), seconds=0.2, metadata=RunMetadata(experiment="swing"))
     monkeypatch.chdir(other.parent)
     refused((ModelFileError, "name it behind the trace", lambda: model_file(trace.header)))
     assert model_file(trace.header, beside=one.with_name("t.npz")) == (one, True)

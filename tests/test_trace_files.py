@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 
 import statemachine as sm
 from statemachine.errors import TraceError
-from statemachine.runs import Trace, export_csv, read, record, whole, write
+from statemachine.runs import RunMetadata, RunStart, Trace, export_csv, read, record, whole, write
 
 from .conftest import Cli, around, refused, written
 from .test_traces import same
@@ -28,7 +28,12 @@ from .test_traces import same
 
 @pytest.fixture(scope="module")
 def box() -> Trace:
-    return record(sm.load("so101/scene_box"), seconds=0.1, keyframe="held", experiment="box")
+    return record(
+        sm.load("so101/scene_box"),
+        seconds=0.1,
+        start=RunStart(keyframe="held"),
+        metadata=RunMetadata(experiment="box"),
+    )
 
 
 def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:

@@ -28,6 +28,7 @@ from statemachine.release_names import is_release
 from statemachine.runs import (
     COLUMNS,
     CONTACTS,
+    RunStart,
     Trace,
     export_csv,
     play,
@@ -137,7 +138,9 @@ def test_a_short_run_is_the_beginning_of_a_long_one(
 
 
 def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
-    trace = record(model_of(tmp_path, ROTOR_PENDULUM), None, 0.5, qpos=[1.0], qvel=[0.7])
+    trace = record(
+        model_of(tmp_path, ROTOR_PENDULUM), None, 0.5, start=RunStart(qpos=[1.0], qvel=[0.7])
+    )
     angle, speed = trace.qpos[:, 0], trace.qvel[:, 0]
     inertia = 0.1 + 2 * 0.5**2 + 0.3  # body about the joint, and rotor
     assert np.allclose(trace["energy"][:, 0], 0.5 * inertia * speed**2, rtol=1e-12)
@@ -242,19 +245,26 @@ def test_a_run_that_diverges_keeps_its_rows(mujoco_arm: sm.Model, tmp_path: Path
 
 
 def test_it_starts_where_it_is_told(mujoco_box: sm.Model) -> None:
-    assert record(mujoco_box, None, 0.01, keyframe="held").header.keyframe == "held"
+    assert record(mujoco_box, None, 0.01, start=RunStart(keyframe="held")).header.keyframe == "held"
     with opened(mujoco_box, "held", nstep=20) as (_, data):
         state = sm.get_state(mujoco_box, data)
         sm.step(mujoco_box, data)
         after = data.qpos.copy()
-    assert record(mujoco_box, None, 0.01, state=state).qpos[1].tobytes() == after.tobytes()
+    assert (
+        record(mujoco_box, None, 0.01, start=RunStart(state=state)).qpos[1].tobytes()
+        == after.tobytes()
+    )
     refused(
         (
             BadInputError,
             "not from both",
-            lambda: record(mujoco_box, None, 0.01, state=state, keyframe="held"),
+            lambda: record(mujoco_box, None, 0.01, start=RunStart(state=state, keyframe="held")),
         ),
-        (UnknownNameError, "", lambda: record(mujoco_box, None, 0.01, keyframe="hold")),
+        (
+            UnknownNameError,
+            "",
+            lambda: record(mujoco_box, None, 0.01, start=RunStart(keyframe="hold")),
+        ),
     )
 
 

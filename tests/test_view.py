@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
@@ -23,12 +24,13 @@ import pytest
 import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.measures import Gap
-from statemachine.page import Figures
-from statemachine.runs import record, write
+from statemachine.runs import RunMetadata, RunStart, record, write
 from statemachine.view import server as serving
 from statemachine.view.live import Command, Live, Tempo
 from statemachine.view.server import Door
 from statemachine.view.session import (
+    EnginePose,
+    Frame,
     LiveSession,
     TraceSession,
     controls_of,
@@ -256,13 +258,13 @@ class Hand:
 
     def __init__(self) -> None:
         self.asked: list[Command] = []
-        self.shown: list[tuple[Figures, Tempo, str]] = []
+        self.shown: list[tuple[Frame, Tempo, str]] = []
 
     def commands(self) -> Sequence[Command]:
         taken, self.asked = self.asked, []
         return taken
 
-    def show(self, frame: Figures, pace: Tempo, note: str) -> None:
+    def show(self, frame: Frame, pace: Tempo, note: str) -> None:
         self.shown.append((frame, pace, note))
 
 
@@ -278,7 +280,7 @@ class Slow(LiveSession):
         self.clock.now += self.cost * count
 
 
-def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Figures, Tempo, str]:
+def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Frame, Tempo, str]:
     """What is shown after some turns, of which the first obeys these commands."""
     hand.asked += asked
     for _ in range(turns):
@@ -358,14 +360,18 @@ def test_commands_are_obeyed_in_their_order() -> None:
 
 
 def test_the_readout_says_what_the_frame_says() -> None:
-    pose = Figures(name="mujoco", tip=np.array([0.1, -0.02, 0.3]))
-    ghost = Figures(name="pybullet", tip=np.array([0.1, -0.02, 0.3015]))
+    def pose(name: str, tip: tuple[float, float, float]) -> EnginePose:
+        nothing = np.zeros((0, 3))
+        return EnginePose(name, nothing, nothing, np.zeros(0), np.array(tip))
+
     joint = Gap(math.radians(2.5), "rad", "elbow")
-    frame = Figures(
+    frame = Frame(
         time=1.25,
         steps=250,
         running=True,
-        poses=(pose, ghost),
+        ctrl=np.zeros(0),
+        resets=0,
+        poses=(pose("mujoco", (0.1, -0.02, 0.3)), pose("pybullet", (0.1, -0.02, 0.3015))),
         tips_apart=0.0015,
         joint_apart=joint,
         trouble="",
@@ -380,7 +386,7 @@ def test_the_readout_says_what_the_frame_says() -> None:
     }
     assert "0.50 ×" in dict(readout(frame, Tempo(2.0, 0.5, True), "tip"))["pace"]
     assert warning(frame, "a note") == "a note"
-    stopped = Figures(**vars(frame) | {"running": False, "trouble": "mujoco: it blew up"})
+    stopped = replace(frame, running=False, trouble="mujoco: it blew up")
     assert dict(readout(stopped, Tempo(1, None, False), ""))["pace"] == "paused"
     assert warning(stopped, "") == "mujoco: it blew up. Reset to go on."
 
@@ -537,7 +543,13 @@ def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(
     mujoco_box: sm.Model, tmp_path: Path
 ) -> None:
     file = write(
-        record(mujoco_box, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz"
+        record(
+            mujoco_box,
+            seconds=0.1,
+            start=RunStart(keyframe=0),
+            metadata=RunMetadata(experiment="box"),
+        ),
+        tmp_path / "box.npz",
     )
     port = str(_free_pair())
     with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:

@@ -149,6 +149,7 @@ class Plan:
             meshes = {geom: int(raw.geom_dataid[geom]) for geom in hulls}
             hulls = {g for g, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0}
         loose = urdf.floats(raw, root) and (kind == "engine" or not self.driven(root))
+        anchored = bool(root) and not loose
         solids, padding, tips = self.surfaces.solids, None, False
         if kind == "stepped":
             padding = self.padding
@@ -159,7 +160,7 @@ class Plan:
             looks=False,
             solids=kind != "ghost" and bool(solids),
             dynamics=kind == "engine",
-            anchored=bool(root) and not loose,
+            anchored=anchored,
             padding=padding,
             tips=tips,
             hulls=frozenset(hulls),

@@ -42,7 +42,7 @@ CONSTANTS_FOLLOW = frozenset({"armature", "mass"})
 
 
 def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Which arrays of a compiled model some options change, and to what.
+    """Return which arrays of a compiled model some options change, and to what.
 
     Args:
         raw: The compiled model; stays as it is.
@@ -57,14 +57,8 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
         front where an option has it. Constants that follow from them are not among them.
     """
     arrays: dict[str, Any] = {}
-    flags = np.asarray(raw.opt.disableflags)
     for name, value in options.items():
-        for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
-            flags = flags & ~int(flag)
-        if name in _SWITCHES:
-            flag = int(_SWITCHES[name])
-            flags = (flags & ~flag) | np.where(value, 0, flag)
-        elif name in _ARRAYS:
+        if name in _ARRAYS:
             arrays[_ARRAYS[name]] = value
         if name == "mass":
             own = raw.body_mass > 0
@@ -80,15 +74,40 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
             arrays["actuator_delay"] = delay = np.zeros((*value.shape[:-1], raw.nactuator))
             delay[..., owner] = SHORTER * value
         elif name in ("kp", "kv"):
-            owner, servo = servos(raw)
-            bias = arrays.setdefault("actuator_biasprm", _rows(raw.actuator_biasprm, value))
-            bias[..., owner[servo], 1 if name == "kp" else 2] = -value[..., servo]
-            if name == "kp":
-                arrays["actuator_gainprm"] = gain = _rows(raw.actuator_gainprm, value)
-                gain[..., owner[servo], 0] = value[..., servo]
+            _set_gain(raw, arrays, name, value)
+    flags = _flags(raw, options)
     if flags.ndim or int(flags) != raw.opt.disableflags:
         arrays["opt.disableflags"] = flags
     return arrays
+
+
+def _set_gain(raw: mujoco.MjModel, arrays: dict[str, Any], name: str, value: Array) -> None:
+    """Add what one gain of the position servos changes.
+
+    Args:
+        raw: The compiled model.
+        arrays: What is changed so far; the other gain may be in it.
+        name: "kp" or "kv".
+        value: (..., nu), NaN of what is not a position servo.
+    """
+    owner, servo = servos(raw)
+    bias = arrays.setdefault("actuator_biasprm", _rows(raw.actuator_biasprm, value))
+    bias[..., owner[servo], 1 if name == "kp" else 2] = -value[..., servo]
+    if name == "kp":
+        arrays["actuator_gainprm"] = gain = _rows(raw.actuator_gainprm, value)
+        gain[..., owner[servo], 0] = value[..., servo]
+
+
+def _flags(raw: mujoco.MjModel, options: Mapping[str, Any]) -> Any:
+    """Return the bits of what is disabled, with some options: an array, without axes or (n,)."""
+    flags = np.asarray(raw.opt.disableflags)
+    for name, value in options.items():
+        for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
+            flags = flags & ~int(flag)
+        if name in _SWITCHES:
+            flag = int(_SWITCHES[name])
+            flags = (flags & ~flag) | np.where(value, 0, flag)
+    return flags
 
 
 def varied(

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from ..compare.questions.one_step import OneStepRequest
     from ..compare.questions.versions import VersionsRequest
     from ..engines.pictures import Renderer
+    from ..interface.options import OptionValue
     from ..report.run_files import RunFiles, ShownModels
 
     Question = (
@@ -363,7 +364,7 @@ def run_of(options: argparse.Namespace) -> Request:
     from ..compare import Request, split_words
 
     what, sides = split_words(options.what, options.menagerie)
-    common: dict[str, object] = {}
+    common: dict[str, OptionValue] = {}
     if options.timestep is not None:
         common["timestep"] = options.timestep
     model = None

@@ -6,10 +6,11 @@ They are called by what tells them apart: the engine first, then file and option
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ..interface.options import OptionValue
 from ..measures import SAME, Common
 from ..measures.text import few, milliseconds, numbers, significant
 from ..runs import Header, Trace
@@ -86,7 +87,7 @@ def files_apart(left: Sequence[str], right: Sequence[str]) -> Two:
     return "/".join(left[-count:]), "/".join(right[-count:])
 
 
-def options_apart(left: Mapping[str, Any], right: Mapping[str, Any]) -> Two:
+def options_apart(left: Mapping[str, OptionValue], right: Mapping[str, OptionValue]) -> Two:
     """The options that differ, as they are typed; what a side does not say is of its file."""
     differing = [
         name
@@ -96,7 +97,7 @@ def options_apart(left: Mapping[str, Any], right: Mapping[str, Any]) -> Two:
     return _typed_options(differing, left), _typed_options(differing, right)
 
 
-def _typed_options(names: Iterable[str], options: Mapping[str, Any]) -> str:
+def _typed_options(names: Iterable[str], options: Mapping[str, OptionValue]) -> str:
     """Return some options as they are typed, and which of them are left to the file."""
     return ", ".join(
         typed_option(name, options[name]) if name in options else f"{name} of the file"
@@ -104,7 +105,7 @@ def _typed_options(names: Iterable[str], options: Mapping[str, Any]) -> str:
     )
 
 
-def typed_option(name: str, value: Any) -> str:
+def typed_option(name: str, value: OptionValue | None) -> str:
     """An option as one types it: "timestep=0.002", "contacts=off", "gravity=0,0,-9.8"."""
     match value:
         case bool():
@@ -141,9 +142,9 @@ def _start_of(header: Header) -> str:
     return header.keyframe or "the default state"
 
 
-def _with_known(header: Header, other: Header) -> dict[str, Any]:
+def _with_known(header: Header, other: Header) -> dict[str, OptionValue]:
     """The options of a run, and what it has where only the other one says an option."""
-    known = {
+    known: dict[str, OptionValue] = {
         "timestep": header.timestep,
         "substeps": header.substeps,
         "gravity": list(header.gravity),

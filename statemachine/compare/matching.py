@@ -35,7 +35,8 @@ class Matched(Counterparts):
     """What of one Model is what of another.
 
     Attributes:
-        left, right: The Models.
+        left: The first Model.
+        right: The second.
         bodies: Pairs of ids.
         only: For each Model what it alone has: names, by "joint", "site" and "actuator".
         notes: What a reader should know, in sentences.

@@ -147,10 +147,11 @@ def perturbed_run(
     qpos, qvel = rerun.start()
     # At a corner of what is possible; of two runs one is opposite to the other.
     corner, side = np.random.default_rng([seed, k // 2]), -1.0 if k % 2 else 1.0
-    qpos = displaced(
-        rerun.model, qpos, uncertain, corner,
-        lambda: side * float(corner.choice((-1.0, 1.0))), lambda: side,
-    )  # fmt: skip
+
+    def along() -> float:
+        return side * float(corner.choice((-1.0, 1.0)))
+
+    qpos = displaced(rerun.model, qpos, uncertain, corner, along, far=lambda: side)
     controller = nudged_controller(rerun.controller(rerun.model), draw)
     qpos, qvel = nudged_start(rerun.model, qpos, qvel, draw)
     # What an engine warns of, and what is wrong with the start, is told of the run itself.
@@ -184,8 +185,11 @@ def displaced(
     """
     qpos = qpos.copy()
     for kind, place in zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True):
-        if kind in (JointType.HINGE, JointType.SLIDE):
-            qpos[place] += (size.angle if kind == JointType.HINGE else size.length) * along()
+        if kind == JointType.HINGE:
+            qpos[place] += size.angle * along()
+            continue
+        if kind == JointType.SLIDE:
+            qpos[place] += size.length * along()
             continue
         if kind == JointType.FREE:
             qpos[place : place + 3] += size.length * far() * direction(draw)
@@ -353,15 +357,13 @@ def chaos_floor(
     sides = tuple(side for side, rerun in enumerate(reruns) if rerun is not None)
     if not sides:
         raise BadInputError("the chaos floor runs a side again, and both are recorded runs")
-    gaps = {curve.name: curve.difference for curve in comparison.curves}
-    gaps |= {a.name: np.array([a.max]) for a in comparison.agreements if a.kind == "contact"}
     work: list[Callable[[], _Departure]] = []
-    for side in sides:
-        rerun, rows = reruns[side], (common.left, common.right)[side]
-        assert rerun is not None
-        for k in range(runs):
-            draw = partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
-            work.append(partial(_departure, draw, traces[side], comparison, rows))
+    for rerun, trace, rows in zip(reruns, traces, (common.left, common.right), strict=True):
+        if rerun is not None:
+            for k in range(runs):
+                draw = partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
+                work.append(partial(_departure, draw, trace, comparison, rows))
+    gaps = _gaps_of(comparison)
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
     ended = 0
     for departure in _departures(work, reruns, jobs, progress):
@@ -375,9 +377,8 @@ def chaos_floor(
         width, moments = widths[agreement.name], common.time
         if agreement.kind == "contact":
             moments = np.zeros(1)
-        else:  # the largest within some rows to either side
-            padded = np.pad(width, reach, mode="edge")
-            width = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+        else:
+            width = _largest_nearby(width, reach)
         bands.append(_band(agreement, gaps[agreement.name], width, moments))
     return ChaosFloor(
         runs=runs,
@@ -388,6 +389,21 @@ def chaos_floor(
         ended=ended,
         bands=tuple(bands),
     )
+
+
+def _gaps_of(comparison: Comparison) -> dict[str, Array]:
+    """Return how far apart the sides are (n,) in each quantity; (1,) [s] of a first touch."""
+    gaps = {curve.name: curve.difference for curve in comparison.curves}
+    for agreement in comparison.agreements:
+        if agreement.kind == "contact":
+            gaps[agreement.name] = np.array([agreement.max])
+    return gaps
+
+
+def _largest_nearby(values: Array, reach: int) -> Array:
+    """Return for each of some values (n,) the largest within so many rows to either side."""
+    padded = np.pad(values, reach, mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
 
 
 @dataclass(frozen=True)

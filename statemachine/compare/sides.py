@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
+from ..interface.options import OptionValue
 from ..measures.text import command, listed
 from ..models import SUFFIXES as MODELS
 from ..models import resolve
@@ -52,7 +53,7 @@ class Side:
     file: str
     engine: str = DEFAULT
     defaults: Literal["model", "engine"] = "model"
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
     menagerie: str | None = None
     taken: TakenParts | None = None
 
@@ -71,7 +72,7 @@ class Side:
         options = (typed_option(name, value) for name, value in self.options.items())
         return " ".join([f"{_typed(self.file)}@{self.chosen_backend()}", *options])
 
-    def load(self, **options: Any) -> Model:
+    def load(self, **options: OptionValue) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.
 
         Raises:
@@ -129,8 +130,8 @@ def _renamed(
 
 
 def with_options(
-    sides: Sequence[Side], options: Mapping[str, Any]
-) -> tuple[list[Side], dict[str, Any]]:
+    sides: Sequence[Side], options: Mapping[str, OptionValue]
+) -> tuple[list[Side], dict[str, OptionValue]]:
     """Sides with what only they are given, and the options that both have.
 
     Args:
@@ -146,7 +147,9 @@ def with_options(
     return [_without(sides[0], left, both), _without(sides[1], right, both)], both
 
 
-def _without(side: Side, options: Mapping[str, Any], common: Mapping[str, Any]) -> Side:
+def _without(
+    side: Side, options: Mapping[str, OptionValue], common: Mapping[str, OptionValue]
+) -> Side:
     """Return a side with those of some options that are not among the common ones."""
     own = {name: value for name, value in options.items() if name not in common}
     return replace(side, options=own)
@@ -226,7 +229,13 @@ def _refuse_mistyped(word: str) -> None:
         raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
 
 
-def _option(text: str) -> tuple[str, Any]:
+def _option(text: str) -> tuple[str, OptionValue]:
+    """Return the name and the value of an option, as typed.
+
+    Raises:
+        UnknownNameError: There is no such option.
+        BadInputError: It has no value, or an invalid one.
+    """
     name, _, given = text.partition("=")
     check_name("option", name, OPTIONS)
     if not given:
@@ -274,7 +283,7 @@ class Request:
     menagerie: str | None = None
     seconds: float | None = None
     seed: int = 0
-    options: dict[str, Any] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
     sides: tuple[Side, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     every: int = 1

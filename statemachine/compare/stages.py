@@ -233,7 +233,8 @@ class StageMeasure:
     """What was read of a stage in one unit: of k elements, at n moments.
 
     Attributes:
-        stage, unit: Of all elements.
+        stage: Of all elements.
+        unit: Of all elements.
         names: What each is of: a joint, a body, a pair of joints.
         apart: (n, k) how far the two sides are apart.
         null: (n, k) how far the left side is from itself.

@@ -123,16 +123,12 @@ def record(
 
     outcome = sandbox.run(
         command,
-        cpu=limits.cpu,
-        wall=limits.wall,
+        sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
         started=has_begun,
-        start=START,
-        start_cpu=START,
         cwd=scratch,
         env=environment(backend),
         writable=folder,
         view=view_of(backend, [own]),
-        memory_most=_MEMORY_MOST,
         stop=stop,
     )
     recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))

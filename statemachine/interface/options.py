@@ -25,6 +25,7 @@ from .checks import (  # noqa: F401 (some are imported from here)
 )
 from .records import OPTIONS, Array, Ints, JointType
 
+OptionValue = bool | int | float | str | Sequence[float] | Array  # of what `replace` takes
 # One number for each degree of freedom.
 PER_DOF = ("armature", "damping", "frictionloss")
 LONGEST = 10.0  # latency [s]: a State has every command of that time

@@ -57,9 +57,10 @@ class Deviation:
 
     Attributes:
         unit: Of the distances: "rad" or "m".
-        worst: The largest distance at any moment; at: when [s].
-        rms: Root of the mean square over the moments.
-        end: At the last moment.
+        worst: The largest distance at any moment [unit].
+        at: When that is [s].
+        rms: Root of the mean square over the moments [unit].
+        end: At the last moment [unit].
     """
 
     unit: str
@@ -81,7 +82,8 @@ class JointPlaces:
     """Where in qpos each kind of joint has its numbers.
 
     Attributes:
-        hinges, slides: Of each hinge [rad] and each slide [m].
+        hinges: Of each hinge [rad].
+        slides: Of each slide [m].
         balls: Where the quaternion of each ball joint starts.
         free: Where the position of each free body starts; its quaternion follows.
     """
@@ -116,17 +118,20 @@ class JointPlaces:
 
 
 def joint_gap(
-    names: Sequence[str], types: Sequence[int] | Ints, addresses: Sequence[int] | Ints,
-    left: Array, right: Array,
-) -> Gap | None:  # fmt: skip
-    """The hinge that differs most between two moments, or the slide where there is no hinge.
+    names: Sequence[str],
+    types: Sequence[int] | Ints,
+    addresses: Sequence[int] | Ints,
+    left: Array,
+    right: Array,
+) -> Gap | None:
+    """Return the gap of the hinge that differs most, or of the slide where there is no hinge.
 
     Args:
-        names: Of the joints; types, addresses: their `JointType`s and places in qpos.
-        types: See names.
-        addresses: See names.
-        left: (nq,) one moment; right: the other.
-        right: See left.
+        names: Of the joints.
+        types: Their `JointType`s.
+        addresses: Their places in qpos.
+        left: (nq,) one moment.
+        right: (nq,) the other.
     """
     kinds, places = np.asarray(types), np.asarray(addresses)
     for kind, unit in ((JointType.HINGE, "rad"), (JointType.SLIDE, "m")):

@@ -19,7 +19,8 @@ class Common:
 
     Attributes:
         time: (n,) since the start [s].
-        left, right: (n,) rows of the runs.
+        left: (n,) rows of the one run.
+        right: (n,) rows of the other.
     """
 
     time: Array
@@ -33,8 +34,8 @@ def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Com
     Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
 
     Args:
-        left: (n,) ascending, when the rows of a run are [s]; right: those of the other.
-        right: See left.
+        left: (n,) ascending, when the rows of a run are [s].
+        right: (m,) those of the other.
         steps: The timesteps of both [s].
 
     Raises:
@@ -45,7 +46,7 @@ def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Com
     # A time is a sum of timesteps: its rounding grows with their number.
     slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
     rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
-    if len(rows) < min(_FEW, *map(len, times)):
+    if len(rows) < min(_FEW, len(left), len(right)):
         raise TraceError(
             f"timesteps of {steps[0]:g} and {steps[1]:g} s have only {len(rows)} moments "
             "in common: record one of them with the other's timestep"

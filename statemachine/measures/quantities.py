@@ -100,22 +100,31 @@ QUANTITIES = {quantity.name: quantity for quantity in _KINDS}
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A difference that does not matter: how much [SI], and the reason."""
+    """A difference that does not matter.
+
+    Attributes:
+        value: How much [SI].
+        reason: Why that much.
+    """
 
     value: float
     reason: str
 
 
 def tolerance_of(
-    kind: str, left: Array, right: Array, reach: float, timestep: float,
+    kind: str,
+    left: Array,
+    right: Array,
+    reach: float,
+    timestep: float,
     given: Mapping[str, float] | None = None,
-) -> Tolerance:  # fmt: skip
-    """The tolerance of a quantity in two runs.
+) -> Tolerance:
+    """Return the tolerance of a quantity in two runs.
 
     Args:
         kind: Which of `QUANTITIES`.
-        left: Its values (n,) in one run; right: in the other. Of energies and forces they count.
-        right: See left.
+        left: (n,) its values in one run, which count for energies and forces.
+        right: (n,) those in the other.
         reach: How far a fingertip gets from the foot of its arm [m].
         timestep: The longer of the two [s].
         given: Values by kind that win over ours [SI].

@@ -130,6 +130,22 @@ class _Ended(BaseException):
     """A signal to end came; `args` has its number."""
 
 
+def _handlers_to_end() -> dict[int, Any]:
+    """Return the handlers of the signals to end that are not ignored, by their numbers."""
+    handlers: dict[int, Any] = {}
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", None), signal.SIGINT):
+        if number is not None:
+            handler = signal.getsignal(number)
+            if handler not in (signal.SIG_IGN, None):
+                handlers[number] = handler
+    return handlers
+
+
+def _restore(handlers: dict[int, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
 @contextmanager
 def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
     """SIGTERM, SIGHUP and SIGINT let what is inside clean up, and then end the process as ever.
@@ -158,12 +174,7 @@ def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
         if at_once:
             raise_if_ended()
 
-    before = {
-        number: handler
-        for number in (signal.SIGTERM, getattr(signal, "SIGHUP", None), signal.SIGINT)
-        if number is not None
-        and (handler := signal.getsignal(number)) not in (signal.SIG_IGN, None)
-    }
+    before = _handlers_to_end()
     ended = 0
     try:
         for number in before:
@@ -173,8 +184,7 @@ def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
     except _Ended as error:
         (ended,) = error.args
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        _restore(before)
     if ended:
         signal.raise_signal(ended)
         raise SystemExit(128 + ended)  # where somebody else takes the signal, and goes on

@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO, Literal, cast
 
 from . import signal_name
 from .places import View, bare_python
@@ -43,6 +43,9 @@ _PATIENCE = 2.0  # seconds to end what a command left behind
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 # Where a process cannot limit its computing time, it is watched from outside.
 WATCHED = sys.platform == "win32"
+
+
+End = Literal["code", "signal", "memory", "cpu", "clock", "flood"]
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class ProcessOutcome:
         how: The same in words that follow "it": "ended the process with code 1".
     """
 
-    end: Literal["code", "signal", "memory", "cpu", "clock", "flood"]
+    end: End
     code: int
     started: bool
     stdout: str
@@ -71,33 +74,61 @@ class ProcessOutcome:
     how: str
 
 
+@dataclass(frozen=True)
+class Limits:
+    """What a command may take.
+
+    Attributes:
+        cpu: Seconds that it may compute, on all processors together.
+        wall: Seconds on the clock that it may take; at their end, on POSIX, it gets SIGPROF, so
+            that a handler may tell where it is.
+        start: Seconds on the clock that it may take until it is ready, and `wall` begins.
+        start_cpu: Seconds of computing until then that are not counted: for a command that
+            limits itself from there (`limit_cpu`).
+        output_most: Bytes of stdout, and of stderr, to keep.
+        memory_most: Bytes of address space of each process, where the system can limit it.
+    """
+
+    cpu: float
+    wall: float
+    start: float = 60.0
+    start_cpu: float = 0.0
+    output_most: int = 1_000_000
+    memory_most: int = MEMORY_MOST
+
+
+@dataclass(frozen=True)
+class _Home:
+    """What a command has of the files of this machine.
+
+    Attributes:
+        folder: The only folder in which it can write, where it is shut in; else "".
+        view: The folder with what it sees beside, as `_launcher` reads it; "" for all.
+        environment: Variables that lead it to its home.
+    """
+
+    folder: str
+    view: str
+    environment: dict[str, str]
+
+
 def run(
     command: Sequence[str],
+    limits: Limits,
     *,
-    cpu: float,
-    wall: float,
     started: Callable[[], bool] = lambda: True,
-    start: float = 60.0,
-    start_cpu: float = 0.0,
     cwd: str | os.PathLike[str] | None = None,
     env: Mapping[str, str] | None = None,
     writable: str | os.PathLike[str] | None = None,
     view: View | None = None,
-    output_most: int = 1_000_000,
-    memory_most: int = MEMORY_MOST,
     stop: threading.Event | None = None,
 ) -> ProcessOutcome:
     """Run a command to its end, or to that of its time; nothing of it is left afterwards.
 
     Args:
         command: Program and arguments.
-        cpu: Seconds that it may compute, on all processors together.
-        wall: Seconds on the clock that it may take; at their end, on POSIX, it gets SIGPROF, so
-            that a handler may tell where it is.
-        started: Tells when it is ready, and `wall` begins.
-        start: Seconds on the clock that it may take until then.
-        start_cpu: Seconds of computing until then that are not counted: for a command that
-            limits itself from there (`limit_cpu`).
+        limits: What it may take.
+        started: Tells when it is ready, and the limits of time begin.
         cwd: Where it runs; None for here.
         env: Its environment; None for ours.
         writable: The folder in which it has its home and its temporary files; where it is
@@ -105,34 +136,23 @@ def run(
             sight. None for none of this.
         view: With `writable`: all that it sees of the files of this machine, beside that folder,
             where it is `shut_in`. None for all.
-        output_most: Bytes of stdout, and of stderr, to keep.
-        memory_most: Bytes of address space of each process, where the system can limit it.
         stop: Set by another thread, it ends the command as the time limit does.
 
     Raises:
         FileNotFoundError: `cwd` is not there, or on Windows the program.
     """
     token, stopped = secrets.token_hex(16), stop or threading.Event()
-    place, home = "", dict[str, str]()
     with ExitStack() as stack:
-        seen = ""
+        home = _Home("", "", {})
         if writable is not None:
-            place = str(Path(writable).resolve())
-            home.update(dict.fromkeys(("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP"), place))
-            if site.ENABLE_USER_SITE:  # what is installed in ours is found
-                home["PYTHONUSERBASE"] = site.getuserbase()
-            if not shut_in():
-                place = ""
-            elif view is not None:
-                seen = stack.enter_context(_written(view))
-        limits = (os.getpid(), memory_most, math.ceil(cpu + start_cpu), _FILE_MOST, place, seen)
-        launched = [sys.executable, "-I", "-S", _LAUNCHER, *map(str, limits)]
+            home = stack.enter_context(_home_in(writable, view))
         out, err = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+        environment = dict(os.environ if env is None else env) | home.environment
         began = time.monotonic()
         process = subprocess.Popen(
-            [*(launched if os.name == "posix" else ()), *command],
+            [*_launched(limits, home), *command],
             cwd=cwd,
-            env={**(os.environ if env is None else env), **home, _TOKEN: token},
+            env=environment | {_TOKEN: token},
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=err,
@@ -140,17 +160,20 @@ def run(
         )
         before = 0.0
 
+        def ready() -> str:
+            return "ready" if started() else ""
+
         def exceeded() -> str:
-            if WATCHED and cpu_of(process) - before > cpu:
+            if WATCHED and cpu_of(process) - before > limits.cpu:
                 return "cpu"
             flooded = any(os.fstat(file.fileno()).st_size > _FLOOD for file in (out, err))
             return "flood" if flooded else ""
 
         try:
-            end = _wait(process, began + start, lambda: "ready" if started() else "", stopped)
+            end = _wait(process, began + limits.start, ready, stopped)
             if is_ready := end == "ready":
                 before = cpu_of(process) if WATCHED else 0.0
-                end = _wait(process, time.monotonic() + wall, exceeded, stopped)
+                end = _wait(process, time.monotonic() + limits.wall, exceeded, stopped)
             took = time.monotonic() - began
             if is_ready and end == "clock":
                 _ask_where(process, token)
@@ -159,24 +182,86 @@ def run(
             used = _reap(process)
         for file in (out, err):
             file.seek(0)
-        texts = [file.read(output_most).decode("utf-8", "replace") for file in (out, err)]
-    code = process.returncode if end == "code" else 0
+        stdout, stderr = (file.read(limits.output_most) for file in (out, err))
+    errors = stderr.decode("utf-8", "replace")
+    end, code = _told_end(end, process.returncode, errors, used >= limits.cpu)
+    return ProcessOutcome(
+        end=end,
+        code=code,
+        started=is_ready or started(),
+        stdout=stdout.decode("utf-8", "replace"),
+        stderr=errors,
+        wall=took,
+        cpu=used,
+        how=_how(end, code, used, limits.cpu, limits.wall if is_ready else limits.start),
+    )
+
+
+def _launched(limits: Limits, home: _Home) -> list[str]:
+    """Return what begins a command, so that the system limits it."""
+    if os.name != "posix":
+        return []
+    computing = math.ceil(limits.cpu + limits.start_cpu)
+    words = os.getpid(), limits.memory_most, computing, _FILE_MOST, home.folder, home.view
+    return [sys.executable, "-I", "-S", _LAUNCHER, *map(str, words)]
+
+
+@contextmanager
+def _home_in(writable: str | os.PathLike[str], view: View | None) -> Iterator[_Home]:
+    """Give a command its home in a folder; with a view, where it is shut in, nothing else."""
+    folder = str(Path(writable).resolve())
+    environment: dict[str, str] = dict.fromkeys(
+        ("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP"), folder
+    )
+    if site.ENABLE_USER_SITE:  # what is installed in ours is found
+        environment["PYTHONUSERBASE"] = site.getuserbase()
+    if not shut_in():
+        yield _Home("", "", environment)
+    elif view is None:
+        yield _Home(folder, "", environment)
+    else:
+        with _written(view) as seen:
+            yield _Home(folder, seen, environment)
+
+
+def _told_end(end: str, returncode: int, stderr: str, used_up: bool) -> tuple[End, int]:
+    """Return what ended a command, and its exit code or the number of the signal that did.
+
+    Args:
+        end: What the waiting for it ended with.
+        returncode: As `subprocess` has it.
+        stderr: What it wrote.
+        used_up: Whether it has computed as long as it may.
+    """
+    code = returncode if end == "code" else 0
     if code < 0:
         code = -code
         of_a_limit = code in (signal.SIGPROF, signal.SIGXCPU)
-        end = "cpu" if of_a_limit or (code == signal.SIGKILL and used >= cpu) else "signal"
-    if end != "cpu" and code and re.search(_NO_MEMORY, texts[1][-2000:]):
+        end = "cpu" if of_a_limit or (code == signal.SIGKILL and used_up) else "signal"
+    if end != "cpu" and code and re.search(_NO_MEMORY, stderr[-2000:]):
         end = "memory"
-    words = {
+    return cast("End", end), code
+
+
+def _how(end: End, code: int, used: float, most_cpu: float, most_clock: float) -> str:
+    """Return how a command ended, in words that follow "it".
+
+    Args:
+        end: What ended it.
+        code: Its exit code, or the number of the signal that ended it.
+        used: How long it computed [s].
+        most_cpu: How long it could compute [s].
+        most_clock: How long it could take on the clock [s].
+    """
+    words: dict[End, str] = {
         "code": f"ended the process with code {code}",
         "signal": f"crashed the process ({signal_name(code)})",
         "memory": "asks for more memory than there is for it",
-        "cpu": f"took longer than {cpu:g} s of computing",
-        "clock": f"took longer than {wall if is_ready else start:g} s on the clock, and computed "
-        f"for {used:.1f} s",
+        "cpu": f"took longer than {most_cpu:g} s of computing",
+        "clock": f"took longer than {most_clock:g} s on the clock, and computed for {used:.1f} s",
         "flood": f"prints more than {_FLOOD >> 20} MB, and was ended there",
     }
-    return ProcessOutcome(end, code, is_ready or started(), *texts, took, used, words[end])  # pyright: ignore
+    return words[end]
 
 
 _asked = threading.Lock()

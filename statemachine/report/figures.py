@@ -196,9 +196,9 @@ def _traces(axes: Any, picture: Traces) -> None:
     if picture.tolerance:
         axes.axhline(picture.tolerance, color=INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
     if picture.floor is not None:
-        x, y = map(np.asarray, picture.floor)
-        axes.fill_between(x, axes.get_ylim()[0], y, where=y > least, color=_FLOOR, linewidth=0,
-                          zorder=0.5)  # fmt: skip
+        x, y = (np.asarray(values) for values in picture.floor)
+        style = {"color": _FLOOR, "linewidth": 0, "zorder": 0.5}
+        axes.fill_between(x, axes.get_ylim()[0], y, where=y > least, **style)
     axes.set_xlabel(picture.across)
     axes.set_ylabel(picture.up)
     axes.spines[["top", "right"]].set_visible(False)

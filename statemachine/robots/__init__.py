@@ -269,11 +269,9 @@ def _examined(
         command, environment = fresh_python(f"{__package__}.examine:main", *words)
         outcome = sandbox.run(
             command,
-            cpu=4 * seconds + 60,
-            wall=seconds,
+            sandbox.Limits(cpu=4 * seconds + 60, wall=seconds, memory_most=_MEMORY),
             cwd=folder,  # engines leave logs where they run
             env={**environment, **ALONE},
-            memory_most=_MEMORY,
             stop=stop,
         )
         if stop.is_set():

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .files import export_csv, model_file, read, shipped, shipped_names, write
     from .header import COLUMNS, CONTACTS, Header
-    from .recorder import record
+    from .recorder import RunMetadata, RunStart, record
     from .rerun import (
         Rerun,
         SideStart,
@@ -35,6 +35,8 @@ _HOMES = {
     "CONTACTS": "header",
     "Header": "header",
     "Rerun": "rerun",
+    "RunMetadata": "recorder",
+    "RunStart": "recorder",
     "SideStart": "rerun",
     "Trace": "trace",
     "beginning_with": "rerun",
@@ -58,6 +60,8 @@ __all__ = [
     "CONTACTS",
     "Header",
     "Rerun",
+    "RunMetadata",
+    "RunStart",
     "SideStart",
     "Trace",
     "beginning_with",

@@ -86,8 +86,11 @@ def said(error: BaseException) -> str:
         EOFError: "EOFError: it asks for input, and nobody types here. A function gets what it "
         'needs as arguments; the rest belongs below `if __name__ == "__main__":`',
     }
-    other = f"{type(error).__name__}{': ' * bool(words)}{words}"
-    return next((text for kind, text in known.items() if isinstance(error, kind)), other)
+    for kind, text in known.items():
+        if isinstance(error, kind):
+            return text
+    name = type(error).__name__
+    return f"{name}: {words}" if words else name
 
 
 Function = Callable[..., Any]
@@ -148,7 +151,13 @@ def function_scenario(
     begins = "the default state" if keyframe is None else f"the keyframe {keyframe!r}"
     says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
     return Scenario(
-        *(called, says, "", 2.0, controller_of, says, lambda _model: None),
+        name=called,
+        says=says,
+        model="",
+        seconds=2.0,
+        controller=controller_of,
+        elsewhere=says,
+        needs=lambda _model: None,
         keyframe=keyframe,
         own=True,
     )
@@ -223,7 +232,9 @@ def _function(path: Path, name: str) -> Function:
     function = getattr(module, name, None)
     if not callable(function):
         functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
-        hint = did_you_mean(name, functions) or f"; it has {few(functions)}" * bool(functions)
+        hint = did_you_mean(name, functions)
+        if functions and not hint:
+            hint = f"; it has {few(functions)}"
         raise BadInputError(f"{path.name} has no function {name}({', '.join(_TAKES)}){hint}")
     return function
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, refuse
+from ..errors import BadInputError, DivergedError
 from ..interface import Data, Model, make_data, step
 
 Progress = Callable[[float], None]  # told the fraction that is done
@@ -41,16 +41,16 @@ def cost_of_a_second(model: Model) -> float:
 
 
 def steps_in(model: Model, seconds: float) -> int:
-    """Number of timesteps in a time, at least one."""
+    """Return the number of timesteps in a time, at least one."""
     steps = max(1.0, seconds / model.timestep)
-    refuse(
-        (not np.isfinite(seconds) or seconds <= 0, f"seconds must be above 0; got {seconds}"),
-        (
-            steps * model.substeps > _STEPS_MOST,
-            f"{seconds:g} s are {steps * model.substeps:.3g} steps of the engine, and a run has "
-            f"at most {_STEPS_MOST:,}",
-        ),
-    )
+    if not np.isfinite(seconds) or seconds <= 0:
+        raise BadInputError(f"seconds must be above 0; got {seconds}")
+    engine_steps = steps * model.substeps
+    if engine_steps > _STEPS_MOST:
+        raise BadInputError(
+            f"{seconds:g} s are {engine_steps:.3g} steps of the engine, and a run has at most "
+            f"{_STEPS_MOST:,}"
+        )
     return round(steps)
 
 

@@ -6,11 +6,10 @@ import csv
 import dataclasses
 import itertools
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -198,17 +197,12 @@ def _write_contacts(file: str, trace: Trace) -> None:
     columns = (
         trace[f"contact_{name}"].tolist() for name in ("row", "geom", "dist", "pos", "force")
     )
-    rows = (
-        [
-            float(trace.time[row]),
-            *(header.geoms[geom] or f"geom {geom}" for geom in geoms),
-            *(header.bodies[header.geom_bodyid[geom]] for geom in geoms),
-            distance,
-            *position,
-            *force,
-        ]
-        for row, geoms, distance, position, force in zip(*columns, strict=True)
-    )
+    rows: list[list[str | float]] = []
+    for row, geoms, distance, position, force in zip(*columns, strict=True):
+        names = [header.geoms[geom] or f"geom {geom}" for geom in geoms]
+        bodies = [header.bodies[header.geom_bodyid[geom]] for geom in geoms]
+        time = float(trace.time[row])
+        rows.append([time, *names, *bodies, distance, *position, *force])
     _write_rows(file, labels, rows)
 
 
@@ -249,7 +243,7 @@ def coordinate_labels(header: Header, positions: bool) -> list[str]:
     return labels
 
 
-def _write_rows(name: str, labels: list[str], rows: Iterable[list[Any]]) -> None:
+def _write_rows(name: str, labels: list[str], rows: Iterable[Sequence[str | float]]) -> None:
     with open(name, "w", encoding="utf-8", newline="") as out:
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(labels)

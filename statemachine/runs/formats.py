@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.lib import format as npy
 
-from ..errors import TraceError, refuse
+from ..errors import TraceError
 from ..installed import require_extra
 from ..interface import MOCAP
 from .header import COLUMNS, CONTACTS, INPUTS, Header
@@ -64,13 +64,12 @@ def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     entries: dict[str, zipfile.ZipInfo] = {}
     for entry in archive.infolist():
         name = entry.filename.removesuffix(".npy")
-        refuse(
-            (name == entry.filename, f"holds {name[:40]!r}, which is not an array"),
-            # Where a damaged list of contents hides its next entries.
-            (entry.comment or entry.extra, "has a damaged list of contents"),
-            (name in entries, f"holds two arrays {name[:40]!r}"),
-            error=TraceError,
-        )
+        if name == entry.filename:
+            raise TraceError(f"holds {name[:40]!r}, which is not an array")
+        if entry.comment or entry.extra:  # where a damaged list of contents hides its next entries
+            raise TraceError("has a damaged list of contents")
+        if name in entries:
+            raise TraceError(f"holds two arrays {name[:40]!r}")
         entries[name] = entry
     return entries
 
@@ -90,12 +89,11 @@ def _describe(
 
 def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
     shape, kind = _describe(archive, entry)
+    if kind != np.uint8 or len(shape) != 1:
+        raise TraceError("has a header that is not text: it is not a trace")
     size = math.prod(shape)
-    refuse(
-        (kind != np.uint8 or len(shape) != 1, "has a header that is not text: it is not a trace"),
-        (size > _HEADER_MOST, f"has a header of {size:,} bytes; at most {_HEADER_MOST:,}"),
-        error=TraceError,
-    )
+    if size > _HEADER_MOST:
+        raise TraceError(f"has a header of {size:,} bytes; at most {_HEADER_MOST:,}")
     return Header.from_json(_array_of(archive, entry).tobytes().decode())
 
 

@@ -6,11 +6,11 @@ import dataclasses
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Sized
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import TraceError, refuse
+from ..errors import TraceError
 from ..interface import OPTIONS, JointType
 from ..interface.options import HUGE
 from ..release_names import engine_of
@@ -182,32 +182,44 @@ class Header:
 
     def _check(self) -> None:
         _check_fields(self)
-        joints, bodies, nu = len(self.joints), len(self.bodies), self.nu
-        # How many numbers each list has, and between which they lie.
-        for name, length, least, below in (
-            ("jnt_type", joints, 0, len(JointType)),
-            ("jnt_qposadr", joints, 0, self.nq),
-            ("jnt_dofadr", joints, 0, self.nv),
-            ("geom_bodyid", len(self.geoms), 0, bodies),
-            ("body_parentid", bodies, 0, bodies),
-            ("actuator_jntid", nu, -1, joints),
-            ("actuators", nu, None, None),
-            ("ctrlrange", nu, None, None),
-            ("jnt_bodyid", len(self.jnt_bodyid) and joints, 0, bodies),
-        ):
-            entries = getattr(self, name)
-            beyond = below is not None and not all(least <= k < below for k in entries)
-            refuse(
-                (len(entries) != length, f"{name} of the trace has {len(entries)} entries"),
-                (beyond, f"{name} of the trace names one that is not there"),
-                error=TraceError,
-            )
+        joints, bodies = len(self.joints), len(self.bodies)
+        _check_ids("jnt_type", self.jnt_type, joints, range(len(JointType)))
+        _check_ids("jnt_qposadr", self.jnt_qposadr, joints, range(self.nq))
+        _check_ids("jnt_dofadr", self.jnt_dofadr, joints, range(self.nv))
+        _check_ids("geom_bodyid", self.geom_bodyid, len(self.geoms), range(bodies))
+        _check_ids("body_parentid", self.body_parentid, bodies, range(bodies))
+        _check_ids("actuator_jntid", self.actuator_jntid, self.nu, range(-1, joints))
+        _check_length("actuators", self.actuators, self.nu)
+        _check_length("ctrlrange", self.ctrlrange, self.nu)
+        if self.jnt_bodyid:  # traces before it have none
+            _check_ids("jnt_bodyid", self.jnt_bodyid, joints, range(bodies))
         for name, kind, qpos, dof in zip(
             self.joint_labels, self.jnt_type, self.jnt_qposadr, self.jnt_dofadr, strict=True
         ):
             of = JointType(kind)
             if qpos + of.nq > self.nq or dof + of.nv > self.nv:
                 raise TraceError(f"{name} of the trace has no place in qpos and qvel")
+
+
+def _check_length(name: str, entries: Sized, length: int) -> None:
+    """Check that a list of a header has as many entries as it should.
+
+    Raises:
+        TraceError: It has more or fewer.
+    """
+    if len(entries) != length:
+        raise TraceError(f"{name} of the trace has {len(entries)} entries")
+
+
+def _check_ids(name: str, ids: Sequence[int], length: int, known: range) -> None:
+    """Check that a list of ids has as many as it should, each of what is there.
+
+    Raises:
+        TraceError: It has more or fewer, or one is of what is not there.
+    """
+    _check_length(name, ids, length)
+    if not all(number in known for number in ids):
+        raise TraceError(f"{name} of the trace names one that is not there")
 
 
 def labels_of_joints(
@@ -266,43 +278,93 @@ def _count(value: Any) -> bool:
     return _integer(value) and 0 <= value < 10**6
 
 
+def _timestep(value: Any) -> bool:
+    return isinstance(value, float) and 0 < value < 1e6
+
+
+def _defaults(value: Any) -> bool:
+    return value in ("model", "engine")
+
+
+def _options(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    return all(_option(name, option) for name, option in value.items())
+
+
+def _text_or_none(value: Any) -> bool:
+    return value is None or _text(value)
+
+
+def _integer_or_none(value: Any) -> bool:
+    return value is None or _integer(value)
+
+
+def _vector(value: Any) -> bool:
+    return _finites(value) and len(value) == 3
+
+
+def _interval(value: Any) -> bool:
+    return _tuple_of(_number)(value) and len(value) == 2
+
+
+def _switch(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+def _versions(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    return all(_text(name) and _text(version) for name, version in value.items())
+
+
+_texts, _integers, _finites = _tuple_of(_text), _tuple_of(_integer), _tuple_of(_finite)
+_intervals = _tuple_of(_interval)
 _KINDS: dict[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(("nq", "nv", "nu", "nmocap", "substeps"), _count),
-    "timestep": lambda value: isinstance(value, float) and 0 < value < 1e6,
-    **dict.fromkeys(("experiment", "says", "command", "energy_by", "ended"), _text),
-    "defaults": lambda value: value in ("model", "engine"),
-    "options": lambda value: (
-        isinstance(value, dict) and all(_option(name, each) for name, each in value.items())
-    ),
-    "keyframe": lambda value: value is None or _text(value),
-    "gravity": lambda value: _tuple_of(_finite)(value) and len(value) == 3,
-    **dict.fromkeys(("joints", "sites", "bodies", "geoms", "actuators"), _tuple_of(_text)),
-    **dict.fromkeys(
-        (
-            *("jnt_type", "jnt_qposadr", "jnt_dofadr"),
-            *("jnt_bodyid", "geom_bodyid", "body_parentid", "actuator_jntid"),
-        ),
-        _tuple_of(_integer),
-    ),
-    "ctrlrange": _tuple_of(lambda row: _tuple_of(_number)(row) and len(row) == 2),
+    "nq": _count,
+    "nv": _count,
+    "nu": _count,
+    "nmocap": _count,
+    "substeps": _count,
+    "timestep": _timestep,
+    "experiment": _text,
+    "says": _text,
+    "command": _text,
+    "energy_by": _text,
+    "ended": _text,
+    "defaults": _defaults,
+    "options": _options,
+    "keyframe": _text_or_none,
+    "gravity": _vector,
+    "joints": _texts,
+    "sites": _texts,
+    "bodies": _texts,
+    "geoms": _texts,
+    "actuators": _texts,
+    "jnt_type": _integers,
+    "jnt_qposadr": _integers,
+    "jnt_dofadr": _integers,
+    "jnt_bodyid": _integers,
+    "geom_bodyid": _integers,
+    "body_parentid": _integers,
+    "actuator_jntid": _integers,
+    "ctrlrange": _intervals,
     "rewritten": _integer,
-    "single": lambda value: isinstance(value, bool),
+    "single": _switch,
 }
 _OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {
     "backend": _text,
-    "versions": lambda value: (
-        isinstance(value, dict) and all(map(_text, (*value, *value.values())))
-    ),
+    "versions": _versions,
     "model_file": _text,
     "model_sha256": _text,
     "timestep": _number,
-    "emulated": _tuple_of(_text),
-    "seed": lambda value: value is None or _integer(value),
+    "emulated": _texts,
+    "seed": _integer_or_none,
 }
 
 
 def _check_fields(header: Header) -> None:
-    """Every field is of its kind, and no name stands twice.
+    """Check that every field is of its kind, and that no name stands twice.
 
     Raises:
         TraceError: One is not.

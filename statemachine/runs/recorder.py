@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..backends import on_default
 from ..engines import room
@@ -42,22 +44,70 @@ from .robot import warn_of_start
 from .trace import COLUMNS, CONTACTS, Trace
 
 
+@dataclass(frozen=True, eq=False)
+class RunStart:
+    """The state that a run starts in.
+
+    Attributes:
+        keyframe: A keyframe, by number or name; None for the default state.
+        state: A State to start from instead.
+        qpos: (nq,) positions [rad or m] that are written over that start; None for its own.
+        qvel: (nv,) velocities [rad/s or m/s] that are written over it; None for its own.
+
+    Raises:
+        BadInputError: It is a keyframe and a State.
+    """
+
+    keyframe: int | str | None = None
+    state: State | None = None
+    qpos: ArrayLike | None = None
+    qvel: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.state is not None and self.keyframe is not None:
+            raise BadInputError("a run starts from a keyframe or from a State, not from both")
+
+    def put(self, model: Model, data: Data) -> None:
+        """Put a Data of a Model to this start."""
+        if self.state is not None:
+            set_state(model, data, self.state)
+        else:
+            reset(model, data, self.keyframe)
+        if self.qpos is not None:
+            data.qpos = self.qpos
+        if self.qvel is not None:
+            data.qvel = self.qvel
+
+
+@dataclass(frozen=True, eq=False)
+class RunMetadata:
+    """The facts of a run that its trace carries in the header.
+
+    Attributes:
+        experiment: Its name; "" for that of the controller.
+        says: What happens, in a sentence.
+        command: What makes it again.
+        defaults: What `load` was given.
+        options: What `Model.replace` was given.
+        seed: What the controller was drawn from; None for nothing.
+    """
+
+    experiment: str = ""
+    says: str = ""
+    command: str = ""
+    defaults: Defaults = "model"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = None
+
+
 def record(
     model: Model,
     controller: Controller | None = None,
     seconds: float = 2.0,
     *,
-    keyframe: int | str | None = None,
-    state: State | None = None,
-    qpos: Any = None,
-    qvel: Any = None,
+    start: RunStart = RunStart(),
+    metadata: RunMetadata = RunMetadata(),
     derive: bool = True,
-    experiment: str = "",
-    says: str = "",
-    command: str = "",
-    defaults: Defaults = "model",
-    options: dict[str, Any] | None = None,
-    seed: int | None = None,
     writes_state: bool = True,
     progress: Progress = silent,
 ) -> Trace:
@@ -68,17 +118,9 @@ def record(
         controller: Called before each step as f(time, data); what it returns is the ctrl
             (nu,) of that step, None leaves ctrl alone. Without one nobody writes ctrl.
         seconds: Simulated time.
-        keyframe: Where to start, by number or name; None for the default state.
-        state: A State to start from instead.
-        qpos: (nq,) and qvel (nv,), written over that start.
-        qvel: See qpos.
+        start: Where to start; the default state where nothing is said.
+        metadata: What the header of the trace says of the run.
         derive: Whether to repeat the run and record what the engine derives, too.
-        experiment: Its name for the header; says: what happens; command: what makes it again.
-        says: See experiment.
-        command: See experiment.
-        defaults: What `load` was given, for the header; options: what `replace` was.
-        options: See defaults.
-        seed: What the controller was drawn from, for the header.
         writes_state: Whether the controller may write more than ctrl.
         progress: Told the fraction that is done.
 
@@ -90,53 +132,28 @@ def record(
         BadInputError: The controller gave something that is not ctrl, or `seconds` is not a time.
         EngineError: The repetition did not end in the same bits.
     """
-    if state is not None and keyframe is not None:
-        raise BadInputError("a run starts from a keyframe or from a State, not from both")
     total = steps_in(model, seconds)
-
-    def begin(model: Model, data: Data) -> None:
-        if state is not None:
-            set_state(model, data, state)
-        else:
-            reset(model, data, keyframe)
-        if qpos is not None:
-            data.qpos = qpos
-        if qvel is not None:
-            data.qvel = qvel
-
     share = 0.3 if derive else 1.0
     with make_data(model) as data:
-        begin(model, data)
+        start.put(model, data)
         warn_of_start(model, data)
         inputs, ended = _run(model, data, controller, total, part_of(progress, 0.0, share))
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""
     if derive:
-        more, rewritten = derived(model, begin, inputs, part_of(progress, share, 1.0 - share))
+        more, rewritten = derived(model, start.put, inputs, part_of(progress, share, 1.0 - share))
         if rewritten and (controller is None or not writes_state):
             raise EngineError(
                 f"the run could not be repeated: {rewritten} rows began in another state; the "
                 "engine does not give the same bits twice"
             )
         columns |= more
+        gravity = metadata.options.get("gravity")
         columns["energy"], energy_by = energies(
-            model, defaults, inputs["qpos"], inputs["qvel"], (options or {}).get("gravity")
+            model, metadata.defaults, inputs["qpos"], inputs["qvel"], gravity
         )
-    header = Header(
-        experiment=experiment or getattr(controller, "__name__", "") or "run",
-        says=says,
-        command=command,
-        provenance=provenance(model, seed),
-        defaults=defaults,
-        options={
-            name: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-            for name, value in (options or {}).items()
-        },
-        keyframe=None if keyframe is None else model.keyframes[model.key_id(keyframe)].name,
-        timestep=model.timestep,
-        substeps=model.substeps,
-        gravity=tuple(model.gravity.tolist()),
-        **layout_of(model),
+    header = replace(
+        _header(model, controller, start, metadata),
         energy_by=energy_by,
         rewritten=rewritten,
         ended=ended,
@@ -144,30 +161,93 @@ def record(
     return Trace(header, columns)
 
 
-def layout_of(model: Model) -> dict[str, Any]:
-    """What a header says of a model: lengths, names, and where everything is."""
-    return {
-        **{name: getattr(model, name) for name in ("nq", "nv", "nu", "nmocap")},
+def _header(
+    model: Model, controller: Controller | None, start: RunStart, metadata: RunMetadata
+) -> Header:
+    """Return what is known of a run before it begins."""
+    return Header(
+        experiment=_experiment(metadata, controller),
+        says=metadata.says,
+        command=metadata.command,
+        provenance=provenance(model, metadata.seed),
+        defaults=metadata.defaults,
+        options={name: _plain(value) for name, value in metadata.options.items()},
+        keyframe=_keyframe_name(model, start.keyframe),
+        timestep=model.timestep,
+        substeps=model.substeps,
+        gravity=tuple(model.gravity.tolist()),
+        **layout_of(model),
+    )
+
+
+def _experiment(metadata: RunMetadata, controller: Controller | None) -> str:
+    """Return the name of an experiment: as it is said, else that of its controller."""
+    if metadata.experiment:
+        return metadata.experiment
+    return getattr(controller, "__name__", "") or "run"
+
+
+def _plain(option: Any) -> Any:
+    """Return the value of an option, an array as a list."""
+    return option.tolist() if isinstance(option, np.ndarray | np.generic) else option
+
+
+def _keyframe_name(model: Model, keyframe: int | str | None) -> str | None:
+    """Return the name of a keyframe that is given by number or name."""
+    return None if keyframe is None else model.keyframes[model.key_id(keyframe)].name
+
+
+class ModelLayout(TypedDict):
+    """The fields of a `Header` that are a model's: lengths, names, and where everything is."""
+
+    nq: int
+    nv: int
+    nu: int
+    nmocap: int
+    joints: tuple[str, ...]
+    sites: tuple[str, ...]
+    bodies: tuple[str, ...]
+    geoms: tuple[str, ...]
+    actuators: tuple[str, ...]
+    jnt_type: tuple[int, ...]
+    jnt_qposadr: tuple[int, ...]
+    jnt_dofadr: tuple[int, ...]
+    jnt_bodyid: tuple[int, ...]
+    geom_bodyid: tuple[int, ...]
+    body_parentid: tuple[int, ...]
+    actuator_jntid: tuple[int, ...]
+    ctrlrange: tuple[tuple[float, ...], ...]
+
+
+def layout_of(model: Model) -> ModelLayout:
+    """Return what a header says of a model: lengths, names, and where everything is."""
+    ctrlrange = tuple(tuple(row) for row in model.actuator_ctrlrange.tolist())
+    layout: ModelLayout = {
+        "nq": model.nq,
+        "nv": model.nv,
+        "nu": model.nu,
+        "nmocap": model.nmocap,
         "joints": model.joint_names,
         "sites": model.site_names,
         "bodies": model.body_names,
         "geoms": model.geom_names,
         "actuators": model.actuator_names,
-        **{
-            name: tuple(getattr(model, name).tolist())
-            for name in (
-                *("jnt_type", "jnt_qposadr", "jnt_dofadr"),
-                *("jnt_bodyid", "geom_bodyid", "body_parentid", "actuator_jntid"),
-            )
-        },
-        "ctrlrange": tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),
+        "jnt_type": tuple(model.jnt_type.tolist()),
+        "jnt_qposadr": tuple(model.jnt_qposadr.tolist()),
+        "jnt_dofadr": tuple(model.jnt_dofadr.tolist()),
+        "jnt_bodyid": tuple(model.jnt_bodyid.tolist()),
+        "geom_bodyid": tuple(model.geom_bodyid.tolist()),
+        "body_parentid": tuple(model.body_parentid.tolist()),
+        "actuator_jntid": tuple(model.actuator_jntid.tolist()),
+        "ctrlrange": ctrlrange,
     }
+    return layout
 
 
 def _run(
     model: Model, data: Data, controller: Controller | None, total: int, progress: Progress
 ) -> tuple[Arrays, str]:
-    """The inputs of each row, as they are when the step begins, and why it ended early."""
+    """Run, and return the inputs of each row as the step begins, and why the run ended early."""
     times: list[float] = []
     rows: tuple[list[bytes], ...] = ([], [], [])
     led: dict[str, list[Array]] = {name: [] for name in MOCAP if model.nmocap}
@@ -191,17 +271,17 @@ def _run(
         # Without its advice, which is of no use here.
         ended = str(error).partition(". This Data")[0]
     kept = zip(INPUTS, rows, (model.nq, model.nv, model.nu), strict=True)
-    inputs = {"time": np.array(times)} | {
-        name: np.frombuffer(b"".join(parts)).reshape(len(times), width)
-        for name, parts, width in kept
-    }
+    inputs: Arrays = {"time": np.array(times)}
+    for name, parts, width in kept:
+        inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
     inputs |= {name: np.array(poses) for name, poses in led.items()}
     # The last rows may have finite numbers that no trace holds.
     state = np.hstack([inputs["qpos"], inputs["qvel"]])
     stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
     rows_left = int(np.append(0, stands)[-1]) + 1  # the first is what it started from
     if rows_left < len(times):
-        ended = ended or f"a coordinate left every bound at {times[-1]:g} s"
+        if not ended:
+            ended = f"a coordinate left every bound at {times[-1]:g} s"
         inputs = {name: array[:rows_left] for name, array in inputs.items()}
     for name, array in inputs.items():
         # A step finds what is not finite itself, but the last row has no step.
@@ -265,7 +345,7 @@ def derived(
 
 
 def is_stale(model: Model) -> bool:
-    """Whether derived values are, after a step, of the state that the step began in.
+    """Tell whether derived values are, after a step, of the state that the step began in.
 
     They are of the state before its last engine step, or of none (RK4): of a Model with several
     engine steps in one, or with that integrator, they must be asked for before the step.
@@ -275,7 +355,7 @@ def is_stale(model: Model) -> bool:
 
 
 def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
-    """Write row `k` of the inputs into a Data; whether it was in another state."""
+    """Write row `k` of the inputs into a Data, and tell whether it was in another state."""
     others = [n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()]
     for name in others:
         getattr(data, name)[:] = inputs[name][k]
@@ -286,7 +366,7 @@ def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
 
 
 def _one_more(model: Model, data: Data) -> None:
-    """The step that the last row would begin, so that it too is of the run itself.
+    """Take the step that the last row would begin, so that it too is of the run itself.
 
     `forward` may start afresh: PyBullet's contacts then lack what the run has built up.
     A state that no step stands, as the last of a run that diverged, has nothing better.
@@ -300,7 +380,7 @@ def _one_more(model: Model, data: Data) -> None:
 
 
 def array_or_nan(data: Data, name: str) -> Array:
-    """A derived array of a Data, copied; one that the backend does not tell is (nv,) NaN."""
+    """Return a derived array of a Data, copied; one that the backend does not tell is (nv,) NaN."""
     try:
         return np.array(getattr(data, name))  # it may be the engine's memory
     except UnsupportedError:
@@ -328,7 +408,7 @@ def energies(
     load: Callable[[Model], Model] = on_default,
     made: Callable[[Model], AbstractContextManager[Data]] = make_data,
 ) -> tuple[Array, str]:
-    """Kinetic and potential energy of states.
+    """Compute the kinetic and potential energy of states.
 
     They are those of the model's masses, rotors (armature) and gravity, computed by MuJoCo
     whatever engine the states come from: so two runs are measured by one yardstick. An

@@ -8,17 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import TraceError, refuse
+from ..errors import TraceError
 from ..interface import MOCAP, Array, Data, Model, make_data, reset
 from ..interface.records import Defaults
 from .drive import Controller, Progress, check_length, silent
-from .recorder import record
+from .header import Header
+from .recorder import RunMetadata, RunStart, record
 from .scenarios import Scenario
 from .trace import Trace
 
 
 class SideStart(NamedTuple):
-    """Where a run starts: qpos (nq,), qvel (nv,), ctrl (nu,)."""
+    """The start of a run: qpos (nq,), qvel (nv,), ctrl (nu,)."""
 
     qpos: Array
     qvel: Array
@@ -26,7 +27,7 @@ class SideStart(NamedTuple):
 
 
 def start_of(model: Model, keyframe: int | str | None) -> SideStart:
-    """Where a Model starts: in a keyframe, or in its default state if that is None."""
+    """Return where a Model starts: in a keyframe, or in its default state if that is None."""
     with make_data(model) as data:
         reset(model, data, keyframe)
         return SideStart(data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
@@ -34,15 +35,16 @@ def start_of(model: Model, keyframe: int | str | None) -> SideStart:
 
 @dataclass(frozen=True, eq=False)
 class Rerun:
-    """How a side is run, so that it can be run again. The fields are arguments of `record`.
+    """The run of a side, so that it can be run again.
 
     Attributes:
         model: With all its options.
         controller: Makes a fresh controller of a Model; it may give None for none.
         seconds: Simulated time.
         keyframe: Where it starts; qpos, qvel: written over that.
-        defaults, options: For the header of the trace.
-        experiment, says, seed: Likewise.
+        defaults: What `load` was given, for the header of the trace.
+        options: What `Model.replace` was given, likewise.
+        experiment, says, seed: Name, sentence and seed of what is done, likewise.
         writes_state: Whether the controller may write more than ctrl.
     """
 
@@ -59,17 +61,58 @@ class Rerun:
     seed: int | None = None
     writes_state: bool = True
 
-    def record(self, **arguments: Any) -> Trace:
-        """The run; `arguments` are further ones of `record`, which win."""
-        return record(**{**vars(self), "controller": self.controller(self.model), **arguments})
+    def record(
+        self,
+        *,
+        controller: Controller | None = None,
+        qpos: Array | None = None,
+        qvel: Array | None = None,
+        command: str = "",
+        derive: bool = True,
+        progress: Progress = silent,
+    ) -> Trace:
+        """Record the run.
+
+        Args:
+            controller: Instead of a fresh one.
+            qpos: (nq,) where it starts, instead of its own [rad or m].
+            qvel: (nv,) its velocities there, instead of its own [rad/s or m/s].
+            command: What makes the trace again.
+            derive: Whether to record what the engine derives, too.
+            progress: Told the fraction that is done.
+        """
+        start = RunStart(
+            keyframe=self.keyframe,
+            qpos=self.qpos if qpos is None else qpos,
+            qvel=self.qvel if qvel is None else qvel,
+        )
+        metadata = RunMetadata(
+            experiment=self.experiment,
+            says=self.says,
+            command=command,
+            defaults=self.defaults,
+            options=self.options,
+            seed=self.seed,
+        )
+        return record(
+            self.model,
+            self.controller(self.model) if controller is None else controller,
+            self.seconds,
+            start=start,
+            metadata=metadata,
+            derive=derive,
+            writes_state=self.writes_state,
+            progress=progress,
+        )
 
     def start(self) -> tuple[Array, Array]:
-        """Positions (nq,) and velocities (nv,) that it starts with."""
+        """Return the positions (nq,) and velocities (nv,) that it starts with."""
         qpos, qvel, _ = start_of(self.model, self.keyframe)
-        return (
-            qpos if self.qpos is None else np.array(self.qpos),
-            qvel if self.qvel is None else np.array(self.qvel),
-        )
+        if self.qpos is not None:
+            qpos = np.array(self.qpos)
+        if self.qvel is not None:
+            qvel = np.array(self.qvel)
+        return qpos, qvel
 
 
 def rerun_of(
@@ -81,13 +124,15 @@ def rerun_of(
     defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
 ) -> Rerun:
-    """How a scenario is run on a Model; arguments are those of `record_scenario`."""
+    """Return how a scenario is run on a Model; arguments are those of `record_scenario`."""
     scenario = scenario.on(model)
-    chosen = {**scenario.options, **(options or {})}
+    chosen = dict(scenario.options)
+    if options is not None:
+        chosen |= options
     return Rerun(
-        model.replace(**chosen) if chosen else model,
-        lambda replaced: scenario.controller(replaced, seed),
-        scenario.seconds if seconds is None else seconds,
+        model=model.replace(**chosen) if chosen else model,
+        controller=lambda replaced: scenario.controller(replaced, seed),
+        seconds=scenario.seconds if seconds is None else seconds,
         keyframe=scenario.keyframe,
         defaults=defaults,
         options=chosen,
@@ -104,18 +149,19 @@ def replayed(
     defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
 ) -> Rerun:
-    """The start and the commands of a trace on a Model of its layout."""
+    """Return the start and the commands of a trace on a Model of its layout."""
+    header = trace.header
     return Rerun(
-        model,
-        lambda _model: commands_of(trace),
-        float(trace.time[-1] - trace.time[0]),
+        model=model,
+        controller=lambda _model: commands_of(trace),
+        seconds=float(trace.time[-1] - trace.time[0]),
         qpos=trace.qpos[0],
         qvel=trace.qvel[0],
         defaults=defaults,
-        options=options or {},
-        experiment=trace.header.experiment,
-        says=trace.header.says,
-        seed=trace.header.provenance.seed,
+        options={} if options is None else options,
+        experiment=header.experiment,
+        says=header.says,
+        seed=header.provenance.seed,
         writes_state=False,
     )
 
@@ -165,44 +211,45 @@ def play(
     options: dict[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Trace:
-    """The ctrl of a trace, from the state it starts in, on another model or engine.
+    """Play the ctrl of a trace, from the state it starts in, on another model or engine.
 
     Where the timesteps differ, a command holds until the time of the next one.
 
     Raises:
         TraceError: The model has other joints or actuators, in name or in order.
     """
-    header = trace.header
-    refuse(
-        *(
-            (
-                tuple(ours) != tuple(theirs),
-                f"the trace has other {what} than {model.path.name}: "
-                f"{', '.join(theirs)} and {', '.join(ours)}",
-            )
-            for what, ours, theirs in (
-                ("joints", model.joint_names, header.joints),
-                ("actuators", model.actuator_names, header.actuators),
-            )
-        ),
-        (
-            (header.nq, header.nv) != (model.nq, model.nv),
-            "the trace's joints are of other kinds than the model's",
-        ),
-        (
-            header.nmocap != model.nmocap,
-            f"the trace has {header.nmocap} mocap bodies, and the model {model.nmocap}",
-        ),
-        error=TraceError,
-    )
+    _check_layout(trace.header, model)
     rerun = replayed(trace, model, defaults, options)
     return rerun.record(command=command, progress=progress)
 
 
-def commands_of(trace: Trace) -> Controller:
-    """A controller that gives the ctrl of a trace; a command holds until the time of the next.
+def _check_layout(header: Header, model: Model) -> None:
+    """Check that a Model has the joints, actuators and mocap bodies of a trace.
 
-    So it does with the poses of mocap bodies, which it writes.
+    Raises:
+        TraceError: It has others.
+    """
+    for what, ours, theirs in (
+        ("joints", model.joint_names, header.joints),
+        ("actuators", model.actuator_names, header.actuators),
+    ):
+        if tuple(ours) != tuple(theirs):
+            raise TraceError(
+                f"the trace has other {what} than {model.path.name}: "
+                f"{', '.join(theirs)} and {', '.join(ours)}"
+            )
+    if (header.nq, header.nv) != (model.nq, model.nv):
+        raise TraceError("the trace's joints are of other kinds than the model's")
+    if header.nmocap != model.nmocap:
+        raise TraceError(
+            f"the trace has {header.nmocap} mocap bodies, and the model {model.nmocap}"
+        )
+
+
+def commands_of(trace: Trace) -> Controller:
+    """Return a controller that gives the ctrl of a trace.
+
+    A command holds until the time of the next. The poses of mocap bodies are written likewise.
     """
     led = [name for name in MOCAP if name in trace]
     commands, start = trace.ctrl, float(trace.time[0])
@@ -223,7 +270,7 @@ def commands_of(trace: Trace) -> Controller:
 
 
 def beginning_with(first: Callable[[Data], Array], controller: Controller) -> Controller:
-    """A controller that begins with some ctrl (nu,), where it gives none of its own."""
+    """Return a controller that begins with some ctrl (nu,), where it gives none of its own."""
     begun = False
 
     def beginning(time: float, data: Data) -> Any:

@@ -154,15 +154,15 @@ def _warn_of_limits(model: Model, qpos: Array) -> None:
     starts = np.array([qpos, *(frame.qpos for frame in model.keyframes)])
     at, (low, high) = starts[:, model.jnt_qposadr[joints]], model.jnt_range[joints].T
     here, *there = np.maximum(low - at, at - high).round(6)
-    outside = [
-        f"{model.joint_names[joints[k]] or f'joint {joints[k]}'} by {here[k]:.3g}"
-        for k in np.argsort(-here, kind="stable")
-        if here[k] > _OUTSIDE
-    ]
+    outside: list[str] = []
+    for k in np.argsort(-here, kind="stable"):
+        if here[k] > _OUTSIDE:
+            name = model.joint_names[joints[k]] or f"joint {joints[k]}"
+            outside.append(f"{name} by {here[k]:.3g}")
     if outside:
         frames = zip(model.keyframes, there, strict=True)
         names = [f.name for f, beyond in frames if f.name and beyond.max() <= _OUTSIDE]
-        inside = _INSIDE.format(names=few(names, 3, " or ")) * bool(names)
+        inside = _INSIDE.format(names=few(names, 3, " or ")) if names else ""
         text = _START.format(joints=few(outside, 1), inside=inside)
         warnings.warn(text, EngineWarning, stacklevel=4)
 

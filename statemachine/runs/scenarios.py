@@ -118,77 +118,89 @@ def _waves(model: Model, seed: int) -> Controller:
     return controller
 
 
-SCENARIOS = {
-    scenario.name: scenario
-    for scenario in (
-        Scenario(
-            "hold",
-            "The arm is told one pose and goes there; on the way a finger meets the floor.",
-            "so101/scene",
-            2.0,
-            lambda model, _seed: _constant(hold_ctrl(model)),
-            "Each position servo is told a pose and goes there; any other actuator exerts what "
-            "holds its joint at the start, or is left at the start's ctrl.",
-            _need_actuators,
-        ),
-        Scenario(
-            "gravity",
-            "The servos are off: the arm falls onto the floor.",
-            "so101/scene",
-            4.0,
-            lambda _model, _seed: _constant(None),
-            "No actuator of the file acts: what can move is left to gravity and to what it "
-            "touches.",
-            _need_joints,
-            options={"actuation": False},
-        ),
-        Scenario(
-            "droop",
-            "Nobody writes ctrl: the servos hold the arm at zero.",
-            "so101/scene",
-            2.0,
-            lambda _model, _seed: _constant(None),
-            "Nobody writes ctrl: each servo holds, and any other actuator exerts, what the start's "
-            "ctrl says.",
-            _need_actuators,
-        ),
-        Scenario(
-            "fall",
-            "The servos are off and nothing can touch anything: the arm falls.",
-            "so101/scene",
-            2.0,
-            lambda _model, _seed: _constant(None),
-            "No actuator of the file acts and nothing can touch anything: what can move is left "
-            "to gravity. A robot that floats falls as a whole.",
-            _need_joints,
-            options={"actuation": False, "contacts": False},
-        ),
-        Scenario(
-            "box",
-            "The jaws hold a box while the arm swings it aside.",
-            "so101/scene_box",
-            3.0,
-            lambda _model, _seed: _constant(np.array(MOVING)),
-            "The jaws hold a box while the arm swings it aside.",
-            _need_box,
-            keyframe="held",
-        ),
-        Scenario(
-            "waves",
-            "Every joint follows waves that a seed draws.",
-            "so101",
-            4.0,
-            _waves,
-            "Every actuator follows waves that a seed draws.",
-            _need_actuators,
-            seeded=True,
-        ),
-    )
-}
+def _hold(model: Model, _seed: int) -> Controller:
+    """Each position servo is told a pose; any other actuator exerts what holds its joint."""
+    return _constant(hold_ctrl(model))
+
+
+def _nothing(_model: Model, _seed: int) -> Controller:
+    """Nobody writes ctrl."""
+    return _constant(None)
+
+
+def _move_the_box(_model: Model, _seed: int) -> Controller:
+    """The arm is told to swing aside, with the jaws closed."""
+    return _constant(np.array(MOVING))
+
+
+_ALL = (
+    Scenario(
+        "hold",
+        "The arm is told one pose and goes there; on the way a finger meets the floor.",
+        "so101/scene",
+        2.0,
+        _hold,
+        "Each position servo is told a pose and goes there; any other actuator exerts what "
+        "holds its joint at the start, or is left at the start's ctrl.",
+        _need_actuators,
+    ),
+    Scenario(
+        "gravity",
+        "The servos are off: the arm falls onto the floor.",
+        "so101/scene",
+        4.0,
+        _nothing,
+        "No actuator of the file acts: what can move is left to gravity and to what it touches.",
+        _need_joints,
+        options={"actuation": False},
+    ),
+    Scenario(
+        "droop",
+        "Nobody writes ctrl: the servos hold the arm at zero.",
+        "so101/scene",
+        2.0,
+        _nothing,
+        "Nobody writes ctrl: each servo holds, and any other actuator exerts, what the start's "
+        "ctrl says.",
+        _need_actuators,
+    ),
+    Scenario(
+        "fall",
+        "The servos are off and nothing can touch anything: the arm falls.",
+        "so101/scene",
+        2.0,
+        _nothing,
+        "No actuator of the file acts and nothing can touch anything: what can move is left "
+        "to gravity. A robot that floats falls as a whole.",
+        _need_joints,
+        options={"actuation": False, "contacts": False},
+    ),
+    Scenario(
+        "box",
+        "The jaws hold a box while the arm swings it aside.",
+        "so101/scene_box",
+        3.0,
+        _move_the_box,
+        "The jaws hold a box while the arm swings it aside.",
+        _need_box,
+        keyframe="held",
+    ),
+    Scenario(
+        "waves",
+        "Every joint follows waves that a seed draws.",
+        "so101",
+        4.0,
+        _waves,
+        "Every actuator follows waves that a seed draws.",
+        _need_actuators,
+        seeded=True,
+    ),
+)
+SCENARIOS = {scenario.name: scenario for scenario in _ALL}
 
 
 def scenario(name: str) -> Scenario:
-    """A scenario by name.
+    """Return a scenario by name.
 
     Raises:
         UnknownNameError: There is none of this name.

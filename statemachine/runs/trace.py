@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import TraceError, refuse
+from ..errors import TraceError
 from ..interface import MOCAP, Array, Ints
 from ..interface.options import HUGE, index_of
 from ..measures import ContactNames, overlaps
@@ -27,19 +27,21 @@ LARGEST = 1e100
 
 
 def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """The columns of a trace are there, and as long and as wide as its header says.
+    """Check that the columns of a trace are there, and as long and as wide as its header says.
 
     Raises:
         TraceError: One is not.
     """
     rows = shapes.get("time", ())
     known = {*COLUMNS, *CONTACTS}
-    refuse(
-        (len(rows) != 1 or not rows[0], "a trace has at least one row, and a column 'time'"),
-        *((name not in known, f"a trace has no column {name[:40]!r}") for name in shapes),
-        *((name not in shapes, f"a trace needs the column {name!r}") for name in INPUTS),
-        error=TraceError,
-    )
+    if len(rows) != 1 or not rows[0]:
+        raise TraceError("a trace has at least one row, and a column 'time'")
+    for name in shapes:
+        if name not in known:
+            raise TraceError(f"a trace has no column {name[:40]!r}")
+    for name in INPUTS:
+        if name not in shapes:
+            raise TraceError(f"a trace needs the column {name!r}")
     for name, shape in shapes.items():
         first = shapes.get("contact_row", ()) if name in CONTACTS else rows
         expected = (*first[:1], *header.shape(name))
@@ -48,22 +50,16 @@ def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
 
 
 def _check_entries(name: str, array: NDArray[Any]) -> None:
-    """Inputs are numbers that an engine takes; the rest may be NaN, which is not told."""
+    """Check that inputs are numbers that an engine takes; the rest may be NaN: not told."""
     is_input = name in (*INPUTS, *MOCAP)
     most = HUGE if is_input else LARGEST
+    if is_input and not np.isfinite(array).all():
+        raise TraceError(f"column {name!r} has an entry that is not a finite number")
     # fmax and fmin pass over NaN.
-    ends = np.fmin.reduce(array, None, initial=0), np.fmax.reduce(array, None, initial=0)
-    refuse(
-        (
-            is_input and not np.isfinite(array).all(),
-            f"column {name!r} has an entry that is not a finite number",
-        ),
-        (
-            not -most <= ends[0] <= ends[1] <= most,
-            f"column {name!r} has an entry beyond {most:g}",
-        ),
-        error=TraceError,
-    )
+    smallest = np.fmin.reduce(array, None, initial=0)
+    largest = np.fmax.reduce(array, None, initial=0)
+    if not -most <= smallest <= largest <= most:
+        raise TraceError(f"column {name!r} has an entry beyond {most:g}")
 
 
 def check_size(unfolded: int, path: Path) -> None:
@@ -118,17 +114,12 @@ class Trace:
 
     def _check_contacts(self, rows: int) -> None:
         row, geom = self.columns["contact_row"], self.columns["contact_geom"]
-        refuse(
-            (
-                len(row) and (row.min() < 0 or row.max() >= rows or (np.diff(row) < 0).any()),
-                "contact_row is not an ascending list of rows",
-            ),
-            (
-                len(geom) and (geom.min() < 0 or geom.max() >= len(self.header.geoms)),
-                "contact_geom names a geom that is not there",
-            ),
-            error=TraceError,
-        )
+        if len(row):
+            is_of_a_row = row.min() >= 0 and row.max() < rows
+            if not is_of_a_row or (np.diff(row) < 0).any():
+                raise TraceError("contact_row is not an ascending list of rows")
+        if len(geom) and (geom.min() < 0 or geom.max() >= len(self.header.geoms)):
+            raise TraceError("contact_geom names a geom that is not there")
 
     def __len__(self) -> int:
         return len(self.time)

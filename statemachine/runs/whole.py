@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import StateMachineError, refuse
+from ..errors import BadInputError, StateMachineError
 
 _FORMULA = tuple("=+-@\t\r")  # how a formula begins
 _PART = ".part-"  # in the names of files that are being written
@@ -34,20 +34,20 @@ def check_place(target: Path, suffixes: Sequence[str] = (), what: str = "the out
         BadInputError: It ends in something else, it is a folder, or its folder is not there or not
             to be written into.
     """
-    folder, file, cannot = target.parent, not _special(target), f"{target} cannot be written"
-    refuse(
-        (
-            suffixes and target.suffix.lower() not in suffixes,
-            f"{what} ends in {' or '.join(suffixes)}; got {target.name!r}",
-        ),
-        (target.is_dir(), f"{target} is a folder; name a file in it"),
-        (not (file or os.access(target, os.W_OK)), f"{cannot}: it is read-only for you"),
-        (file and not folder.is_dir(), f"{cannot}: there is no folder {folder}"),
-        (
-            file and not os.access(folder, os.W_OK | os.X_OK),
-            f"{cannot}: its folder is read-only for you",
-        ),
-    )
+    if suffixes and target.suffix.lower() not in suffixes:
+        raise BadInputError(f"{what} ends in {' or '.join(suffixes)}; got {target.name!r}")
+    if target.is_dir():
+        raise BadInputError(f"{target} is a folder; name a file in it")
+    cannot = f"{target} cannot be written"
+    if _special(target):
+        if not os.access(target, os.W_OK):
+            raise BadInputError(f"{cannot}: it is read-only for you")
+        return
+    folder = target.parent
+    if not folder.is_dir():
+        raise BadInputError(f"{cannot}: there is no folder {folder}")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise BadInputError(f"{cannot}: its folder is read-only for you")
 
 
 @contextmanager

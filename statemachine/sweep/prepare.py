@@ -18,14 +18,14 @@ from ..compare.perturbed import EXACT, parse_uncertainty
 from ..errors import BadInputError, MissingEngineError, StateMachineError
 from ..installed import require_extra
 from ..interface import Model, make_data
-from ..interface.options import checked_options
+from ..interface.options import OptionValue, checked_options
 from ..models import resolve
 from ..runs.controllers import is_function, parameters_of
 from ..runs.drive import check_length, cost_of_a_second, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
 from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc, with_kinds
-from .request import OptionValue, PreparedSweep, Sweep, beyond_ranges, options_at, start_at
+from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
 from .rows import require_parquet
 from .worker import digest_of, load_of
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..compare.perturbed import Uncertainty, displaced
 from ..errors import BadInputError, check_name
 from ..interface import Array, JointType, Model
-from ..interface.options import index_of
+from ..interface.options import OptionValue, index_of
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint
@@ -256,9 +256,6 @@ def _recorded(vary: Vary) -> RecordedFactor:
 
 _AXES = ("x", "y", "z")
 _STREAM = 1  # of a seed: not that of the commands which an experiment draws
-
-
-OptionValue = bool | int | float | str | Array
 
 
 def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str, OptionValue]:

@@ -25,6 +25,7 @@ from ..backends import on_default, parse_backend
 from ..errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ..installed import DEFAULT, silence
 from ..interface import Array, Data, Model, forward, make_data, reset
+from ..interface.options import OptionValue
 from ..interface.records import usual_site
 from ..measures import ContactNames
 from ..measures.text import listed
@@ -37,7 +38,6 @@ from ..runs.recorder import energies
 from ..runs.scenarios import Scenario
 from .design import Value, digest
 from .request import (
-    OptionValue,
     PreparedSweep,
     Sweep,
     SweepCell,

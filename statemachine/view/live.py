@@ -6,11 +6,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from ..errors import StateMachineError
-from ..page import Figures
-from .session import Session
+from .session import Frame, Session
 
 RATE = 40.0  # frames in a second of the clock
 _MOST_LAG = 0.25  # seconds behind the clock that may still be caught up
@@ -40,15 +39,22 @@ class Front(Protocol):
     """A page, seen from the loop; all of it is called from the loop's thread."""
 
     def commands(self) -> Sequence[Command]:
-        """What was asked for since the last time, in order."""
+        """Return what was asked for since the last time, in order."""
         ...
 
-    def show(self, frame: Figures, pace: Tempo, note: str) -> None:
-        """A moment, how fast time goes, and what was wrong with the last command."""
+    def show(self, frame: Frame, pace: Tempo, note: str) -> None:
+        """Show a moment, how fast time goes, and what was wrong with the last command."""
+
+
+class _Mark(NamedTuple):
+    """A moment of the clock [s], and how many steps had been taken then."""
+
+    time: float
+    steps: int
 
 
 class Live:
-    """Lets a session follow the clock, and shows it."""
+    """Loop that lets a session follow the clock, and shows it."""
 
     def __init__(
         self,
@@ -67,8 +73,11 @@ class Live:
             sleep: Waits for so many of them.
             rate: Frames in a second.
         """
-        self._session, self._front = session, front
-        self._clock, self._sleep, self._span = clock, sleep, 1 / rate
+        self._session = session
+        self._front = front
+        self._clock = clock
+        self._sleep = sleep
+        self._span = 1 / rate
         self._note = ""
         self._late = 0.0  # until when it counts as late
         self._restart()
@@ -88,15 +97,15 @@ class Live:
             self._catch_up(began + self._span)
         now = self._clock()
         reached = self._reached(now) if session.running else None
-        self._front.show(
-            session.frame(), Tempo(session.speed, reached, now < self._late), self._note
-        )
+        tempo = Tempo(session.speed, reached, now < self._late)
+        self._front.show(session.frame(), tempo, self._note)
         left = began + self._span - self._clock()
         if left > 0:
             self._sleep(left)
 
     def _obey(self, command: Command) -> None:
-        session, self._note = self._session, ""
+        session = self._session
+        self._note = ""
         before = session.running, session.steps, session.speed
         try:
             command()
@@ -106,9 +115,10 @@ class Live:
             self._restart()
 
     def _restart(self) -> None:
-        """From now on; what passed while time stood, or before it jumped, is not owed."""
-        self._start, self._taken = self._clock(), 0
-        self._marks = deque([(self._start, 0)])  # when how many steps had been taken
+        """Count from now on; what passed while time stood, or before it jumped, is not owed."""
+        self._start = self._clock()
+        self._taken = 0
+        self._marks = deque([_Mark(self._start, 0)])
 
     def _catch_up(self, deadline: float) -> None:
         """Take what is due, as far as there is time for it before the next frame."""
@@ -127,13 +137,13 @@ class Live:
             # No engine can be hurried: the rest is let go, or it would lag ever more.
             self._start += lag
             self._late = now + 1
-        self._marks.append((now, self._taken))
-        while len(self._marks) > 2 and self._marks[1][0] <= now - _WINDOW:
+        self._marks.append(_Mark(now, self._taken))
+        while len(self._marks) > 2 and self._marks[1].time <= now - _WINDOW:
             self._marks.popleft()
 
     def _reached(self, now: float) -> float | None:
-        """Simulated seconds in a second of the clock, of late; None before it can be told."""
-        began, taken = self._marks[0]
-        if now - began < _WINDOW / 4:
+        """Return simulated seconds in a second of the clock, of late; None before it is known."""
+        mark = self._marks[0]
+        if now - mark.time < _WINDOW / 4:
             return None
-        return (self._taken - taken) * self._session.timestep / (now - began)
+        return (self._taken - mark.steps) * self._session.timestep / (now - mark.time)

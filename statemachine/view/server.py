@@ -17,18 +17,21 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from http.cookies import CookieError, SimpleCookie
 from io import StringIO
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..errors import BadInputError, MissingEngineError, refuse
+from ..errors import BadInputError, MissingEngineError
 from ..installed import require_extra
+
+if TYPE_CHECKING:
+    import viser
 
 _PORTS = 100  # tried one after another
 _SAY = "open the address that `statemachine view` printed, with its token\n"
 
 
 class Door:
-    """Lets in who knows the token, under a name of this machine, and from its own page.
+    """Guard that lets in who knows the token, under a name of this machine, and from its own page.
 
     A page of another site can make a browser connect to this machine, and can give its own
     name this machine's address; neither knows the token. The address that is printed holds it,
@@ -124,11 +127,10 @@ def free_port(host: str, port: int) -> int:
         BadInputError: It is not a port, the host is not an address of this machine, or all near it
             are taken.
     """
-    refuse(
-        (not 0 <= port <= 65535, f"port must be from 0 to 65535; got {port}"),
-        # Which would mean everywhere.
-        (not host.strip(), "host must be an address; 127.0.0.1 is this machine alone"),
-    )
+    if not 0 <= port <= 65535:
+        raise BadInputError(f"port must be from 0 to 65535; got {port}")
+    if not host.strip():  # which would mean everywhere
+        raise BadInputError("host must be an address; 127.0.0.1 is this machine alone")
     try:
         family, _, _, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -150,8 +152,8 @@ def free_port(host: str, port: int) -> int:
     raise BadInputError(f"cannot listen on {host}, port {port}: {last}")
 
 
-def serve(host: str, port: int, label: str, door: Door) -> Any:
-    """A viser server on a port that is free, without its banner and without its tunnel.
+def serve(host: str, port: int, label: str, door: Door) -> viser.ViserServer:
+    """Start a viser server on a port that is free, without its banner and without its tunnel.
 
     Args:
         host: Where it listens.
@@ -181,7 +183,7 @@ def serve(host: str, port: int, label: str, door: Door) -> Any:
     return server
 
 
-def stop(server: Any) -> None:
+def stop(server: viser.ViserServer) -> None:
     """Close the connections and free the port; nothing is printed."""
     with redirect_stdout(StringIO()):
         server.stop()

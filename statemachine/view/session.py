@@ -9,10 +9,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import BadInputError, StateMachineError, TraceError, refuse
+from ..errors import BadInputError, StateMachineError, TraceError
 from ..interface import (
     Array,
     Data,
@@ -25,13 +27,93 @@ from ..interface import (
     step,
     usual_site,
 )
-from ..measures import distances, joint_gap
-from ..page import Figures
+from ..measures import Gap, distances, joint_gap
 from ..runs import Trace
 
 SLOWEST, FASTEST = 0.001, 1000.0
 _STEPS_MOST = 100_000  # of one press of a button
 _EQUAL = 1e-6  # seconds between moments that count as the same
+
+
+@dataclass(frozen=True)
+class Control:
+    """Slider for an actuator.
+
+    Attributes:
+        name: Of the actuator.
+        low: Least value, in `unit`.
+        high: Greatest value, in `unit`.
+        unit: ° for the aim of a hinge's servo, mm for a slide's, else nothing.
+        scale: What one `unit` is in the actuator's own unit [rad, m, N·m …].
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str
+    scale: float
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joints of the model that is shown.
+
+    Attributes:
+        names: Of the joints.
+        types: Their `JointType`s.
+        addresses: Where each begins in qpos.
+    """
+
+    names: Sequence[str]
+    types: Sequence[int] | Ints
+    addresses: Sequence[int] | Ints
+
+
+@dataclass(frozen=True, eq=False)
+class EnginePose:
+    """Pose of the model on one engine.
+
+    Attributes:
+        name: Of the engine.
+        xpos: (nbody, 3) [m].
+        xquat: (nbody, 4) wxyz.
+        qpos: (nq,) in MuJoCo's layout.
+        tip: (3,) the fingertip [m]; None if the model has no site.
+    """
+
+    name: str
+    xpos: Array
+    xquat: Array
+    qpos: Array
+    tip: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A moment of a session.
+
+    Attributes:
+        time: Simulated time [s].
+        steps: Steps taken since the start or the last reset.
+        running: Whether time goes on by itself.
+        ctrl: (nu,) the commands [unit of the actuator].
+        resets: How often the commands were replaced by others than the sliders'.
+        poses: Of each engine; what is drawn solid comes first.
+        tips_apart: Between the fingertips of two engines [m]; None without two, or without a site.
+        joint_apart: Of the hinge or slide that differs most, among hinges if there are any; None
+            without two engines, or without such a joint.
+        trouble: Why it cannot go on, in a sentence; or "".
+    """
+
+    time: float
+    steps: int
+    running: bool
+    ctrl: Array
+    resets: int
+    poses: tuple[EnginePose, ...]
+    tips_apart: float | None
+    joint_apart: Gap | None
+    trouble: str
 
 
 class Session(ABC):
@@ -49,7 +131,7 @@ class Session(ABC):
         steps: Steps taken since the start or the last reset.
     """
 
-    controls: tuple[Figures, ...] = ()
+    controls: tuple[Control, ...] = ()
     places: tuple[str, ...] = ()
     length: float | None = None
 
@@ -57,7 +139,7 @@ class Session(ABC):
         self,
         names: Sequence[str],
         timestep: float,
-        joints: tuple[Sequence[str], Sequence[int] | Ints, Sequence[int] | Ints],
+        joints: Joints,
         sites: Sequence[str],
         site: int | None,
     ) -> None:
@@ -66,14 +148,20 @@ class Session(ABC):
         Args:
             names: Of the engines.
             timestep: Simulated time of a step [s].
-            joints: Their names, `JointType`s and places in qpos.
+            joints: Of the model.
             sites: Names of the sites.
             site: Which of them stands for the fingertip; None for none.
         """
-        self.names, self.timestep, self._joints, self._site = names, timestep, joints, site
+        self.names = names
+        self.timestep = timestep
         self.tip = "" if site is None else sites[site]
-        self.running, self.speed, self.steps = False, 1.0, 0
-        self._trouble, self._resets = "", 1
+        self.running = False
+        self.speed = 1.0
+        self.steps = 0
+        self._joints = joints
+        self._site = site
+        self._trouble = ""
+        self._resets = 1
 
     def set_speed(self, speed: float) -> None:
         """Let time go at another speed.
@@ -131,45 +219,57 @@ class Session(ABC):
         """
 
     @abstractmethod
-    def frame(self) -> Figures:
-        """This moment.
-
-        Returns:
-            time: Simulated time [s].
-            steps: Steps taken since the start or the last reset.
-            running: Whether time goes on by itself.
-            ctrl: (nu,) the commands [unit of the actuator].
-            resets: How often the commands were replaced by others than the sliders'.
-            poses: Of each engine its `name`, `xpos` (nbody, 3) [m], `xquat` (nbody, 4) wxyz, `tip`
-                (3,) the fingertip [m], None if the model has no site, and `qpos` (nq,) in MuJoCo's
-                layout; what is drawn solid comes first.
-            tips_apart: Between the fingertips of two engines [m]; None without two, or without a
-                site.
-            joint_apart: Of the hinge or slide that differs most, among hinges if there are any;
-                None without two engines, or without such a joint.
-            trouble: Why it cannot go on, in a sentence; or "".
-        """
+    def frame(self) -> Frame:
+        """Return this moment."""
 
     def _snapshot(
-        self, time: float, ctrl: Array, poses: tuple[Figures, ...], same: bool = True
-    ) -> Figures:
-        """A frame; how far two engines are apart is known if their moments are the same."""
-        tips, joint = None, None
+        self, time: float, ctrl: Array, poses: tuple[EnginePose, ...], same: bool = True
+    ) -> Frame:
+        """Return a frame.
+
+        Args:
+            time: Simulated time [s].
+            ctrl: (nu,) the commands.
+            poses: Of each engine.
+            same: Whether they are of the same moment: then it is known how far they are apart.
+        """
+        tips_apart, joint_apart = None, None
         if same and len(poses) > 1:
             left, right = poses[:2]
             if left.tip is not None and right.tip is not None:
-                tips = float(distances(left.tip, right.tip))
-            joint = joint_gap(*self._joints, left.qpos, right.qpos)
-        return Figures(
+                tips_apart = float(distances(left.tip, right.tip))
+            joints = self._joints
+            joint_apart = joint_gap(
+                joints.names, joints.types, joints.addresses, left.qpos, right.qpos
+            )
+        return Frame(
             time=time,
             steps=self.steps,
             running=self.running,
             ctrl=ctrl,
             resets=self._resets,
             poses=poses,
-            tips_apart=tips,
-            joint_apart=joint,
+            tips_apart=tips_apart,
+            joint_apart=joint_apart,
             trouble=self._trouble,
+        )
+
+
+class _Arm(NamedTuple):
+    """A Model and its Data."""
+
+    model: Model
+    data: Data
+
+
+def _check_twins(first: Model, other: Model) -> None:
+    """Raise BadInputError where two models are not the same file at the same timestep."""
+    if (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody):
+        raise BadInputError(f"{other!r} is another model than {first!r}")
+    if other.timestep != first.timestep:
+        raise BadInputError(
+            f"the timesteps differ: {first.timestep:g} s on {first.backend}, "
+            f"{other.timestep:g} s on {other.backend}"
         )
 
 
@@ -197,32 +297,24 @@ class LiveSession(Session, ExitStack):
         ExitStack.__init__(self)
         first = models[0]
         for other in models[1:]:
-            refuse(
-                (
-                    (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody),
-                    f"{other!r} is another model than {first!r}",
-                ),
-                (
-                    other.timestep != first.timestep,
-                    f"the timesteps differ: {first.timestep:g} s on {first.backend}, "
-                    f"{other.timestep:g} s on {other.backend}",
-                ),
-            )
+            _check_twins(first, other)
+        tip_site = usual_site(first.site_names) if site is None else first.site_id(site)
         super().__init__(
             tuple(model.backend for model in models),
             first.timestep,
-            (first.joint_names, first.jnt_type, first.jnt_qposadr),
+            Joints(first.joint_names, first.jnt_type, first.jnt_qposadr),
             first.site_names,
-            usual_site(first.site_names) if site is None else first.site_id(site),
+            tip_site,
         )
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
-        self._arms: list[tuple[Model, Data]] = []
-        # The last moment that was good: its time and the poses.
-        self._good: tuple[float, tuple[Figures, ...]] = 0.0, ()
+        self._arms: list[_Arm] = []
+        # Those of the last moment that was good.
+        self._time = 0.0
+        self._poses: tuple[EnginePose, ...] = ()
         try:
             for model in models:
-                self._arms.append((model, self.enter_context(make_data(model))))
+                self._arms.append(_Arm(model, self.enter_context(make_data(model))))
             self.reset(keyframe)
         except BaseException:
             self.close()
@@ -245,31 +337,56 @@ class LiveSession(Session, ExitStack):
         self._trouble, self.steps = "", 0
         self._resets += 1
 
-    def frame(self) -> Figures:
-        """This moment; after an engine failed, the last one that was good.
+    def frame(self) -> Frame:
+        """Return this moment; after an engine failed, the last one that was good.
 
         Looking changes nothing: the run goes on as if nobody had looked.
         """
+        solid = self._arms[0].data
         if self._all_do(forward):
-            poses = tuple(self._pose(model, data) for model, data in self._arms)
-            self._good = self._arms[0][1].time, poses
-        time, poses = self._good
-        return self._snapshot(time, np.array(self._arms[0][1].ctrl), poses)
+            self._time = solid.time
+            self._poses = tuple(self._pose(model, data) for model, data in self._arms)
+        return self._snapshot(self._time, np.array(solid.ctrl), self._poses)
 
-    def _pose(self, model: Model, data: Data) -> Figures:
+    def _pose(self, model: Model, data: Data) -> EnginePose:
+        """Return the pose of a Data of now."""
         tip = None if self._site is None else np.array(data.site_xpos[self._site])
-        arrays = {name: np.array(getattr(data, name)) for name in ("xpos", "xquat", "qpos")}
-        return Figures(name=model.backend, tip=tip, **arrays)
+        return EnginePose(
+            name=model.backend,
+            xpos=np.array(data.xpos),
+            xquat=np.array(data.xquat),
+            qpos=np.array(data.qpos),
+            tip=tip,
+        )
 
     def _all_do(self, verb: Callable[[Model, Data], None]) -> bool:
-        """Call a verb on every engine; whether there is no trouble, now or before."""
-        for model, data in () if self._trouble else self._arms:
+        """Call a verb on every engine; return whether there is no trouble, now or before."""
+        if self._trouble:
+            return False
+        for model, data in self._arms:
             try:
                 verb(model, data)
             except StateMachineError as error:
                 self.running = False
-                self._trouble = self._trouble or f"{model.backend}: {error}"
+                if not self._trouble:
+                    self._trouble = f"{model.backend}: {error}"
         return not self._trouble
+
+
+def _check_drawable(trace: Trace, first: Trace) -> None:
+    """Raise TraceError where a trace cannot be drawn, or is not of the model of the first."""
+    for column in ("xpos", "xquat"):
+        if column not in trace or not np.isfinite(trace[column]).all():
+            raise TraceError(f"{trace!r} has no {column}: it cannot be drawn")
+    if (trace.header.bodies, trace.header.nq) != (first.header.bodies, first.header.nq):
+        raise TraceError(f"{trace!r} is of another model than {first!r}")
+
+
+def _engine_name(trace: Trace) -> str:
+    """Return the engine of a trace, and whether it ran as its own users meet it."""
+    if trace.header.defaults == "engine":
+        return f"{trace.header.backend}, engine defaults"
+    return trace.header.backend
 
 
 class TraceSession(Session):
@@ -287,32 +404,19 @@ class TraceSession(Session):
         Raises:
             TraceError: A trace has no poses, or the two do not fit.
         """
-        first = traces[0]
         for trace in traces:
-            refuse(
-                *(
-                    (
-                        column not in trace or not np.isfinite(trace[column]).all(),
-                        f"{trace!r} has no {column}: it cannot be drawn",
-                    )
-                    for column in ("xpos", "xquat")
-                ),
-                (
-                    (trace.header.bodies, trace.header.nq)
-                    != (first.header.bodies, first.header.nq),
-                    f"{trace!r} is of another model than {first!r}",
-                ),
-                error=TraceError,
-            )
-        header = first.header
+            _check_drawable(trace, traces[0])
+        header = traces[0].header
         sites = header.sites if all("site_xpos" in trace for trace in traces) else ()
-        names = tuple(
-            trace.header.backend + ", engine defaults" * (trace.header.defaults == "engine")
-            for trace in traces
+        super().__init__(
+            tuple(_engine_name(trace) for trace in traces),
+            header.timestep,
+            Joints(header.joints, header.jnt_type, header.jnt_qposadr),
+            sites,
+            usual_site(sites),
         )
-        joints = header.joints, header.jnt_type, header.jnt_qposadr
-        super().__init__(names, header.timestep, joints, sites, usual_site(sites))
-        self.header, self._traces = header, traces
+        self.header = header
+        self._traces = traces
         self._times = [trace.time - trace.time[0] for trace in traces]
         self.length = min(float(time[-1]) for time in self._times)
         self._last = int(np.searchsorted(self._times[0], self.length + _EQUAL)) - 1
@@ -324,7 +428,8 @@ class TraceSession(Session):
 
     def play(self) -> None:
         """Let time go on; from the start, if it is at the end."""
-        self.steps = 0 if self.steps == self._last else self.steps
+        if self.steps == self._last:
+            self.steps = 0
         self.running = self._last > 0
 
     def seek(self, time: float) -> None:
@@ -338,18 +443,16 @@ class TraceSession(Session):
         self.running = self.running and self.steps < self._last
 
     def reset(self, keyframe: int | str | None = None) -> None:
-        """To the start."""
+        """Go to the start."""
         self.steps = 0
 
-    def frame(self) -> Figures:
-        """This row of the first trace, and what the other has nearest to its time."""
+    def frame(self) -> Frame:
+        """Return this row of the first trace, and what the other has nearest to its time."""
         now = self._times[0][self.steps]
         rows = [int(np.abs(time - now).argmin()) for time in self._times]
-        poses = []
+        poses: list[EnginePose] = []
         for trace, name, row in zip(self._traces, self.names, rows, strict=True):
-            tip = None if self._site is None else trace["site_xpos"][row, self._site]
-            arrays = {column: trace[column][row] for column in ("xpos", "xquat", "qpos")}
-            poses.append(Figures(name=name, tip=tip, **arrays))
+            poses.append(self._pose(trace, name, row))
         first = self._traces[0]
         # Moments that are not the same say nothing about the engines.
         same = abs(self._times[-1][rows[-1]] - now) < _EQUAL
@@ -357,45 +460,49 @@ class TraceSession(Session):
             float(first.time[self.steps]), first.ctrl[self.steps], tuple(poses), bool(same)
         )
 
+    def _pose(self, trace: Trace, name: str, row: int) -> EnginePose:
+        """Return the pose of a row of a trace."""
+        tip = None if self._site is None else trace["site_xpos"][row, self._site]
+        return EnginePose(
+            name=name,
+            xpos=trace["xpos"][row],
+            xquat=trace["xquat"][row],
+            qpos=trace["qpos"][row],
+            tip=tip,
+        )
+
 
 def checked_speed(speed: float) -> float:
-    """Simulated seconds in a second of the clock; BadInputError if nothing can go at that."""
+    """Return a speed, or raise BadInputError if nothing can go at that.
+
+    Args:
+        speed: Simulated seconds in a second of the clock.
+    """
     if not SLOWEST <= speed <= FASTEST:  # not a number fails this too
         raise BadInputError(f"speed must be from {SLOWEST:g} to {FASTEST:g}; got {speed:g}")
     return float(speed)
 
 
-def controls_of(model: Model) -> tuple[Figures, ...]:
-    """A slider for each actuator, over its range; over its joint's where it has none.
+def controls_of(model: Model) -> tuple[Control, ...]:
+    """Make a slider for each actuator, over its range; over its joint's where it has none."""
+    return tuple(_control(model, index) for index in range(len(model.actuator_names)))
 
-    Returns:
-        name: Of the actuator.
-        low: Least value, in `unit`; high: the greatest.
-        unit: ° for the aim of a hinge's servo, mm for a slide's, else nothing.
-        scale: What one `unit` is in the actuator's own unit [rad, m, N·m …].
-    """
-    controls = []
-    for index, name in enumerate(model.actuator_names):
-        low, high = model.actuator_ctrlrange[index].tolist()
-        joint = int(model.actuator_jntid[index])
-        kind = int(model.jnt_type[joint]) if joint >= 0 else -1
-        unit, scale, spare = "", 1.0, 1.0
-        if np.isfinite(model.actuator_kp[index]):  # a servo
-            if kind == JointType.HINGE:
-                unit, scale, spare = "°", math.pi / 180, math.pi
-            elif kind == JointType.SLIDE:
-                unit, scale = "mm", 1e-3
-            if kind >= 0 and model.jnt_limited[joint] and not math.isfinite(high - low):
-                low, high = model.jnt_range[joint].tolist()
-        if not math.isfinite(high - low):
-            low, high = -spare, spare
-        controls.append(
-            Figures(
-                name=name or f"actuator {index}",
-                low=low / scale,
-                high=high / scale,
-                unit=unit,
-                scale=scale,
-            )
-        )
-    return tuple(controls)
+
+def _control(model: Model, index: int) -> Control:
+    """Make the slider for an actuator, by number."""
+    low, high = model.actuator_ctrlrange[index].tolist()
+    joint = int(model.actuator_jntid[index])
+    kind = int(model.jnt_type[joint]) if joint >= 0 else -1
+    unit, scale = "", 1.0
+    without_range = 1.0  # [actuator's own unit]
+    if np.isfinite(model.actuator_kp[index]):  # a servo
+        if kind == JointType.HINGE:
+            unit, scale, without_range = "°", math.pi / 180, math.pi
+        elif kind == JointType.SLIDE:
+            unit, scale = "mm", 1e-3
+        if kind >= 0 and model.jnt_limited[joint] and not math.isfinite(high - low):
+            low, high = model.jnt_range[joint].tolist()
+    if not math.isfinite(high - low):
+        low, high = -without_range, without_range
+    name = model.actuator_names[index] or f"actuator {index}"
+    return Control(name, low / scale, high / scale, unit, scale)

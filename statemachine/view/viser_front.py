@@ -7,7 +7,7 @@ import queue
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from ..drawing import Drawing, Part
 from ..drawing.scene import Camera
 from ..measures.text import millimetres, position, short_time
-from ..page import Figures
 from .live import Command, Tempo
-from .session import FASTEST, SLOWEST, Session
+from .session import FASTEST, SLOWEST, Frame, Session
+
+if TYPE_CHECKING:
+    import viser
 
 _GHOST = (0.20, 0.45, 0.95)  # the second engine, seen through
 _OPACITY = 0.45
@@ -33,9 +35,14 @@ _DIM = "opacity:.65;padding-right:.8em;vertical-align:top"
 class ViserFront:
     """A `Front` on a viser server. Tabs may come and go; all of them show the same."""
 
+    _readout: viser.GuiHtmlHandle
+    _switch: viser.GuiButtonHandle
+    _seek: viser.GuiSliderHandle[float] | None
+    _sliders: list[viser.GuiSliderHandle[float]]
+
     def __init__(
         self,
-        server: Any,
+        server: viser.ViserServer,
         session: Session,
         drawing: Drawing,
         keyframe: int | None = None,
@@ -48,20 +55,25 @@ class ViserFront:
             drawing: What its model looks like.
             keyframe: Where the session began, by number.
         """
-        self._server, self._session = server, session
+        self._server = server
+        self._session = session
+        self._extent = drawing.extent
         # Callbacks come from viser's own thread: all they do is put a command in here.
         self._asked: queue.SimpleQueue[Command] = queue.SimpleQueue()
-        self._frames: list[dict[int, Any]] = []
-        self._resets, self._when, self._dragged = 0, 0.0, 0.0
+        # Of each engine: the frame of each body, by its number.
+        self._frames: list[dict[int, viser.FrameHandle]] = []
+        self._resets = 0  # of the session, as the sliders show them
+        self._when = 0.0  # of the last readout [s of the clock]
+        self._dragged = 0.0  # when somebody moved the slider of a recording [s of the clock]
         with server.atomic():
             self._build_scene(drawing)
             self._build_panel(keyframe)
 
     def commands(self) -> Sequence[Command]:
-        """What was asked for since the last time."""
+        """Return what was asked for since the last time."""
         return [self._asked.get_nowait() for _ in range(self._asked.qsize())]
 
-    def show(self, frame: Figures, pace: Tempo, note: str) -> None:
+    def show(self, frame: Frame, pace: Tempo, note: str) -> None:
         """Move the bodies, and what stands beside them."""
         with self._server.atomic():
             for bodies, pose in zip(self._frames, frame.poses, strict=True):
@@ -80,15 +92,14 @@ class ViserFront:
 
     def _build_scene(self, drawing: Drawing) -> None:
         scene = self._server.scene
-        self._extent = drawing.extent
         scene.world_axes.visible = False
         scene.configure_default_lights(enabled=True, cast_shadow=True)
         camera = self._server.initial_camera
         camera.look_at = drawing.center
-        eye = Camera(
-            drawing.center, _DISTANCE * drawing.extent, drawing.azimuth, drawing.elevation
-        ).eye
-        camera.position = tuple(eye.tolist())
+        distance = _DISTANCE * drawing.extent
+        view = Camera(drawing.center, distance, drawing.azimuth, drawing.elevation)
+        x, y, z = view.eye.tolist()
+        camera.position = (x, y, z)
         camera.up = (0.0, 0.0, 1.0)
         for part in drawing.parts:
             if part.body == 0:
@@ -110,6 +121,7 @@ class ViserFront:
             self._add_part(part, name, False)
             return
         cell = float(10.0 ** np.floor(np.log10(self._extent) - 0.5))
+        height = float(part.vertices[0, 2])
         self._server.scene.add_grid(
             name,
             infinite_grid=True,
@@ -120,7 +132,7 @@ class ViserFront:
             fade_distance=20 * self._extent,
             plane_color=_bytes(part.rgba),
             plane_opacity=1.0,
-            position=(0.0, 0.0, float(part.vertices[0, 2])),
+            position=(0.0, 0.0, height),
         )
 
     def _add_part(self, part: Part, name: str, ghost: bool) -> None:
@@ -167,13 +179,13 @@ class ViserFront:
         if len(session.names) > 1:
             ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
             self._on(ghost.on_update, lambda: partial(self._show_ghost, ghost.value))
-        self._sliders: list[Any] = []
-        self._seek: Any = None
+        self._sliders = []
+        self._seek = None
         if session.length:
             self._seek = gui.add_slider(
                 "seek [s]", 0.0, float(session.length), float(session.timestep), 0.0
             )
-            self._on(self._seek.on_update, self._sought)
+            self._on(self._seek.on_update, partial(self._sought, self._seek))
         if session.controls:
             with gui.add_folder("ctrl"):
                 for index in range(len(session.controls)):
@@ -184,7 +196,7 @@ class ViserFront:
         span = control.high - control.low
         step = float(10 ** np.floor(np.log10(span / 500))) if span > 0 else 1.0
         # Round figures to read; what they stand for stays in the range.
-        low, high = (_round(value, step) for value in (control.low, control.high))
+        low, high = _round(control.low, step), _round(control.high, step)
         label = f"{control.name} [{control.unit}]" if control.unit else control.name
         slider = self._server.gui.add_slider(label, low, high, step, min(max(0.0, low), high))
 
@@ -195,14 +207,14 @@ class ViserFront:
         self._on(slider.on_update, asked)
         self._sliders.append(slider)
 
-    def _follow(self, frame: Figures) -> None:
+    def _follow(self, frame: Frame) -> None:
         """Put the sliders to commands that did not come from them."""
         for index, slider in enumerate(self._sliders):
             scale = self._session.controls[index].scale
             shown = _round(float(frame.ctrl[index]) / scale, slider.step)
             slider.value = min(max(shown, slider.min), slider.max)
 
-    def _say(self, frame: Figures, pace: Tempo, note: str) -> None:
+    def _say(self, frame: Frame, pace: Tempo, note: str) -> None:
         now = time.monotonic()
         if frame.running and now - self._when < _SPAN:
             return  # nobody reads faster
@@ -212,9 +224,10 @@ class ViserFront:
 
     # What comes back
 
-    def _sought(self) -> Command:
+    def _sought(self, slider: viser.GuiSliderHandle[float]) -> Command:
+        """Return the command to go to the time that a slider was moved to."""
         self._dragged = time.monotonic()
-        return partial(self._session.seek, float(self._seek.value))
+        return partial(self._session.seek, float(slider.value))
 
     def _show_ghost(self, visible: bool) -> None:
         for handle in self._frames[1].values():
@@ -231,33 +244,48 @@ class ViserFront:
         listen(put)
 
 
-def readout(frame: Figures, pace: Tempo, tip: str) -> list[tuple[str, str]]:
-    """Rows of a name and a value that stand beside the picture of one moment.
+class ReadoutRow(NamedTuple):
+    """Row that stands beside the picture.
+
+    Attributes:
+        name: What it is.
+        value: With its unit.
+    """
+
+    name: str
+    value: str
+
+
+def readout(frame: Frame, pace: Tempo, tip: str) -> list[ReadoutRow]:
+    """Return what stands beside the picture of one moment.
 
     Args:
         frame: The moment.
         pace: How fast it goes.
         tip: Name of the site that stands for the fingertip, or "".
     """
-    tips, joint = frame.tips_apart, frame.joint_apart
-    far = "" if joint is None else position(joint.size or 0.0, joint.unit == "m", 3)
     rows = [
-        ("time", short_time(frame.time)),
-        ("steps", f"{frame.steps:,}"),
-        ("pace", _pace(frame, pace)),
-        ("tip", tip),
-        *(
-            (f"on {pose.name}", "  ".join(f"{1000 * value:.1f}" for value in pose.tip) + " mm")
-            for pose in frame.poses
-            if pose.tip is not None
-        ),
-        ("tips apart", "" if tips is None else millimetres(tips, 3)),
-        ("joints apart", "" if joint is None else f"{far}, {joint.where}"),
+        ReadoutRow("time", short_time(frame.time)),
+        ReadoutRow("steps", f"{frame.steps:,}"),
+        ReadoutRow("pace", _pace(frame, pace)),
     ]
-    return [(name, text) for name, text in rows if text]
+    if tip:
+        rows.append(ReadoutRow("tip", tip))
+    for pose in frame.poses:
+        if pose.tip is not None:
+            place = "  ".join(f"{1000 * value:.1f}" for value in pose.tip)
+            rows.append(ReadoutRow(f"on {pose.name}", f"{place} mm"))
+    if frame.tips_apart is not None:
+        rows.append(ReadoutRow("tips apart", millimetres(frame.tips_apart, 3)))
+    joint = frame.joint_apart
+    if joint is not None:
+        size = position(joint.size or 0.0, joint.unit == "m", 3)
+        rows.append(ReadoutRow("joints apart", f"{size}, {joint.where}"))
+    return rows
 
 
-def _pace(frame: Figures, pace: Tempo) -> str:
+def _pace(frame: Frame, pace: Tempo) -> str:
+    """Return how fast time goes, in words."""
     if not frame.running:
         return "paused"
     if pace.reached is None:
@@ -266,8 +294,8 @@ def _pace(frame: Figures, pace: Tempo) -> str:
     return f"{pace.reached:.2f} × real time{late}"
 
 
-def warning(frame: Figures, note: str) -> str:
-    """What is wrong, or ""."""
+def warning(frame: Frame, note: str) -> str:
+    """Return what is wrong, or ""."""
     return f"{frame.trouble}. Reset to go on." if frame.trouble else note
 
 
@@ -276,11 +304,10 @@ def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:
         f"<tr><td style='{_DIM}'>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
         for name, value in rows
     )
-    trouble = (
-        f"<p role='alert' style='color:#b3261e;margin:.4em 0 0'>{html.escape(warning)}</p>"
-        if warning
-        else ""
-    )
+    trouble = ""
+    if warning:
+        style = "color:#b3261e;margin:.4em 0 0"
+        trouble = f"<p role='alert' style='{style}'>{html.escape(warning)}</p>"
     return (
         "<div style='padding:.5em .7em;font-size:.8em;line-height:1.5'>"
         f"<table style='font-variant-numeric:tabular-nums;border-spacing:0'>{cells}</table>"
@@ -294,12 +321,12 @@ def _bytes(rgb: Sequence[float]) -> tuple[int, int, int]:
 
 
 def _round(value: float, step: float) -> float:
-    """The nearest multiple of a step that is a power of ten."""
+    """Return the nearest multiple of a step that is a power of ten."""
     return round(round(value / step) * step, 12)
 
 
 def thinner(part: Part, by: float) -> NDArray[np.float32]:
-    """The vertices (v, 3) of a part, moved inward along the normals of its faces [m]."""
+    """Return the vertices (v, 3) of a part, moved inward along the normals of its faces [m]."""
     corners = part.vertices[part.faces].astype(float)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sums = np.zeros((len(part.vertices), 3))

@@ -32,13 +32,8 @@ from ...errors import EngineWarning, StateMachineError, UnsupportedError
 from ...installed import DEFAULT
 from ...model_files import checked_file
 from ...models import resolve
-<<<<<<< HEAD
-from ...page import Figures
 from ...release_names import engine_of, is_release
-=======
-from ...releases import engine_of, is_release
 from ..matching import Matched
->>>>>>> wt-b1
 from .compiled import compiled, enter_rest
 from .diff import PoseGap, diff
 from .ledger import Key, Ledger, ReadingAgreement, ReadingDifference

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
+from ...errors import BadInputError, shown
+from ...interface.options import OptionValue
 from ...runs import Trace
 from ...runs.reporter import QUIET, Reporter
-from ..convergence import convergence
-from ..sides import Request
+from ..convergence import Convergence, convergence
+from ..sides import Request, Side
 from ..two_sides import run_sides
 from .one_step import check_runs
 
@@ -29,14 +30,16 @@ class ConvergeRequest:
 
     def with_finer_steps(self, times: int) -> Request:
         """Return what is run, with so many times as many steps of the engine on both sides."""
-        usual = self.run.options.get("substeps", 1)
-        sides = tuple(
-            replace(side, options=_finer(side.options, usual, times)) for side in self.run.sides
-        )
-        return replace(self.run, options=_finer(self.run.options, 1, times), sides=sides)
+        common = _substeps(self.run.options, 1)
+        sides: list[Side] = []
+        for side in self.run.sides:
+            substeps = times * _substeps(side.options, common)
+            sides.append(replace(side, options={**side.options, "substeps": substeps}))
+        options = {**self.run.options, "substeps": times * common}
+        return replace(self.run, options=options, sides=tuple(sides))
 
 
-def answer(request: ConvergeRequest, reporter: Reporter = QUIET):
+def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> Convergence:
     """Run both sides with ever finer steps, and compare.
 
     Raises:
@@ -50,12 +53,9 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET):
         return convergence(run, progress=progress)
 
 
-def _finer(options: Mapping[str, Any], usual: int, times: int) -> dict[str, Any]:
-    """Return options with so many times as many substeps.
-
-    Args:
-        options: As `Model.replace` takes them.
-        usual: How many substeps there are where they name none.
-        times: So many times as many.
-    """
-    return {**options, "substeps": options.get("substeps", usual) * times}
+def _substeps(options: Mapping[str, OptionValue], usual: int) -> int:
+    """Return the number of substeps that options name; `usual` where they name none."""
+    value = options.get("substeps", usual)
+    if not isinstance(value, int):
+        raise BadInputError(f"substeps must be a whole number; got {shown(value)}")
+    return value

@@ -141,16 +141,23 @@ def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matc
 
 
 def _bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
-    """The roots; a base that floats in one file and stands still in the other is one too."""
-    carriers = (
-        (left.groups[a.parent], right.groups[right.by_joint[name].parent])
-        for name, a in left.by_joint.items()
-        if a.parent >= 0 and name in right.by_joint and right.by_joint[name].parent >= 0
-    )
+    """Return the roots; a base that floats in one file and stands still in the other is one too."""
     roots = left.groups[0], right.groups[0]
-    above = next(carriers, roots)
-    floats = [bool(group.joint and group.joint.kind == "free") for group in above]
-    return above if floats[0] != floats[1] and above[floats[0]].parent < 0 else roots
+    above = roots
+    for name, group in left.by_joint.items():
+        other = right.by_joint.get(name)
+        if other is not None and group.parent >= 0 and other.parent >= 0:
+            above = left.groups[group.parent], right.groups[other.parent]
+            break
+    is_floating = [_floats(group) for group in above]
+    if is_floating[0] == is_floating[1]:
+        return roots
+    return above if above[is_floating[0]].parent < 0 else roots
+
+
+def _floats(group: Group) -> bool:
+    """Tell whether a group hangs on a free joint."""
+    return group.joint is not None and group.joint.kind == "free"
 
 
 def _placed(
@@ -188,26 +195,30 @@ def _apart(point: Array, other: Array, axis: Array) -> float:
 
 
 def _of_root(left: GroupTree, right: GroupTree, a: Group, b: Group) -> list[Placement]:
-    """How the frames of two roots may lie: as they are, or so that links of them coincide."""
+    """Return how the frames of two roots may lie: as they are, or so that their links coincide."""
     theirs = {link.name: place for link, place in b.links}
     choices = [theirs[link.name] @ at.inverse for link, at in a.links if link.name in theirs]
     # The robot's first link, where only one of the files has a world around it.
-    firsts = [
-        group.links[1][1]
-        if tree.robot.rooted and group.number == 0 and len(group.links) > 1
-        else HERE
-        for tree, group in ((left, a), (right, b))
-    ]
-    return [HERE, *choices, firsts[1] @ firsts[0].inverse]
+    ours, others = _first_link(left, a), _first_link(right, b)
+    return [HERE, *choices, others @ ours.inverse]
+
+
+def _first_link(tree: GroupTree, group: Group) -> Placement:
+    """Return the place of the robot's first link in a root that is the world, else the root's."""
+    if tree.robot.rooted and group.number == 0 and len(group.links) > 1:
+        return group.links[1][1]
+    return HERE
 
 
 def _best(
     left: GroupTree, right: GroupTree, a: Group, b: Group, names: Places, choices: list[Placement]
 ) -> Placement:
+    """Return the first placement that nearly fits best; a mismatch counts 1 at most."""
     fixed = names.get((a.number, b.number), [])
-    scores = [
-        sum(e / (e + _ODD) for e in _errors(left, right, a, b, fixed, align)) for align in choices
-    ]
+    scores: list[float] = []
+    for align in choices:
+        errors = _errors(left, right, a, b, fixed, align)
+        scores.append(sum(error / (error + _ODD) for error in errors))
     least = min(scores)
     return next(align for align, score in zip(choices, scores, strict=True) if score <= least + 0.5)
 

@@ -135,16 +135,17 @@ def with_capsules(shapes: Sequence[CollisionShape]) -> tuple[CollisionShape, ...
 
 
 def _ends(cylinder: CollisionShape, shapes: Sequence[CollisionShape]) -> Iterator[CollisionShape]:
+    """Yield the first sphere of the cylinder's radius at each of its ends."""
     radius, half = cylinder.size
     for sign in (-1, 1):
         end = cylinder.place.of(np.array([0.0, 0.0, sign * half]))
-        yield from [
-            shape
-            for shape in shapes
-            if shape.kind == "sphere"
-            and abs(shape.size[0] - radius) <= 1e-6 * radius
-            and np.linalg.norm(shape.place.pos - end) <= 1e-3 * radius
-        ][:1]
+        for shape in shapes:
+            if shape.kind != "sphere":
+                continue
+            is_as_wide = abs(shape.size[0] - radius) <= 1e-6 * radius
+            if is_as_wide and np.linalg.norm(shape.place.pos - end) <= 1e-3 * radius:
+                yield shape
+                break
 
 
 def laid_on(shape: CollisionShape, other: CollisionShape) -> CollisionShape:

@@ -17,11 +17,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ... import models
-from ...errors import ModelError, refuse
+from ...errors import ModelError
 from ...interface import Array
 from ...measures.text import grouped
 from ...rotations import HERE, Placement
-from .records import CollisionShape, Follows, Inertial, Link, Robot, RobotJoint
+from .records import CollisionShape, Follows, Inertial, Link, Range, Robot, RobotJoint
 from .shapes import read_mesh, volume_of
 
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
@@ -81,14 +81,10 @@ class _Reader:
     def robot(self) -> Robot:
         root = _parse(self.path)
         elements = _by_name(root, "link")
-        refuse(
-            (
-                len(elements) > _MOST,
-                f"it has {len(elements):,} links, and {_MOST:,} are the most here",
-            ),
-            (not elements, "it has no <link>"),
-            error=ModelError,
-        )
+        if len(elements) > _MOST:
+            raise ModelError(f"it has {len(elements):,} links, and {_MOST:,} are the most here")
+        if not elements:
+            raise ModelError("it has no <link>")
         hung: dict[str, tuple[str, Element]] = {}
         for joint in _by_name(root, "joint").values():
             parent, child = _end(joint, "parent", elements), _end(joint, "child", elements)
@@ -100,13 +96,15 @@ class _Reader:
             self.notes.append(
                 "its <transmission> elements are for a controller and are not compared"
             )
+        links: list[Link] = []
+        for name in order:
+            parent, joint = hung.get(name, ("", None))
+            links.append(self._link(name, elements[name], parent, joint))
         return Robot(
             name="/".join(self.path.parts[-2:]),
             reader="its XML",
             format="URDF",
-            links=tuple(
-                self._link(name, elements[name], *hung.get(name, ("", None))) for name in order
-            ),
+            links=tuple(links),
             frames=(),
             actuators=None,
             settings=None,
@@ -156,15 +154,11 @@ class _Reader:
             self.notes.append(f"{where} is a <{kind}>, which is not known here")
         if min(size, default=0) < 0:
             raise ModelError(f"{where} has a negative size")
-        return CollisionShape(
-            kind,
-            _origin(element, where),
-            size,
-            points=None if points is None else points.reshape(-1, 3),
-            volume=None if points is None else volume_of(points),
-            name=element.get("name", ""),
-            label=element.get("name", ""),
-        )
+        name = element.get("name", "")
+        shape = CollisionShape(kind, _origin(element, where), size, name=name, label=name)
+        if points is None:
+            return shape
+        return replace(shape, points=points.reshape(-1, 3), volume=volume_of(points))
 
 
 def _by_name(root: Element, tag: str) -> dict[str, Element]:
@@ -220,30 +214,43 @@ def _joint(element: Element) -> RobotJoint | None:
     # What the format takes where no axis is given.
     axis = _numbers(element, "axis", "xyz", 3, where, (1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
-    limits, follows, limited = None, None, kind in ("revolute", "prismatic")
-    refuse(
-        (length < 1e-9 and kind != "floating", f"the axis of {where} is zero"),
-        (limited and element.find("limit") is None, f"{where} is {kind} and has no <limit>"),
-        error=ModelError,
-    )
-    if limited:
-        low, high = (_said(element, "limit", end, where) or 0.0 for end in ("lower", "upper"))
-        limits = (low, high) if low <= high else None  # PyBullet's way to say "none"
-    if (mimic := element.find("mimic")) is not None:
-        factor = float(_numbers(mimic, ".", "multiplier", 1, where, (1.0,))[0])
-        follows = Follows(mimic.get("joint", ""), factor, _said(mimic, ".", "offset", where) or 0.0)
-    return RobotJoint(
-        name=name,
-        kind=_KINDS[kind],
-        axis=axis / max(length, 1e-9),
-        anchor=np.zeros(3),
-        limits=limits,
+    if length < 1e-9 and kind != "floating":
+        raise ModelError(f"the axis of {where} is zero")
+    joint = RobotJoint(name, _KINDS[kind], axis / max(length, 1e-9), anchor=np.zeros(3))
+    return replace(
+        joint,
+        limits=_limits(element, kind, where),
         velocity=_said(element, "limit", "velocity", where),
         effort=_said(element, "limit", "effort", where),
         damping=_said(element, "dynamics", "damping", where),
         friction=_said(element, "dynamics", "friction", where),
-        follows=follows,
+        follows=_follows(element, where),
     )
+
+
+def _limits(joint: Element, kind: str, where: str) -> Range | None:
+    """Return the limits of a joint [rad or m]; None where it has none.
+
+    Raises:
+        ModelError: It is of a type that has limits, and gives none.
+    """
+    if kind not in ("revolute", "prismatic"):
+        return None
+    if joint.find("limit") is None:
+        raise ModelError(f"{where} is {kind} and has no <limit>")
+    low = _said(joint, "limit", "lower", where) or 0.0
+    high = _said(joint, "limit", "upper", where) or 0.0
+    return (low, high) if low <= high else None  # PyBullet's way to say "none"
+
+
+def _follows(joint: Element, where: str) -> Follows | None:
+    """Return which joint it mimics, if it mimics one."""
+    mimic = joint.find("mimic")
+    if mimic is None:
+        return None
+    factor = float(_numbers(mimic, ".", "multiplier", 1, where, (1.0,))[0])
+    offset = _said(mimic, ".", "offset", where) or 0.0
+    return Follows(mimic.get("joint", ""), factor, offset)
 
 
 def _inertial(link: Element, of: str) -> Inertial | None:
@@ -266,18 +273,17 @@ def _origin(element: Element, where: str) -> Placement:
     zeros = (0.0, 0.0, 0.0)
     pos = _numbers(element, "origin", "xyz", 3, where, zeros)
     rpy = _numbers(element, "origin", "rpy", 3, where, zeros).tolist()
-    (sr, sp, sy), (cr, cp, cy) = ([f(angle) for angle in rpy] for f in (math.sin, math.cos))
+    sr, sp, sy = [math.sin(angle) for angle in rpy]
+    cr, cp, cy = [math.cos(angle) for angle in rpy]
     # Rz(yaw)·Ry(pitch)·Rx(roll), as the format defines its rpy.
-    mat = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return Placement(pos, np.array(mat))
+    first = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
+    second = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
+    third = [-sp, cp * sr, cp * cr]
+    return Placement(pos, np.array([first, second, third]))
 
 
 def _said(element: Element, path: str, attribute: str, where: str) -> float | None:
-    """The number of an attribute of an element below; None where the file does not give it."""
+    """Return the number of an attribute of an element below; None where the file gives none."""
     numbers = _numbers(element, path, attribute, 1, where, ())
     return float(numbers[0]) if len(numbers) else None
 
@@ -294,7 +300,7 @@ def _numbers(
     where: str,
     default: tuple[float, ...] | None = None,
 ) -> Array:
-    """The numbers (count,) of an attribute of an element below, "." for the element itself."""
+    """Return the numbers (count,) of an attribute of an element below, or "." for itself."""
     part = element.find(path)
     text = None if part is None else part.get(attribute)
     if text is not None:

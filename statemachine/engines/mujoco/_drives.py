@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -155,7 +155,7 @@ def _sensors(sides: Sides) -> Iterator[ModelDifference]:
     yield from sides.extras("sensor", pairs, lambda raw, k: zeros(("sensor_cutoff",), raw, k))
     ours = [b for _, b in pairs]
     if ours != sorted(ours):
-        orders = [", ".join(name_of(right, "sensor", b) for b in s) for s in (ours, sorted(ours))]
+        orders = _named(right, ours), _named(right, sorted(ours))
         refused = ""
         if not len(ours) == left.nsensor == right.nsensor:
             refused = "one of the sides has other sensors, too, which have places among them"
@@ -167,6 +167,11 @@ def _sensors(sides: Sides) -> Iterator[ModelDifference]:
             edits=() if refused else _reordered_sensors(right, ours),
             refused=refused,
         )
+
+
+def _named(raw: Any, sensors: Iterable[int]) -> str:
+    """Return the names of sensors, in their order."""
+    return ", ".join(name_of(raw, "sensor", sensor) for sensor in sensors)
 
 
 def _reordered_sensors(raw: Any, order: list[int]) -> tuple[Edit, ...]:

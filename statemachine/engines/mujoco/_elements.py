@@ -144,10 +144,12 @@ def equalities(sides: Sides) -> Iterator[ModelDifference]:
             values = differing(("eq_data",), [wanted[:used]], [there[:used]])
             edits = [("eq_data", (b,), wanted)]
             yield sides.tell("parameters", "equality", a, values, "", edits)
-    yield from sides.extras(
-        *("equality", pairs),
-        lambda raw, k: zeros(("eq_active0",), raw, k) if raw.eq_active0[k] else (),
-    )
+    yield from sides.extras("equality", pairs, _deactivated)
+
+
+def _deactivated(raw: Any, k: int) -> tuple[Edit, ...]:
+    """Return the edits that switch an equality off; none where it is off."""
+    return zeros(("eq_active0",), raw, k) if raw.eq_active0[k] else ()
 
 
 def _match(sides: Sides) -> Iterator[tuple[int, int]]:
@@ -226,10 +228,14 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
 
     def pairs(kind: str, ends: Callable[[Any], Iterable[tuple[int, int]]]) -> Pairs:
         """Those of either model that are of the same two elements."""
-        ours, theirs = (
-            [{sides.there(side, kind, int(end)) for end in pair} for pair in ends(raw)]
-            for side, raw in enumerate(sides.raws)
-        )
+        found: list[list[set[int]]] = []
+        for side, raw in enumerate(sides.raws):
+            found.append([])
+            for first, second in ends(raw):
+                found[side].append(
+                    {sides.there(side, kind, int(first)), sides.there(side, kind, int(second))}
+                )
+        ours, theirs = found
         return [(k, theirs.index(pair)) for k, pair in enumerate(ours) if pair in theirs]
 
     alike = pairs("geom", lambda raw: zip(raw.pair_geom1, raw.pair_geom2, strict=True))
@@ -249,12 +255,13 @@ def as_geoms(raw: Any, k: Any) -> tuple[Edit, ...]:
     if not (bodies_meet(raw, *bodies) and masks_meet(raw, g, h)):
         return (("pair_margin", (k,), NO_TOUCH),)
     condim, friction, solref, solimp = mixed(raw, g, h)
-    return (
-        ("pair_dim", (k,), condim),
-        ("pair_friction", (k,), friction[[0, 0, 1, 2, 2]]),
-        ("pair_solref", (k,), solref),
-        ("pair_solreffriction", (k,), np.zeros(2)),
-        ("pair_solimp", (k,), solimp),
-        ("pair_margin", (k,), raw.geom_margin[[g, h]].max()),
-        ("pair_gap", (k,), raw.geom_gap[[g, h]].max()),
-    )
+    values = {
+        "pair_dim": condim,
+        "pair_friction": friction[[0, 0, 1, 2, 2]],
+        "pair_solref": solref,
+        "pair_solreffriction": np.zeros(2),
+        "pair_solimp": solimp,
+        "pair_margin": raw.geom_margin[[g, h]].max(),
+        "pair_gap": raw.geom_gap[[g, h]].max(),
+    }
+    return tuple((name, (k,), value) for name, value in values.items())

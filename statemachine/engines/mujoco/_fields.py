@@ -267,7 +267,7 @@ def known(name: str) -> str:
     """
     if any(name in row.fields for rows in ROWS.values() for row in rows):
         return "compared"
-    fates = (
-        fate for fate, names in FATES.items() if any(fnmatchcase(name, n) for n in names.split())
-    )
-    return next(fates, "")
+    for fate, names in FATES.items():
+        if any(fnmatchcase(name, pattern) for pattern in names.split()):
+            return fate
+    return ""

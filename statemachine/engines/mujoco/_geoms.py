@@ -154,16 +154,19 @@ class Geoms:
         return shapes.chosen(self._sides.left, self._sides.right, pairs)
 
     def _together(self, a: int, b: int) -> list[tuple[int, int]]:
-        """The pairs that share the mesh of `b`, if those of the first model share one, too."""
+        """Return the pairs that share the mesh of `b`, if those of the first model share one."""
         left, right = self._sides.left, self._sides.right
         sharing = (right.geom_type == shapes.MESH) & (right.geom_dataid == right.geom_dataid[b])
         pairs = [pair for pair in self.pairs if sharing[pair[1]]]
-        alike = len(pairs) == sum(sharing[g] for g in self._acting[1]) and all(
-            left.geom_type[geom] == shapes.MESH
-            and shapes.identical(left, int(left.geom_dataid[a]), left, int(left.geom_dataid[geom]))
-            for geom, _ in pairs
-        )
-        return pairs if alike else []
+        if len(pairs) != sum(sharing[geom] for geom in self._acting[1]):
+            return []
+        mesh = int(left.geom_dataid[a])
+        for geom, _ in pairs:
+            if left.geom_type[geom] != shapes.MESH:
+                return []
+            if not shapes.identical(left, mesh, left, int(left.geom_dataid[geom])):
+                return []
+        return pairs
 
 
 def touches(raw: Any) -> Any:

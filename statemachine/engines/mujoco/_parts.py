@@ -91,11 +91,7 @@ def _turn_of_axes(left: Array, right: Array) -> float:
         right: The other.
     """
     (ours, a), (theirs, b) = (np.linalg.eigh(tensor) for tensor in (left, right))
-    equal = [
-        [moments[k + 1] - moments[k] <= _EQUAL * moments[2] for k in (0, 1)]
-        for moments in (ours, theirs)
-    ]
-    low, high = (any(side[k] for side in equal) for k in (0, 1))
+    low, high = (_is_equal(ours, k) or _is_equal(theirs, k) for k in (0, 1))
     if low and high:
         return 0.0
     if low or high:
@@ -111,14 +107,22 @@ def _turn_of_axes(left: Array, right: Array) -> float:
     return min(turns)
 
 
+def _is_equal(moments: Array, k: int) -> bool:
+    """Tell whether a moment of three (3,), which ascend, is the next one, but for rounding."""
+    return bool(moments[k + 1] - moments[k] <= _EQUAL * moments[2])
+
+
 def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:
-    """Whether the bodies of a part are the same ones in the same places."""
+    """Tell whether the bodies of a part are the same ones in the same places."""
+    if len(here) != len(there):
+        return False
     ours, theirs = sides.solids
-    return len(here) == len(there) and all(
-        max(apart(ours.place(a), theirs.place(b))) <= NEAR
-        and sides.left.body(a).name == sides.right.body(b).name
-        for a, b in zip(here, there, strict=True)
-    )
+    for a, b in zip(here, there, strict=True):
+        if not max(apart(ours.place(a), theirs.place(b))) <= NEAR:
+            return False
+        if sides.left.body(a).name != sides.right.body(b).name:
+            return False
+    return True
 
 
 def _of_body(
@@ -246,11 +250,10 @@ def _place(
     alike = all(same(a, b) for a, b in refs)
     held = any(_is_kept(left, a) or _is_kept(right, b) for a, b in joints)
     if not alike and (len(joints) > 1 or held):  # an equality counts from the reference, too
-        zero: list[Edit] = [
-            ("qpos0", (int(right.jnt_qposadr[b]),), ref)
-            for (_, b), (ref, other) in zip(joints, refs, strict=True)
-            if not same(ref, other)
-        ]
+        zero: list[Edit] = []
+        for (_, b), (ref, other) in zip(joints, refs, strict=True):
+            if not same(ref, other):
+                zero.append(("qpos0", (int(right.jnt_qposadr[b]),), ref))
         # Of joints of both kinds the positions have no common unit.
         kinds = {int(left.jnt_type[a]) for a, _ in joints}
         unit = ""

@@ -58,9 +58,6 @@ def readable(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference
 
 def _pairs_of_elements(sides: Sides) -> dict[str, Pairs]:
     """Return pairs of ids by kind of element; of geoms those that touch nothing, too."""
-    from ...backends.actuators import ctrl_owners
-
-    owners = ctrl_owners(sides.left), ctrl_owners(sides.right)
     acting = Geoms(sides).pairs
     return {
         "body": sorted(sides.ids["body"].items()),
@@ -69,11 +66,17 @@ def _pairs_of_elements(sides: Sides) -> dict[str, Pairs]:
         "site": sides.pairs.sites,
         "camera": list(sides.by_name("camera")),
         "tendon": list(sides.by_name("tendon")),
-        "actuator": sorted(
-            {(int(owners[0][a]), int(owners[1][b])) for a, b in sides.pairs.actuators}
-        ),
+        "actuator": _pairs_of_actuators(sides),
         "sensor": list(sides.by_name("sensor")),
     }
+
+
+def _pairs_of_actuators(sides: Sides) -> Pairs:
+    """Return pairs of ids of actuators: of those that take two places in ctrl that are one."""
+    from ...backends.actuators import ctrl_owners  # here: it loads MuJoCo
+
+    ours, theirs = ctrl_owners(sides.left), ctrl_owners(sides.right)
+    return sorted({(int(ours[a]), int(theirs[b])) for a, b in sides.pairs.actuators})
 
 
 def shown_elements(left: Any, right: Any, pairs: Counterparts) -> dict[str, list[tuple[int, int]]]:
@@ -217,10 +220,12 @@ def _tuple(sides: Sides, side: int, k: int, there: int) -> _Entry:
     lost = any(number == NOBODY for _, number, _ in objects)
     target = int(sides.right.tuple_adr[there])
     place = slice(target, target + size)
+    numbers = [number for _, number, _ in objects]
+    theirs = slice(start, start + size)
     edits: tuple[Edit, ...] = (
-        ("tuple_objtype", (place,), np.array(raw.tuple_objtype[start : start + size])),
-        ("tuple_objid", (place,), np.array([number for _, number, _ in objects], dtype=int)),
-        ("tuple_objprm", (place,), np.array(raw.tuple_objprm[start : start + size])),
+        ("tuple_objtype", (place,), np.array(raw.tuple_objtype[theirs])),
+        ("tuple_objid", (place,), np.array(numbers, dtype=int)),
+        ("tuple_objprm", (place,), np.array(raw.tuple_objprm[theirs])),
     )
     # What refers to something that the second model does not have fits nowhere.
     return _Entry(", ".join(words), edits, -1 if lost else size)

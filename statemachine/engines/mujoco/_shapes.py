@@ -43,10 +43,11 @@ def of(raw: Any, geom: int) -> CollisionShape:
         parts = _parts(raw, int(raw.geom_dataid[geom]))
         points = np.array(raw.mesh_vert[parts["mesh_vert"]], dtype=np.float64)
         volume = volume_of(points[raw.mesh_face[parts["mesh_face"]]])
+    sizes = raw.geom_size[geom][: PRIMITIVES.get(word, 0)]
     return CollisionShape(
         kind=word,
         place=placed(raw.geom_pos[geom], raw.geom_quat[geom]),
-        size=tuple(map(float, raw.geom_size[geom][: PRIMITIVES.get(word, 0)])),
+        size=tuple(sizes.tolist()),
         points=points,
         volume=volume,
         name=raw.geom(geom).name,
@@ -75,12 +76,17 @@ def hull(raw: Any, geom: int, points: Any) -> Array:
 
 def apart(left: Array, right: Array) -> float:
     """How far a point of either set (n, 3) is from all of the other, at most [m]."""
-    away = [
-        np.linalg.norm(a[start : start + _CHUNK, None] - b, axis=2).min(axis=1).max()
-        for a, b in ((left, right), (right, left))
-        for start in range(0, len(a), _CHUNK)
-    ]
-    return float(max(away, default=0.0))
+    return max(_farthest(left, right), _farthest(right, left))
+
+
+def _farthest(points: Array, others: Array) -> float:
+    """Return how far a point (n, 3) is from all others at most [m]; 0 of none."""
+    farthest = 0.0
+    for start in range(0, len(points), _CHUNK):
+        chunk = points[start : start + _CHUNK, None]
+        nearest = np.linalg.norm(chunk - others, axis=2).min(axis=1)
+        farthest = max(farthest, float(nearest.max()))
+    return farthest
 
 
 def copied(left: Any, right: Any, ours: int, theirs: int) -> tuple[tuple[Edit, ...], str]:
@@ -137,18 +143,7 @@ def chosen(left: Any, right: Any, pairs: Iterable[tuple[int, int]]) -> dict[int,
         The mesh, by geom of the second.
     """
     own = {b: int(right.geom_dataid[b]) for _, b in pairs}
-    choices = {
-        b: next(
-            # Its own, if that will do.
-            (
-                m
-                for m in (own[b], *range(right.nmesh))
-                if identical(left, left.geom_dataid[a], right, m)
-            ),
-            None,
-        )
-        for a, b in pairs
-    }
+    choices = {b: _identical_mesh(left, left.geom_dataid[a], right, own[b]) for a, b in pairs}
     while True:
         own_choices = {mesh for b, mesh in choices.items() if mesh == own[b]}
         overwritten = {own[b] for b, mesh in choices.items() if mesh is None} - own_choices
@@ -156,6 +151,14 @@ def chosen(left: Any, right: Any, pairs: Iterable[tuple[int, int]]) -> dict[int,
         if not lost:
             return {b: mesh for b, mesh in choices.items() if mesh is not None}
         choices |= dict.fromkeys(lost)
+
+
+def _identical_mesh(left: Any, mesh: int, right: Any, own: int) -> int | None:
+    """Return the mesh of the second model that is one of the first: `own`, if that will do."""
+    for candidate in (own, *range(right.nmesh)):
+        if identical(left, mesh, right, candidate):
+            return candidate
+    return None
 
 
 def identical(left: Any, ours: int, right: Any, theirs: int) -> bool:
@@ -181,11 +184,11 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         return
     # The heights of a field are from 0 to 1 of its largest.
     far = np.abs(data[0] * sizes[0][2] - data[1] * sizes[1][2]).max()
-    edits: tuple[Edit, ...] = (
+    edits: list[Edit] = [
         ("hfield_data", (there,), np.array(data[0])),
         ("hfield_size", (theirs,), np.array(sizes[0])),
-        *copies(("geom_size", "geom_rbound", "geom_aabb"), left, a, b),
-    )
+    ]
+    edits += copies(("geom_size", "geom_rbound", "geom_aabb"), left, a, b)
     users = (right.geom_type == right.geom_type[b]) & (right.geom_dataid == theirs)
     why = "another geom has this height field, too" if users.sum() > 1 else ""
     values = (("farthest point", 0.0, float(far)),)

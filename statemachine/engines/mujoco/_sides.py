@@ -233,10 +233,11 @@ class Sides:
     def _names(self, kind: str) -> list[list[str]]:
         """Names of the elements of each model."""
         word = _COUNTED.get(kind, kind)
-        return [
-            [getattr(raw, word)(k).name for k in range(getattr(raw, f"n{word}"))]
-            for raw in self.raws
-        ]
+        names: list[list[str]] = []
+        for raw in self.raws:
+            element, count = getattr(raw, word), getattr(raw, f"n{word}")
+            names.append([element(k).name for k in range(count)])
+        return names
 
     def tell(
         self,
@@ -276,12 +277,7 @@ class Sides:
         for a, b in pairs:
             for row in fields.ROWS[table or kind]:
                 values = differing(row.fields, *self._entries(row.fields, a, b))
-                acts = not row.when or any(
-                    np.any(entry)
-                    for entries in self._entries(row.when.split(), a, b)
-                    for entry in entries
-                )
-                if values and acts:
+                if values and self._acts(row, a, b):
                     edits = () if back else copies(row.fields, self.left, a, b)
                     edits_one = copies(row.fields, self.right, b, a) if back else ()
                     where = name or name_of(self.left, kind, a)
@@ -296,17 +292,16 @@ class Sides:
                         units=row.units,
                     )
 
+    def _acts(self, row: fields.FieldRow, a: int, b: int) -> bool:
+        """Tell whether what a row needs to act is there, in one of two elements at least."""
+        if not row.when:
+            return True
+        ours, theirs = self._entries(row.when.split(), a, b)
+        return any(np.any(entry) for entry in (*ours, *theirs))
+
     def _entries(self, names: Sequence[str], a: int, b: int) -> list[list[Any]]:
-        """What two elements have in some arrays; a range without its flag is unlimited."""
-        return [
-            [
-                getattr(raw, name)[k]
-                if name not in fields.LIMITED or getattr(raw, fields.LIMITED[name])[k]
-                else np.array([-np.inf, np.inf])
-                for name in names
-            ]
-            for raw, k in ((self.left, a), (self.right, b))
-        ]
+        """Return what two elements have in some arrays; a range without its flag is unlimited."""
+        return [_values(self.left, names, a), _values(self.right, names, b)]
 
     def extras(
         self,
@@ -328,14 +323,16 @@ class Sides:
         for side, names in enumerate(self._names(kind)):
             raw = self.raws[side]
             for k in sorted({*range(len(names))} - {pair[side] for pair in pairs}):
-                edits, values = without(raw, k), (what(raw, k), None)
-                if edits:
-                    yield ModelDifference(
-                        *(f"extra {called or kind}", kind, name_of(raw, kind, k)),
-                        ((kind, *(values[::-1] if side else values)),),
-                        edits=edits if side else (),
-                        edits_one=() if side else edits,
-                    )
+                edits, value = without(raw, k), what(raw, k)
+                if not edits:
+                    continue
+                subject, name = f"extra {called or kind}", name_of(raw, kind, k)
+                if side:
+                    values = ((kind, None, value),)
+                    yield ModelDifference(subject, kind, name, values, edits=edits)
+                else:
+                    values = ((kind, value, None),)
+                    yield ModelDifference(subject, kind, name, values, edits_one=edits)
 
     def elsewhere(
         self, kind: str, a: int, b: int, wanted: Placement, theirs: Placement
@@ -363,3 +360,15 @@ class Sides:
         if max(apart(inner, placed(*(value for _, _, value in edits)))) > _SAME_PLACE:
             edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
         return self.tell("place", kind, a, values, "m", edits, units={TURNED: "rad"})
+
+
+def _values(raw: Any, names: Sequence[str], k: int) -> list[Any]:
+    """Return what an element has in some arrays; a range without its flag is unlimited."""
+    values: list[Any] = []
+    for name in names:
+        flag = fields.LIMITED.get(name)
+        if flag is None or getattr(raw, flag)[k]:
+            values.append(getattr(raw, name)[k])
+        else:
+            values.append(np.array([-np.inf, np.inf]))
+    return values

@@ -63,11 +63,11 @@ class _MjModel(_Object):
 
     def contents(self, thoroughly: bool) -> Contents:
         model, options = self.thing, self.thing.opt
-        return {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options} | {
-            name: getattr(model, name).tobytes()
-            for name, size in self._sizes.items()
-            if thoroughly or size <= _LARGE
-        }
+        contents = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
+        for name, size in self._sizes.items():
+            if thoroughly or size <= _LARGE:
+                contents[name] = getattr(model, name).tobytes()
+        return contents
 
 
 def _bytes(value: Any) -> bytes:

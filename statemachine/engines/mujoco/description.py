@@ -79,7 +79,8 @@ def _without_missing_meshes(path: Path, name: str) -> Robot | None:
             if geom.meshname in missing:
                 if geom.contype or geom.conaffinity:
                     shape = CollisionShape(
-                        *("mesh", placed(geom.pos, geom.quat)),
+                        kind="mesh",
+                        place=placed(geom.pos, geom.quat),
                         name=geom.name,
                         contact={"friction": tuple(map(float, geom.friction))},
                     )
@@ -122,20 +123,18 @@ def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
         above = names[raw.body_parentid[body]] if body else ""
         links += _links(raw, body, above, actuators)
         names.append(links[-1].name)
-    frames = tuple(_frame(raw, site, names) for site in range(raw.nsite))
-    return Robot(
+    robot = Robot(
         name=name,
         reader=f"mujoco {mujoco.__version__}",
         format=form,
         links=tuple(links),
-        frames=frames,
+        frames=tuple(_frame(raw, site, names) for site in range(raw.nsite)),
         actuators=actuators,
         settings=settings_of(raw),
-        defaults=settings_of(empty),
-        touch=shapes.touch_of(empty, 0),
         rooted=True,
         notes=tuple(_notes(raw, links, actuators)),
     )
+    return replace(robot, defaults=settings_of(empty), touch=shapes.touch_of(empty, 0))
 
 
 def _frame(raw: Any, site: int, links: list[str]) -> RobotFrame:
@@ -171,22 +170,26 @@ def _links(raw: Any, body: int, above: str, actuators: tuple[Actuator, ...]) -> 
 def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
     dof, kind = int(raw.jnt_dofadr[joint]), JointType(raw.jnt_type[joint])
     scalar = kind in (JointType.SLIDE, JointType.HINGE)
-    return RobotJoint(
+    plain = RobotJoint(
         name=name_of(raw, "joint", joint),
         kind=kind.name.lower(),
         axis=np.array(raw.jnt_axis[joint]),
         anchor=np.array(raw.jnt_pos[joint]),
         limits=_limited(raw.jnt_range[joint], raw.jnt_limited[joint]),
-        velocity=None,
-        effort=_effort(raw, joint, actuators) if scalar else None,
+        number=joint,
+    )
+    told = replace(
+        plain,
         armature=float(raw.dof_armature[dof]),
         damping=float(raw.dof_damping[dof]),
         friction=float(raw.dof_frictionloss[dof]),
         stiffness=float(raw.jnt_stiffness[joint]),
-        rest=float(raw.qpos_spring[raw.jnt_qposadr[joint]]) if scalar else None,
         follows=_follows(raw, joint),
-        number=joint,
     )
+    if not scalar:
+        return told
+    rest = float(raw.qpos_spring[raw.jnt_qposadr[joint]])
+    return replace(told, effort=_effort(raw, joint, actuators), rest=rest)
 
 
 def _follows(raw: Any, joint: int) -> Follows | None:
@@ -272,26 +275,36 @@ def _most(raw: Any, i: int, drive: Actuator) -> float:
 
 
 def _actuator(raw: Any, i: int) -> Actuator:
+    """Return an actuator, with the gains of a position servo if it is one."""
     gain, bias = raw.actuator_gainprm[i], raw.actuator_biasprm[i]
-    form = int(raw.actuator_biastype[i])  # mjtBias: none, affine, …
-    kinds = {
-        "general": raw.actuator_dyntype[i] or raw.actuator_gaintype[i],
-        "motor": form == 0,
-        "position": form == 1 and not bias[0] and bias[1] == -gain[0],
-        "velocity": form == 1 and not bias[:2].any() and bias[2] == -gain[0],
-    }
-    kind = next((kind for kind, holds in kinds.items() if holds), "general")
-    position = kind == "position"
     joint = name_of(raw, "joint", int(raw.actuator_trnid[i, 0])) if _drives_a_joint(raw, i) else ""
     control = raw.actuator_ctrladr[i]  # the first of several
-    return Actuator(
+    actuator = Actuator(
         name=raw.actuator(i).name or f"actuator {i}",
         joint=joint,
-        kind=kind,
-        kp=float(gain[0]) if position else None,
-        kv=float(-bias[2]) if position else None,
-        gain=None if position else float(gain[0]),
+        kind=_actuator_kind(raw, i),
+        kp=None,
+        kv=None,
+        gain=float(gain[0]),
         gear=float(raw.actuator_gear[raw.actuator_outadr[i], 0]),
         forcerange=_limited(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
         ctrlrange=_limited(raw.actuator_ctrlrange[control], raw.actuator_ctrllimited[control]),
     )
+    if actuator.kind != "position":
+        return actuator
+    return replace(actuator, kp=float(gain[0]), kv=float(-bias[2]), gain=None)
+
+
+def _actuator_kind(raw: Any, i: int) -> str:
+    """Return the kind of an actuator: position, velocity, motor, or general."""
+    if raw.actuator_dyntype[i] or raw.actuator_gaintype[i]:
+        return "general"
+    gain, bias = raw.actuator_gainprm[i], raw.actuator_biasprm[i]
+    form = int(raw.actuator_biastype[i])  # mjtBias: none, affine, …
+    if form == 0:
+        return "motor"
+    if form == 1 and not bias[0] and bias[1] == -gain[0]:
+        return "position"
+    if form == 1 and not bias[:2].any() and bias[2] == -gain[0]:
+        return "velocity"
+    return "general"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,15 +28,20 @@ from ._sides import Sides, plain, same
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {
-    *("body_ipos", "body_iquat", "geom_pos", "geom_quat", "geom_size"),
-    *("geom_margin", "geom_gap"),
+    "body_ipos",
+    "body_iquat",
+    "geom_pos",
+    "geom_quat",
+    "geom_size",
+    "geom_margin",
+    "geom_gap",
 }
 
 
 def differences(
     left: Any, right: Any, pairs: Counterparts, *, world: bool = True
 ) -> tuple[ModelDifference, ...]:
-    """All that two compiled models differ in and that can change a motion.
+    """Return all that two compiled models differ in and that can change a motion.
 
     Args:
         left: An mjModel.
@@ -45,18 +50,15 @@ def differences(
         world: Whether gravity and the timestep are compared, too.
     """
     sides = Sides(left, right, pairs)
-    geoms = Geoms(sides)
-    return (
-        *_options(left, right, world),
-        *weights(sides),
-        *places(sides),
-        *geoms.differences(),
-        *elements(sides),
-        *equalities(sides),
-        *drives(sides),
-        *contact_pairs(sides),
-        *_whole(left, right),
-    )
+    found = list(_options(left, right, world))
+    for rows_of in (weights, places, _geoms, elements, equalities, drives, contact_pairs):
+        found += rows_of(sides)
+    found += _whole(left, right)
+    return tuple(found)
+
+
+def _geoms(sides: Sides) -> Iterable[ModelDifference]:
+    return Geoms(sides).differences()
 
 
 def edited(raw: Any, edits: Iterable[Edit]) -> Any:
@@ -129,10 +131,11 @@ def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
     overridden = (left.opt.enableflags | right.opt.enableflags) & overrides
     ours, theirs = settings_of(left), settings_of(right)
     for subject, options in fields.OPTIONS.items():
-        idle = (not world and subject in ("gravity", "timestep")) or (
-            subject == "contact override" and not overridden
-        )
-        names = [name for name in options if not (idle or same(ours[name], theirs[name]))]
+        if not world and subject in ("gravity", "timestep"):
+            continue
+        if subject == "contact override" and not overridden:
+            continue
+        names = [name for name in options if not same(ours[name], theirs[name])]
         if names:
             values = tuple((name, ours[name], theirs[name]) for name in names)
             edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
@@ -185,24 +188,31 @@ def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
 
 
 _GAINS = ("actuator_gainprm", "actuator_biasprm")
+_ENDS, _EACH = ("lower end", "upper end"), ("{}[{}]",)
 # Fields whose entries mean something one by one, and what each is called; a name with {} is of all.
 _SPLIT: dict[str, Sequence[str]] = {
-    **dict.fromkeys(
-        (
-            *("body_ipos", "body_pos", "jnt_pos", "geom_pos", "site_pos", "geom_surfacevel"),
-            *("opt.gravity", "opt.wind", "opt.magnetic"),
-        ),
-        ("x", "y", "z"),
-    ),
-    **dict.fromkeys(
-        (
-            *("jnt_range", "jnt_actfrcrange", "tendon_range", "tendon_actfrcrange"),
-            *("actuator_ctrlrange", "actuator_forcerange", "actuator_actrange"),
-        ),
-        ("lower end", "upper end"),
-    ),
-    **dict.fromkeys(("geom_size", "geom_friction", "pair_friction"), ("{}[{}]",)),
-    **dict.fromkeys(("actuator_gear", *_GAINS), ("{}[{}]",)),
+    "body_ipos": "xyz",
+    "body_pos": "xyz",
+    "jnt_pos": "xyz",
+    "geom_pos": "xyz",
+    "site_pos": "xyz",
+    "geom_surfacevel": "xyz",
+    "opt.gravity": "xyz",
+    "opt.wind": "xyz",
+    "opt.magnetic": "xyz",
+    "jnt_range": _ENDS,
+    "jnt_actfrcrange": _ENDS,
+    "tendon_range": _ENDS,
+    "tendon_actfrcrange": _ENDS,
+    "actuator_ctrlrange": _ENDS,
+    "actuator_forcerange": _ENDS,
+    "actuator_actrange": _ENDS,
+    "geom_size": _EACH,
+    "geom_friction": _EACH,
+    "pair_friction": _EACH,
+    "actuator_gear": _EACH,
+    "actuator_gainprm": _EACH,
+    "actuator_biasprm": _EACH,
     "body_inertia": ("diaginertia[{1}]",),
 }
 # A difference that sets one of these is a thing of one piece: the rest means something else then.
@@ -210,42 +220,60 @@ _KINDS = ("geom_type", "actuator_gaintype", "actuator_biastype", "actuator_dynty
 
 
 def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
-    """A difference by its single entries, or itself where it is of one piece.
+    """Return a difference by its single entries, or itself where it is of one piece.
 
     Args:
         right: The compiled model that its edits are of.
         difference: One of `differences`.
     """
-    whole = difference.only_read or difference.subject.startswith("extra ")
-    if whole or difference.edits_one or difference.refused:
+    if difference.only_read or difference.subject.startswith("extra "):
+        return (difference,)
+    if difference.edits_one or difference.refused:
         return (difference,)
     edits = [edit for edit in difference.edits if not same(edit[2], _read(right, edit))]
-    if any(
-        name in _KINDS or name.endswith("limited") or any(isinstance(part, slice) for part in index)
-        for name, index, _ in edits
-    ):
+    if any(_is_of_one_piece(edit) for edit in edits):
         return (difference,)
-    # The gain of a servo stands in two places, which are one entry.
-    gains = [edit for edit in edits if edit[0] in _GAINS]
-    both = [[edit[2] for edit in gains], [_read(right, edit) for edit in gains]]
-    servo = len(gains) == 2 and all(_is_servo(*arrays) for arrays in both)
-    parts = grouped(
-        ("kp" if servo and entry[0] in ("gainprm[0]", "biasprm[1]") else entry[0], entry)
-        for edit in edits
-        for entry in _by_entry(right, edit)
-    )
+    changes: list[tuple[str, _Entry]] = []
+    is_servo = _changes_a_servo(right, edits)
+    for edit in edits:
+        for entry in _by_entry(right, edit):
+            # The gain of a servo stands in two places, which are one entry.
+            is_gain = is_servo and entry.name in ("gainprm[0]", "biasprm[1]")
+            changes.append(("kp" if is_gain else entry.name, entry))
+    parts = grouped(changes)
     if len(parts) < 2:
         return (difference,)
-    return tuple(
-        replace(
-            difference,
-            subject=f"{difference.subject} ({name})",
-            values=((name, *rows[0][1:3]),),
-            unit=rows[0][3] or difference.unit_of(_word(rows[0][4][0])),
-            units={},
-            edits=tuple(row[4] for row in rows),
-        )
-        for name, rows in parts.items()
+    return tuple(_part(difference, name, rows) for name, rows in parts.items())
+
+
+def _is_of_one_piece(edit: Edit) -> bool:
+    """Tell whether an edit is of something whose entries mean nothing one by one."""
+    name, index, _ = edit
+    if name in _KINDS or name.endswith("limited"):
+        return True
+    return any(isinstance(part, slice) for part in index)
+
+
+def _changes_a_servo(right: Any, edits: Sequence[Edit]) -> bool:
+    """Tell whether edits make one position servo of another."""
+    gains = [edit for edit in edits if edit[0] in _GAINS]
+    if len(gains) != 2:
+        return False
+    wanted = [edit[2] for edit in gains]
+    now = [_read(right, edit) for edit in gains]
+    return _is_servo(*wanted) and _is_servo(*now)
+
+
+def _part(difference: ModelDifference, name: str, entries: Sequence[_Entry]) -> ModelDifference:
+    """Return the part of a difference that is of one entry, which may stand in several places."""
+    first = entries[0]
+    return replace(
+        difference,
+        subject=f"{difference.subject} ({name})",
+        values=((name, first.left, first.right),),
+        unit=first.unit or difference.unit_of(_word(first.edit[0])),
+        units={},
+        edits=tuple(entry.edit for entry in entries),
     )
 
 
@@ -255,22 +283,40 @@ def _word(array: str) -> str:
     return rest or kind
 
 
-def _by_entry(right: Any, edit: Edit) -> Iterator[tuple[str, Any, Any, str, Edit]]:
-    """What an entry is called, both values, its unit if that is another, what brings it over."""
+@dataclass(frozen=True, eq=False)
+class _Entry:
+    """A single entry that an edit changes.
+
+    Attributes:
+        name: What it is called.
+        left, right: Its value in each model.
+        unit: Its SI unit, if that is another one than that of its array.
+        edit: What brings it over.
+    """
+
+    name: str
+    left: Any
+    right: Any
+    unit: str
+    edit: Edit
+
+
+def _by_entry(right: Any, edit: Edit) -> Iterator[_Entry]:
+    """Yield the entries that an edit changes."""
     (name, index, value), old = edit, _read(right, edit)
     word, names = _word(name), _SPLIT.get(name)
     if name in ("body_quat", "geom_quat", "site_quat"):
         angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
-        yield "turn", 0.0, angle, "rad", edit
+        yield _Entry("turn", 0.0, angle, "rad", edit)
     elif names is None or not np.ndim(value):
         word += "".join(f"[{k}]" for k in index[1:2])
-        yield word, plain(value), plain(old), "", edit
+        yield _Entry(word, plain(value), plain(old), "", edit)
     else:
         for k in range(len(value)):
             if not same(value[k], old[k]):
                 called = names[0].format(word, k) if len(names) == 1 else names[k]
                 left, other = float(value[k]), float(old[k])
-                yield called, left, other, "", (name, (*index, k), left)
+                yield _Entry(called, left, other, "", (name, (*index, k), left))
 
 
 def _is_servo(gains: Any, biases: Any) -> bool:

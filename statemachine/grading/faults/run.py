@@ -288,8 +288,7 @@ def _run(
         command = _command(path.name, backend, folder, str(settings), str(record))
         outcome = sandbox.run(
             command,
-            cpu=seconds,
-            wall=clock,
+            sandbox.Limits(cpu=seconds, wall=clock),
             started=lambda: record.stat().st_size > 0,
             cwd=path.parent,
             env=env,

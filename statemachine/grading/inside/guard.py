@@ -30,8 +30,8 @@ PUBLIC = (
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
     *PUBLIC, "_models", "drawing", "engines", "freshness", "installed", "measures", "model_files",
-    "page", "probes", "processes", "release_names", "releases", "show", "typed_numbers",
-    "witness",
+    "page", "probes", "processes", "release_names", "releases", "robot_packages", "show",
+    "typed_numbers", "witness",
 )  # fmt: skip
 
 _PROCESS, _PROGRAM = "it starts another process", "it starts another program"

@@ -169,16 +169,25 @@ def _why(
         for name, places in right.others.items():
             if near(reading, places[k], slack):
                 return f"that is the place of {name}, {away}; {TIP!r} is asked for"
+    if text := _other_pose(k, reading, world.model, right, answer, away):
+        return text
+    apart = told_apart(reading, expected, lambda place, digits: f"{vector(place, digits)} m")
+    return f"you return {apart} is expected, {away}"
+
+
+def _other_pose(
+    k: int, reading: Array, model: Model, right: Readings, answer: Answer, away: str
+) -> str:
+    """Return that reading k (3,) [m] is of another pose of the arm; "" where it is of none."""
     if k < 3 and near(reading, right.tip[3], TOLERANCE):
-        if _wrote_before_forward(answer, address(world.model)):
+        if _wrote_before_forward(answer, address(model)):
             return f"qpos was written before the first forward: that is the new pose, {away}"
         return f"forward was called before it was read: that is the new pose already, {away}"
     if k == 0 and near(reading, right.tip[1], TOLERANCE):
         return f"forward was called before it: a new Data has nothing derived yet; you are {away}"
-    if k == 3 and (text := _pose(reading, world.model, answer, away)):
-        return text
-    apart = told_apart(reading, expected, lambda place, digits: f"{vector(place, digits)} m")
-    return f"you return {apart} is expected, {away}"
+    if k == 3:
+        return _pose(reading, model, answer, away)
+    return ""
 
 
 def _wrote_before_forward(answer: Answer, place: int) -> bool:
