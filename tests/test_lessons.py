@@ -49,7 +49,7 @@ from statemachine.page import (
     Traces,
     Verdict,
 )
-from statemachine.report import quiz
+from statemachine.report import asking, quiz
 from statemachine.report import terminal as bar
 from statemachine.report.quiz import RecordedReader
 from statemachine.runs import record_scenario
@@ -776,9 +776,9 @@ def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("builtins.input", Mock(side_effect=EOFError))
     assert quiz.Reader().ask(question) is None
-    refused((quiz.Stopped, "", lambda: quiz.Reader().go_on()))
+    refused((asking.Stopped, "", lambda: quiz.Reader().go_on()))
     monkeypatch.setattr("builtins.input", lambda _: "q")
-    refused((quiz.Stopped, "", lambda: quiz.Reader().ask(question)))
+    refused((asking.Stopped, "", lambda: quiz.Reader().ask(question)))
 
 
 def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
@@ -808,7 +808,7 @@ def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
         "_take",
         lambda _request: (Page("t", "o", [Question("q", ("a", "b"), 0, "because")]), {}),
     )
-    monkeypatch.setattr(quiz, "can_ask", lambda: True)
+    monkeypatch.setattr(asking, "can_ask", lambda: True)
 
 
 @pytest.mark.usefixtures("short_path", "pinocchio")

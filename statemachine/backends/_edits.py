@@ -14,7 +14,6 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array
-from ._delays import SHORTER, commands_kept, with_room
 from ._release_child import held
 from .actuators import servos
 
@@ -69,6 +68,8 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
             arrays["geom_friction"] = friction = _rows(raw.geom_friction, value)
             friction[..., 0] = value
         elif name == "latency":
+            from ._delays import SHORTER
+
             owner, _ = servos(raw)
             arrays["actuator_delay"] = delay = np.zeros((*value.shape[:-1], raw.nactuator))
             delay[..., owner] = SHORTER * value
@@ -122,6 +123,8 @@ def varied(
     Returns:
         The compiled model, with room for the longest latency; (n, ...) arrays, as `changes`.
     """
+    from ._delays import commands_kept, with_room
+
     arrays = changes(raw, options)
     arrays |= {
         f"opt.{name}": options[name] for name in ("timestep", "integrator") if name in options
@@ -162,6 +165,10 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any], timestep: float) -> muj
     if CONSTANTS_FOLLOW & options.keys():
         mujoco.mj_setConst(raw, mujoco.MjData(raw))
     raw.opt.timestep = timestep
+    if not raw.actuator_delay.any():
+        return raw
+    from ._delays import with_room
+
     return with_room(raw)
 
 

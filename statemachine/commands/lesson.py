@@ -195,7 +195,7 @@ def path_requests_of(options: argparse.Namespace) -> list[LessonRequest]:
 
 def run(options: argparse.Namespace) -> int:
     """Take one lesson, on one backend or all."""
-    from ..report.quiz import Stopped
+    from ..report.asking import Stopped
 
     request = request_of(options)
     reader = _reader(options, request.lesson)
@@ -261,7 +261,7 @@ def _show_path(
 ) -> int:
     """Show lessons, and the last page; where the reader stops, say how to go on."""
     from ..report import terminal
-    from ..report.quiz import Stopped
+    from ..report.asking import Stopped
 
     code, lesson = 0, requests[0].lesson
     try:
@@ -348,18 +348,23 @@ def _reader(options: argparse.Namespace, lesson: Lesson) -> Reader | None:
     Raises:
         BadInputError: Predictions are to be kept, and nobody is asked for any.
     """
-    from ..report.quiz import Reader, RecordedReader, can_ask
+    from ..report.asking import can_ask
 
-    is_asked = can_ask() and not options.json and not options.no_questions
+    if options.json or options.no_questions or not can_ask():
+        if options.record is not None:
+            raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
+        return None
+    from ..report.quiz import Reader, RecordedReader
+
     if options.record is None:
-        return Reader(lesson.name) if is_asked else None
-    if not is_asked:
-        raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
+        return Reader(lesson.name)
     return RecordedReader(Path(options.record), lesson.name)
 
 
 def _show_summary(reader: Reader | None) -> None:
     """Print what a reader's file says by now, if their predictions are kept."""
+    if reader is None:
+        return
     from ..report.quiz import RecordedReader
 
     if isinstance(reader, RecordedReader):

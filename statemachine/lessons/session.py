@@ -18,7 +18,7 @@ import statemachine
 from ..backends import backend_engine
 from ..interface import Array, Data, Model, make_data, step
 from ..page import Block, Code, Page, Printed
-from ..probes.calls import record, recorded_engines, statements
+from ..probes.code_statements import statements
 from ..runs.drive import Progress, silent, steps_in
 from ..runs.robot import is_the_arm, warn_of_start
 from . import Lesson, module, template
@@ -231,11 +231,16 @@ def take(
     code = lesson_module.code(model, values, load_line(name or lesson.model, backend, menagerie))
     with CodeRun(code, model) as play:
         result = lesson_module.run(play, values, progress)
-    recording = None
-    engine = backend_engine(backend) or backend
-    if calls and engine in recorded_engines():
-        recording = record(code, engine)
+    recording = _recorded(code, backend) if calls else None
     return LessonRun(result, code, play.printed, is_the_arm(model), recording)
+
+
+def _recorded(code: str, backend: str) -> Recording | None:
+    """Record what some code makes an engine do, if the engine's room can tell."""
+    from ..probes.calls import record, recorded_engines  # here, for it is much, and few ask for it
+
+    engine = backend_engine(backend) or backend
+    return record(code, engine) if engine in recorded_engines() else None
 
 
 def fitted(lesson: Lesson, model: Model, options: Options) -> dict[str, Any]:

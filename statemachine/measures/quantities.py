@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..errors import BadInputError, UnsupportedError, check_name
-from ..interface import DERIVED, Array, Contacts, Data, Ints, Model
+from ..interface import DERIVED, Array, Contacts, Data
 from ..typed_numbers import typed_float
-from .text import few, grouped, milliseconds, rounded
+from .text import milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
 COUNT = 2 * np.pi / 4096
@@ -241,126 +239,3 @@ def readings(data: Data, copied: bool = False) -> dict[str, Array | Contacts]:
             derived[name] = np.array(array) if copied else array
     derived["contacts"] = data.contacts
     return derived
-
-
-# What a contact is called: "gripper on floor", the same in every room.
-
-_T = TypeVar("_T")
-_LISTED = 8  # pairs in a sentence
-_DEEP = 1e-3  # m; what rests on a floor sinks in by less
-
-
-class ContactNames:
-    """Names for the contacts of one model.
-
-    A contact is between two bodies: the one that has more bodies between itself and the world
-    comes first; of two with as many, that with the larger id. What is fixed to the world has
-    the name of its geom. So a robot is on what it touches, and everything is on the floor.
-    """
-
-    def __init__(
-        self,
-        bodies: Sequence[str],
-        geoms: Sequence[str],
-        geom_bodyid: Sequence[int],
-        body_parentid: Sequence[int],
-    ) -> None:
-        """Of names by id, "" for none; the body of each geom, and the parent of each body."""
-        self._bodies = [name or f"body {k}" for k, name in enumerate(bodies)]
-        self._geoms = list(geoms)
-        self._body_of = [int(body) for body in geom_bodyid]
-        self._parents = [int(parent) for parent in body_parentid]
-        self._pairs: dict[tuple[int, int], tuple[str, str]] = {}
-
-    @classmethod
-    def of(cls, model: Model) -> ContactNames:
-        """The names of a Model, made once."""
-        if model not in _OF:
-            _OF[model] = cls(
-                model.body_names,
-                model.geom_names,
-                model.geom_bodyid.tolist(),
-                model.body_parentid.tolist(),
-            )
-        return _OF[model]
-
-    def pair(self, left: int, right: int) -> str:
-        """The bodies of two geoms that touch: "gripper on floor"."""
-        return self._names(left, right)[0]
-
-    def geoms(self, left: int, right: int) -> str:
-        """The same, and which of a body's geoms it is: "gripper on floor (fixed_stud_1)"."""
-        return self._names(left, right)[1]
-
-    def _names(self, left: int, right: int) -> tuple[str, str]:
-        """Both, worked out once: a contact lasts for many steps."""
-        if (left, right) not in self._pairs:
-            upper, lower = sorted((left, right), key=self._distance, reverse=True)
-            pair = f"{self._owner(upper)} on {self._owner(lower)}"
-            shapes = [
-                self._geoms[geom]
-                for geom in (upper, lower)
-                if self._geoms[geom] not in ("", self._owner(geom))
-            ]
-            with_shapes = f"{pair} ({' on '.join(shapes)})" if shapes else pair
-            self._pairs[left, right] = pair, with_shapes
-        return self._pairs[left, right]
-
-    def _owner(self, geom: int) -> str:
-        """Return the body of a geom; the geom itself where that is fixed to the world."""
-        body = self._body_of[geom]
-        if body == 0 and self._geoms[geom]:
-            return self._geoms[geom]
-        return self._bodies[body]
-
-    def _distance(self, geom: int) -> tuple[int, int]:
-        """Return how many bodies are between a geom and the world, and the number of its own."""
-        body = above = self._body_of[geom]
-        for count in range(len(self._parents)):
-            if not above:
-                return count, body
-            above = self._parents[above]
-        return len(self._parents), body  # a file may say that a body hangs on itself
-
-
-_OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
-
-
-def together(contacts: Iterable[str]) -> str:
-    """Contacts in a list, the geoms of one pair of bodies behind it: "a on b (c, d), e on f"."""
-    parts = (contact.partition(" (") for contact in contacts)
-    geoms = grouped((pair, shapes.removesuffix(")")) for pair, _, shapes in parts)
-    pairs = []
-    for pair, shapes in geoms.items():
-        named = [shape for shape in shapes if shape]
-        pairs.append(f"{pair} ({', '.join(named)})" if named else pair)
-    return few(pairs, _LISTED)
-
-
-def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
-    """Shapes inside each other by more than 1 mm, the deepest first: "gripper on box by 151 mm".
-
-    Args:
-        names: What contacts are called.
-        geoms: (n, 2) of each contact; negative where it is of no geom, which is left out.
-        distances: (n,) [m], negative where shapes overlap.
-    """
-    nearest: dict[str, float] = {}
-    for pair, distance in zip(geoms.tolist(), distances.tolist(), strict=True):
-        if distance < -_DEEP and min(pair) >= 0:
-            name = names.pair(*pair)
-            nearest[name] = min(distance, nearest.get(name, 0.0))
-    deepest = sorted(nearest.items(), key=lambda item: item[1])
-    return [f"{pair} by {rounded(-distance, 'm')}" for pair, distance in deepest]
-
-
-def same_pairs(left: Mapping[str, _T], right: Mapping[str, _T]) -> dict[str, _T]:
-    """What `right` has by pair of bodies, the pairs called as in `left`.
-
-    Two models may number the same bodies in another order.
-    """
-    renamed = {}
-    for pair, value in right.items():
-        turned = " on ".join(reversed(pair.split(" on ")))
-        renamed[turned if turned in left and pair not in left else pair] = value
-    return renamed

@@ -21,14 +21,11 @@ from .. import __version__
 from ..grading import KIND, answers_in
 from ..page import LETTERS, Question
 from ..runs.whole import replace_text
+from .asking import Stopped
 
 _WIDTH_MOST = 100
 _SPLIT = 0.25  # what it costs to split a block: as much as half of a window that stays empty
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-
-
-class Stopped(Exception):  # noqa: N818  (nothing is wrong)
-    """The reader has had enough for now."""
 
 
 def lettered(question: Question) -> list[str]:
@@ -39,11 +36,6 @@ def lettered(question: Question) -> list[str]:
 def answer_of(question: Question) -> str:
     """Return the choice that the run gave."""
     return "none of them" if question.right is None else lettered(question)[question.right]
-
-
-def can_ask() -> bool:
-    """Tell whether somebody is there to answer: both ends are a terminal."""
-    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
 class Reader:

@@ -30,7 +30,7 @@ from ..installed import DEFAULT, WITNESS, require
 from ..interface import Data, Model, get_state, make_data, reset, set_state, step
 from ..lessons.fingertip import certify
 from ..lessons.in_turns import Ratio, in_turns
-from ..probes.audit import future
+from ..probes.state_audit import future
 from ..runs import record_scenario
 from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes

@@ -1,0 +1,75 @@
+"""The moments that two runs share, and values at them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import TraceError
+from ..interface import Array, Ints
+
+SAME = 1e-6  # of a timestep: two moments nearer than this are one
+_FEW = 20  # common moments below which a comparison says nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Common:
+    """The moments that two runs share, counted from the start of each.
+
+    Attributes:
+        time: (n,) since the start [s].
+        left: (n,) rows of the one run.
+        right: (n,) rows of the other.
+    """
+
+    time: Array
+    left: Ints
+    right: Ints
+
+
+def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Common:
+    """Rows of the same moment: nothing is interpolated.
+
+    Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
+
+    Args:
+        left: (n,) ascending, when the rows of a run are [s].
+        right: (m,) those of the other.
+        steps: The timesteps of both [s].
+
+    Raises:
+        TraceError: They share too few moments.
+    """
+    times = [time - time[0] for time in (left, right)]
+    near = nearest(times[1], times[0])
+    # A time is a sum of timesteps: its rounding grows with their number.
+    slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
+    rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
+    if len(rows) < min(_FEW, len(left), len(right)):
+        raise TraceError(
+            f"timesteps of {steps[0]:g} and {steps[1]:g} s have only {len(rows)} moments "
+            "in common: record one of them with the other's timestep"
+        )
+    return Common(times[0][rows], rows, near[rows])
+
+
+def nearest(time: Array, wanted: Array) -> Ints:
+    """The row of the time (n,), ascending, that is nearest to each that is wanted (k,)."""
+    near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
+    near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
+    return near
+
+
+def at_moments(time: Array, values: Array, wanted: Array, slack: float) -> Array:
+    """Values (n, k) of ascending moments (n,) at others (m,).
+
+    Those of the run itself where it has the moment, to within `slack` [s]; else on the line
+    between two of them.
+    """
+    near = nearest(time, wanted)
+    rows = values[near].copy()
+    off = np.flatnonzero(np.abs(time[near] - wanted) > slack)
+    if len(off):
+        rows[off] = np.column_stack([np.interp(wanted[off], time, column) for column in values.T])
+    return rows
