@@ -274,10 +274,7 @@ def _run(
     for name, parts, width in kept:
         inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
     inputs |= {name: np.array(poses) for name, poses in led.items()}
-    # The last rows may have finite numbers that no trace holds.
-    state = np.hstack([inputs["qpos"], inputs["qvel"]])
-    stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
-    rows_left = int(np.append(0, stands)[-1]) + 1  # the first is what it started from
+    rows_left = _rows_within_bounds(inputs)
     if rows_left < len(times):
         if not ended:
             ended = f"a coordinate left every bound at {times[-1]:g} s"
@@ -288,6 +285,13 @@ def _run(
             raise BadInputError(f"the controller left {name} with an entry that is not a number")
     progress(1.0)
     return inputs, ended
+
+
+def _rows_within_bounds(inputs: Arrays) -> int:
+    """Return how many rows a trace can hold: the last ones may have finite numbers beyond it."""
+    state = np.hstack([inputs["qpos"], inputs["qvel"]])
+    stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
+    return int(np.append(0, stands)[-1]) + 1  # the first is what it started from
 
 
 # What follows from the states of a run: what its engine derives, and energies by one yardstick.
