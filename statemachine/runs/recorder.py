@@ -279,12 +279,20 @@ def _run(
         if not ended:
             ended = f"a coordinate left every bound at {times[-1]:g} s"
         inputs = {name: array[:rows_left] for name, array in inputs.items()}
-    for name, array in inputs.items():
-        # A step finds what is not finite itself, but the last row has no step.
-        if not np.isfinite(array[-1]).all():
-            raise BadInputError(f"the controller left {name} with an entry that is not a number")
+    _check_last_row(inputs)
     progress(1.0)
     return inputs, ended
+
+
+def _check_last_row(inputs: Arrays) -> None:
+    """Check that the controller left numbers: a step finds what is none, the last row has no step.
+
+    Raises:
+        BadInputError: An entry is not a finite number.
+    """
+    for name, array in inputs.items():
+        if not np.isfinite(array[-1]).all():
+            raise BadInputError(f"the controller left {name} with an entry that is not a number")
 
 
 def _rows_within_bounds(inputs: Arrays) -> int:
