@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -50,24 +51,29 @@ def check_assignment_copies_in(lab: Lab, model: Model, data: Data) -> None:
     require_equal(data.ctrl, np.arange(6.0) / 10, "ctrl after assignment")
 
 
+def _repeated(value: object, count: int) -> list[object]:
+    """Return a list of a value so many times."""
+    return [value] * count
+
+
 @check(on="box", keyframe=0)
 def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> None:
     """Wrong shape, length, kind, NaN, infinity or a zero quaternion: refused, unchanged."""
     bad: list[tuple[str, Any]] = [
-        ("ctrl", [0.0] * 5),
-        ("ctrl", [[0.0] * 6]),
+        ("ctrl", _repeated(0.0, 5)),
+        ("ctrl", [_repeated(0.0, 6)]),
         ("ctrl", 0.0),
-        ("ctrl", ["a"] * 6),
-        ("ctrl", [None] * 6),
-        ("ctrl", [1j] * 6),
-        ("ctrl", [True] * 6),
-        ("ctrl", [2e10] * 6),
+        ("ctrl", _repeated("a", 6)),
+        ("ctrl", _repeated(None, 6)),
+        ("ctrl", _repeated(1j, 6)),
+        ("ctrl", _repeated(True, 6)),
+        ("ctrl", _repeated(2e10, 6)),
         ("ctrl", np.arange(6).astype(object)),
         ("ctrl", [[1.0], [1.0, 2.0]]),
-        ("ctrl", [np.nan] + [0.0] * 5),
-        ("qpos", [np.inf] * model.nq),
+        ("ctrl", [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ("qpos", _repeated(np.inf, model.nq)),
         ("qpos", np.zeros(model.nq)),
-        ("qvel", [1e300] * model.nv),
+        ("qvel", _repeated(1e300, model.nv)),
         ("time", np.nan),
         ("time", "soon"),
     ]
@@ -221,13 +227,15 @@ def check_closed_data_is_refused(lab: Lab) -> None:
         qpos = data.qpos
         state = get_state(model, data)
     data.close()
-    require_raises(
-        ClosedDataError,
-        *(partial(verb, model, data) for verb in (step, forward, reset, get_state)),
+    calls: list[Callable[[], object]] = [
         partial(set_state, model, data, state),
-        *(partial(getattr, data, name) for name in ("xpos", "contacts", "time", "raw")),
         partial(setattr, data, "ctrl", np.zeros(6)),
-    )
+    ]
+    for verb in (step, forward, reset, get_state):
+        calls.append(partial(verb, model, data))
+    for name in ("xpos", "contacts", "time", "raw"):
+        calls.append(partial(getattr, data, name))
+    require_raises(ClosedDataError, *calls)
     require_equal(qpos, np.zeros(6), "an array that outlived its Data")
     require("closed" in repr(data), "repr does not say that it is closed")
 
@@ -266,8 +274,8 @@ def check_bad_options_are_refused(lab: Lab) -> None:
         {"damping": [1.0, 2.0]},
         {"armature": np.nan},
         {"mass": 1.0},
-        {"mass": 0 * model.body_mass},
-        {"mass": model.body_mass + 1},
+        {"mass": np.zeros_like(model.body_mass)},
+        {"mass": np.add(model.body_mass, 1)},
         {"friction": -0.1},
         {"friction": [1.0, 2.0]},
         {"kp": 0},

@@ -76,16 +76,19 @@ class Pile(ABC):
     @classmethod
     def reset(cls) -> dict[str, dict[str, bool]]:
         """Which quantities are, for each way to reset, still what was written before."""
-        survivors = {}
+        survivors: dict[str, dict[str, bool]] = {}
         for name, way in cls.resets.items():
-            survivors[name] = {
-                quantity: cls._survives(quantity, way) for quantity in cls.quantities
-            }
+            survivors[name] = cls._survivors(way)
             with cls.fresh() as scene:
                 bodies = scene.bodies()
                 way(scene)
                 survivors[name]["bodies"] = scene.bodies() == bodies
         return survivors
+
+    @classmethod
+    def _survivors(cls, act: Callable[[Any], object]) -> dict[str, bool]:
+        """Tell for each quantity whether a number that was written is there after an act."""
+        return {quantity: cls._survives(quantity, act) for quantity in cls.quantities}
 
     @classmethod
     def save(cls) -> dict[str, dict[str, bool]]:
@@ -96,10 +99,13 @@ class Pile(ABC):
                 scene.disturb(quantity)
                 restore(scene)
 
-        return {
-            name: {q: cls._survives(q, partial(there_and_back, q, save)) for q in cls.quantities}
-            for name, save in cls.ways_to_save.items()
-        }
+        brought_back: dict[str, dict[str, bool]] = {}
+        for name, save in cls.ways_to_save.items():
+            brought_back[name] = {}
+            for quantity in cls.quantities:
+                act = partial(there_and_back, quantity, save)
+                brought_back[name][quantity] = cls._survives(quantity, act)
+        return brought_back
 
     @classmethod
     def future(cls, moments: Sequence[float], steps: int) -> dict[str, list[Futures]]:
@@ -119,7 +125,7 @@ class Pile(ABC):
                     restore(scene)
                     return first, scene.run(steps)
 
-        return {name: [start(way)] for name, way in cls.resets.items()} | {
-            name: [middle(save, moment) for moment in moments]
-            for name, save in cls.ways_to_save.items()
-        }
+        futures = {name: [start(way)] for name, way in cls.resets.items()}
+        for name, save in cls.ways_to_save.items():
+            futures[name] = [middle(save, moment) for moment in moments]
+        return futures

@@ -75,17 +75,24 @@ _MARKED_INERTIAL = (
     '<inertial><origin xyz="{at}"/><mass value="{mass}"/>'
     '<inertia ixx="{mass}" ixy="0" ixz="0" iyy="{mass}" iyz="0" izz="{mass}"/></inertial>'
 )
+
+
+def _mark(k: int) -> str:
+    """Return a mark in URDF: a link, and the joint that fixes it to the body."""
+    inertial = _MARKED_INERTIAL.format(at="0 0 0", mass=1e-12)
+    return (
+        f'<link name="mark{k}">{inertial}</link>'
+        f'<joint name="to{k}" type="fixed"><parent link="body"/><child link="mark{k}"/>'
+        f'<origin xyz="{numbers(MARKS[k])}"/></joint>'
+    )
+
+
 # A mark is a link of next to no mass: of a centre of mass PyBullet tells the place in double.
 MARKED_URDF = (
     '<robot name="marked"><link name="body">'
     + _MARKED_INERTIAL.format(at=numbers(CENTRE), mass=1)
     + "</link>"
-    + "".join(
-        f'<link name="mark{k}">{_MARKED_INERTIAL.format(at="0 0 0", mass=1e-12)}</link>'
-        f'<joint name="to{k}" type="fixed"><parent link="body"/><child link="mark{k}"/>'
-        f'<origin xyz="{numbers(mark)}"/></joint>'
-        for k, mark in enumerate(MARKS)
-    )
+    + "".join(map(_mark, range(len(MARKS))))
     + "</robot>"
 )
 
@@ -116,17 +123,24 @@ def _link(joint: str) -> str:
     return joint if joint == "base" else joint[::-1]
 
 
+def _urdf_link(name: str) -> str:
+    return f'<link name="{name}">{_TREE_INERTIAL}</link>'
+
+
+def _urdf_joint(name: str, parent: str, kind: str) -> str:
+    type_ = "continuous" if kind == "hinge" else "fixed"
+    return (
+        f'<joint name="{name}" type="{type_}">'
+        f'<parent link="{_link(parent)}"/><child link="{_link(name)}"/></joint>'
+    )
+
+
 # The links stand in the opposite order, so that no rule about links passes for one about joints.
 TREE_URDF = (
-    f'<robot name="tree"><link name="base">{_TREE_INERTIAL}</link>'
-    + "".join(
-        f'<link name="{_link(name)}">{_TREE_INERTIAL}</link>' for name, _, _ in reversed(TREE)
-    )
-    + "".join(
-        f'<joint name="{name}" type="{"continuous" if kind == "hinge" else "fixed"}">'
-        f'<parent link="{_link(parent)}"/><child link="{_link(name)}"/></joint>'
-        for name, parent, kind in TREE
-    )
+    '<robot name="tree">'
+    + _urdf_link("base")
+    + "".join(_urdf_link(_link(name)) for name, _, _ in reversed(TREE))
+    + "".join(_urdf_joint(*row) for row in TREE)
     + "</robot>"
 )
 

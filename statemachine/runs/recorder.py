@@ -275,20 +275,32 @@ def _run(
     for name, parts, width in kept:
         inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
     inputs |= {name: np.array(poses) for name, poses in led.items()}
-    # The last rows may have finite numbers that no trace holds.
-    state = np.hstack([inputs["qpos"], inputs["qvel"]])
-    stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
-    rows_left = int(np.append(0, stands)[-1]) + 1  # the first is what it started from
+    rows_left = _rows_within_bounds(inputs)
     if rows_left < len(times):
         if not ended:
             ended = f"a coordinate left every bound at {times[-1]:g} s"
         inputs = {name: array[:rows_left] for name, array in inputs.items()}
-    for name, array in inputs.items():
-        # A step finds what is not finite itself, but the last row has no step.
-        if not np.isfinite(array[-1]).all():
-            raise BadInputError(f"the controller left {name} with an entry that is not a number")
+    _check_last_row(inputs)
     progress(1.0)
     return inputs, ended
+
+
+def _check_last_row(inputs: Arrays) -> None:
+    """Check that the controller left numbers: a step finds what is none, the last row has no step.
+
+    Raises:
+        BadInputError: An entry is not a finite number.
+    """
+    for name, array in inputs.items():
+        if not np.isfinite(array[-1]).all():
+            raise BadInputError(f"the controller left {name} with an entry that is not a number")
+
+
+def _rows_within_bounds(inputs: Arrays) -> int:
+    """Return how many rows a trace can hold: the last ones may have finite numbers beyond it."""
+    state = np.hstack([inputs["qpos"], inputs["qvel"]])
+    stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
+    return int(np.append(0, stands)[-1]) + 1  # the first is what it started from
 
 
 # What follows from the states of a run: what its engine derives, and energies by one yardstick.

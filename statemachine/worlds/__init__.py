@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -37,17 +38,22 @@ from .verbs import (
 # options = draw(model, 1024, seed=0, mass=(0.8, 1.2), friction=Uniform(0.5, 1.5, each=True))
 # worlds = make_worlds(model, 1024, **options)
 
+
+def _sliding_friction(model: Model) -> Array:
+    return model.geom_friction[:, 0]
+
+
 # Options of `Model.replace` that can be drawn, and their value in a Model. One that is drawn
 # as it is, and multiplies nothing, has none.
 _NOMINAL: dict[str, Callable[[Model], Array] | None] = {
-    "mass": lambda model: model.body_mass,
-    "friction": lambda model: model.geom_friction[:, 0],
-    "kp": lambda model: model.actuator_kp,
-    "kv": lambda model: model.actuator_kv,
-    "armature": lambda model: model.dof_armature,
-    "damping": lambda model: model.dof_damping,
-    "frictionloss": lambda model: model.dof_frictionloss,
-    "gravity": lambda model: model.gravity,
+    "mass": attrgetter("body_mass"),
+    "friction": _sliding_friction,
+    "kp": attrgetter("actuator_kp"),
+    "kv": attrgetter("actuator_kv"),
+    "armature": attrgetter("dof_armature"),
+    "damping": attrgetter("dof_damping"),
+    "frictionloss": attrgetter("dof_frictionloss"),
+    "gravity": attrgetter("gravity"),
     "latency": None,
 }
 

@@ -255,13 +255,15 @@ def as_geoms(raw: Any, k: Any) -> tuple[Edit, ...]:
     if not (bodies_meet(raw, *bodies) and masks_meet(raw, g, h)):
         return (("pair_margin", (k,), NO_TOUCH),)
     condim, friction, solref, solimp = mixed(raw, g, h)
+    five = friction[[0, 0, 1, 2, 2]]  # a pair has two sliding and two rolling coefficients
+    margin, gap = raw.geom_margin[[g, h]].max(), raw.geom_gap[[g, h]].max()
     values = {
         "pair_dim": condim,
-        "pair_friction": friction[[0, 0, 1, 2, 2]],
+        "pair_friction": five,
         "pair_solref": solref,
         "pair_solreffriction": np.zeros(2),
         "pair_solimp": solimp,
-        "pair_margin": raw.geom_margin[[g, h]].max(),
-        "pair_gap": raw.geom_gap[[g, h]].max(),
+        "pair_margin": margin,
+        "pair_gap": gap,
     }
     return tuple((name, (k,), value) for name, value in values.items())

@@ -101,7 +101,8 @@ class Geoms:
         ]
         if values:
             edits = copies(("geom_type", *_BOUNDS, "geom_fluid"), left, a, b)
-            yield sides.tell("shape", "geom", a, values, "m", edits, units=_NO_LENGTHS)
+            difference = sides.tell("shape", "geom", a, values, "m", edits)
+            yield replace(difference, units=_NO_LENGTHS)
         if _off(ours, theirs):
             yield self._moved(a, b)
 

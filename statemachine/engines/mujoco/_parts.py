@@ -146,7 +146,8 @@ def _of_body(
             back = copies(fields, right, pair.right, pair.left)
         else:
             why = _DIAGONAL
-        yield sides.tell(subject, "body", pair.left, figures, unit, edits, back, why, _TURN_UNIT)
+        difference = sides.tell(subject, "body", pair.left, figures, unit, edits, back, why)
+        yield replace(difference, units=_TURN_UNIT)
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
@@ -170,16 +171,10 @@ def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) ->
     filled = [_weighs(sides, figure, pair.right, there) for figure in _WEIGHS]
     why = _DIAGONAL if sides.right.body_simple[pair.right] else ""
     units = {figure: unit for subject in differing for figure, unit in _FIGURES[subject].items()}
-    return sides.tell(
-        subject,
-        "body",
-        pair.left,
-        chain(*differing.values()),
-        _WEIGHS[subject][1],
-        edits=() if why else chain(*emptied, *filled),
-        refused=why,
-        units=units,
-    )
+    values, unit = chain(*differing.values()), _WEIGHS[subject][1]
+    edits = () if why else chain(*emptied, *filled)
+    difference = sides.tell(subject, "body", pair.left, values, unit, edits, refused=why)
+    return replace(difference, units=units)
 
 
 def _principal(tensor: Array) -> tuple[Array, Array]:

@@ -59,17 +59,17 @@ def readable(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference
 
 def _pairs_of_elements(sides: Sides) -> dict[str, Pairs]:
     """Return pairs of ids by kind of element; of geoms those that touch nothing, too."""
-    acting = Geoms(sides).pairs
-    return {
+    geoms = one_to_one(sides.by_name("geom"), Geoms(sides).pairs)
+    pairs = {
         "body": sorted(sides.ids["body"].items()),
         "joint": sides.pairs.joints,
-        "geom": sorted(one_to_one(sides.by_name("geom"), acting).items()),
+        "geom": sorted(geoms.items()),
         "site": sides.pairs.sites,
-        "camera": list(sides.by_name("camera")),
-        "tendon": list(sides.by_name("tendon")),
         "actuator": _pairs_of_actuators(sides),
-        "sensor": list(sides.by_name("sensor")),
     }
+    for kind in ("camera", "tendon", "sensor"):
+        pairs[kind] = list(sides.by_name(kind))
+    return pairs
 
 
 def _pairs_of_actuators(sides: Sides) -> Pairs:
@@ -220,11 +220,12 @@ def _tuple(sides: Sides, side: int, k: int, there: int) -> _Entry:
     target = int(sides.right.tuple_adr[there])
     place = slice(target, target + size)
     numbers = [number for _, number, _ in objects]
-    theirs = slice(start, start + size)
+    source = slice(start, start + size)
+    types, values = np.array(raw.tuple_objtype[source]), np.array(raw.tuple_objprm[source])
     edits: tuple[Edit, ...] = (
-        ("tuple_objtype", (place,), np.array(raw.tuple_objtype[theirs])),
+        ("tuple_objtype", (place,), types),
         ("tuple_objid", (place,), np.array(numbers, dtype=int)),
-        ("tuple_objprm", (place,), np.array(raw.tuple_objprm[theirs])),
+        ("tuple_objprm", (place,), values),
     )
     # What refers to something that the second model does not have fits nowhere.
     return _Entry(", ".join(words), edits, -1 if lost else size)

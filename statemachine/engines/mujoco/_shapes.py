@@ -44,9 +44,10 @@ def of(raw: Any, geom: int) -> CollisionShape:
         points = np.array(raw.mesh_vert[parts["mesh_vert"]], dtype=np.float64)
         volume = volume_of(points[raw.mesh_face[parts["mesh_face"]]])
     sizes = raw.geom_size[geom][: PRIMITIVES.get(word, 0)]
+    place = placed(raw.geom_pos[geom], raw.geom_quat[geom])
     return CollisionShape(
         kind=word,
-        place=placed(raw.geom_pos[geom], raw.geom_quat[geom]),
+        place=place,
         size=tuple(sizes.tolist()),
         points=points,
         volume=volume,

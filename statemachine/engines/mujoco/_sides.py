@@ -5,10 +5,10 @@ What moves as one is compared in one frame: fixed bodies are no difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import product
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,6 @@ _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves 
 _COUNTED = {"equality": "eq", "camera": "cam"}  # in the names of counts and of views
 
 Pairs = Sequence[tuple[int, int]]
-NO_UNITS: Mapping[str, str] = MappingProxyType({})  # that are other than that of a difference
 
 
 def same(left: Any, right: Any) -> bool:
@@ -249,12 +248,11 @@ class Sides:
         edits: Iterable[Edit] = (),
         back: Iterable[Edit] = (),
         refused: str = "",
-        units: Mapping[str, str] = NO_UNITS,
     ) -> ModelDifference:
         """A difference of an element of the first model; the rest as of ModelDifference."""
         name = name_of(self.left, kind, element)
         return ModelDifference(
-            subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused, units
+            subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused
         )
 
     def rows(
@@ -359,7 +357,8 @@ class Sides:
         # The first model's own numbers, where they say that place: both move by the same bits.
         if max(apart(inner, placed(*(value for _, _, value in edits)))) > _SAME_PLACE:
             edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
-        return self.tell("place", kind, a, values, "m", edits, units={TURNED: "rad"})
+        difference = self.tell("place", kind, a, values, "m", edits)
+        return replace(difference, units={TURNED: "rad"})
 
 
 def _values(raw: Any, names: Sequence[str], k: int) -> list[Any]:

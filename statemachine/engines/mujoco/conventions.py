@@ -193,14 +193,17 @@ def friction() -> dict[str, Sliding]:
     return {"equal priority": speed, "the block has priority": partial(speed, priority=1)}
 
 
-PILE_MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
-{
-    "".join(
-        f'<body pos="{x} {y} {z}" quat="{" ".join(map(str, TILT if k == 0 else (1, 0, 0, 0)))}">'
+def _pile_body(k: int) -> str:
+    """Return a box of the pile in MJCF; the first of them is turned."""
+    place, turn = PLACES[k], TILT if k == 0 else (1, 0, 0, 0)
+    return (
+        f'<body pos="{" ".join(map(str, place))}" quat="{" ".join(map(str, turn))}">'
         f'<freejoint/><geom type="box" size="{HALF} {HALF} {HALF}"/></body>'
-        for k, (x, y, z) in enumerate(PLACES)
     )
-}
+
+
+PILE_MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
+{"".join(map(_pile_body, range(len(PLACES))))}
 <body pos="2 0 2"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body></worldbody>
 <actuator><position joint="j" kp="20"/></actuator></mujoco>"""
 
@@ -320,26 +323,36 @@ def _apart(n: Any) -> bool:
     return [world.time for world in n.worlds] == [0, n.m.opt.timestep, 0]
 
 
+def _is_loaded(n: Any) -> bool:
+    return n.m.nq == n.m.nu == 1 and n.d.time == 0
+
+
+def _read_tip(n: Any) -> bool:
+    return near(n.tip, tip_at(n.d.qpos[0]), 1e-12)
+
+
+def _recomputed(n: Any) -> bool:
+    """Tell whether the tip is of now, and no time passed."""
+    is_of_now = near(n.d.site("tip").xpos, tip_at(n.d.qpos[0]), 1e-12)
+    return n.d.time == n.m.opt.timestep and is_of_now
+
+
 _CELLS = {
     "load": Cell(
         "import mujoco\n"
         "import numpy as np\n"
         "m = mujoco.MjModel.from_xml_path(file)\n"
         "d = mujoco.MjData(m)",
-        lambda n: n.m.nq == n.m.nu == 1 and n.d.time == 0,
+        _is_loaded,
     ),
     "state": Cell(f"d.qpos[0], d.qvel[0] = {ANGLE}, 0", partial(_accelerates, torque=0.0)),
     "command": Cell(f"d.ctrl[0] = {TORQUE}", partial(_accelerates, torque=TORQUE)),
     "step": Cell("mujoco.mj_step(m, d)", _stepped),
     "recompute": Cell(
-        "mujoco.mj_forward(m, d)",  # and no time passes
-        lambda n: (
-            n.d.time == n.m.opt.timestep and near(n.d.site("tip").xpos, tip_at(n.d.qpos[0]), 1e-12)
-        ),
+        "mujoco.mj_forward(m, d)",
+        _recomputed,
     ),
-    "read a site": Cell(
-        'tip = d.site("tip").xpos', lambda n: near(n.tip, tip_at(n.d.qpos[0]), 1e-12)
-    ),
+    "read a site": Cell('tip = d.site("tip").xpos', _read_tip),
     "reset": Cell("mujoco.mj_resetData(m, d)", _was_reset),
     "save": Cell(
         "part = mujoco.mjtState.mjSTATE_INTEGRATION\n"

@@ -31,13 +31,12 @@ pin: Any = require("pinocchio")
 
 
 def names_with(pin: Any, *words: str) -> tuple[str, ...]:
-    """Public names of Pinocchio's, and of its Data's, that have one of the words in them."""
-    names = (*vars(pin), *vars(pin.Data))
-    return tuple(
-        sorted(
-            name for name in names if name[0] != "_" and any(word in name.lower() for word in words)
-        )
-    )
+    """Return public names of Pinocchio's, and of its Data's, that have one of the words in them."""
+    found: list[str] = []
+    for name in (*vars(pin), *vars(pin.Data)):
+        if name[0] != "_" and any(word in name.lower() for word in words):
+            found.append(name)
+    return tuple(sorted(found))
 
 
 def _marks(model: Any, data: Any, q: Array) -> Array:
@@ -188,21 +187,47 @@ def _apart(n: Any) -> bool:
     return all(_tip_at(n, data, angle) for angle, data in worlds.items())
 
 
+def _is_loaded(n: Any) -> bool:
+    return n.m.nq == n.m.nv == 1 and n.m.existFrame("tip")
+
+
+def _takes_state(n: Any) -> bool:
+    """Tell whether functions take it."""
+    return _accelerates(n, np.zeros(1), 0.0)
+
+
+def _takes_torque(n: Any) -> bool:
+    return not names_with(n.pin, "actuat", "motor") and _accelerates(n, n.tau, TORQUE)
+
+
+def _recomputed(n: Any) -> bool:
+    return _stepped(n) and _tip_at(n, n.d, n.q[0])
+
+
+def _read_tip(n: Any) -> bool:
+    return near(n.tip, tip_at(n.q[0]), 1e-12)
+
+
+def _saved(n: Any) -> bool:
+    """Tell whether it is as it was kept."""
+    return _was_reset(n) and n.saved[0][0] == n.saved[1][0] == 0
+
+
 _CELLS = {
     "load": Cell(
         "import numpy as np\n"
         "import pinocchio as pin\n"
         "m = pin.buildModelFromUrdf(file)\n"
         "d = m.createData()",
-        lambda n: n.m.nq == n.m.nv == 1 and n.m.existFrame("tip"),
+        _is_loaded,
     ),
     "state": Cell(
         f"q, v = np.array([{ANGLE}]), np.zeros(1)",
-        lambda n: _accelerates(n, np.zeros(1), 0.0),  # functions take it
+        _takes_state,
     ),
     "command": Cell(
         f"tau = np.array([{TORQUE}])  # a torque; no actuators",
-        lambda n: not names_with(n.pin, "actuat", "motor") and _accelerates(n, n.tau, TORQUE),
+        _takes_torque,
     ),
     "step": Cell(
         "a = pin.aba(m, d, q, v, tau)  # no step: integrate it yourself\n"
@@ -213,18 +238,18 @@ _CELLS = {
     "recompute": Cell(
         "pin.forwardKinematics(m, d, q, v)  # joints\n"
         "pin.updateFramePlacements(m, d)    # and frames",
-        lambda n: _stepped(n) and _tip_at(n, n.d, n.q[0]),
+        _recomputed,
     ),
     "read a site": Cell(
         'tip = d.oMf[m.getFrameId("tip")].translation',
-        lambda n: near(n.tip, tip_at(n.q[0]), 1e-12),
+        _read_tip,
     ),
     "reset": Cell("q, v = pin.neutral(m), np.zeros(m.nv)  # no reset", _was_reset),
     "save": Cell(
         "saved = q.copy(), v.copy()  # they are yours\n"
         "q = pin.integrate(m, q, np.ones(m.nv))\n"
         "q, v = saved  # back",
-        lambda n: _was_reset(n) and n.saved[0][0] == n.saved[1][0] == 0,  # as it was kept
+        _saved,
     ),
     "many worlds": Cell("worlds = [m.createData() for _ in range(3)]", _apart),
 }

@@ -84,21 +84,25 @@ class _World(WatchedObject):
         speeds = [pb.getBaseVelocity(body, client) for body in bodies]
         numbers = {body: list(range(pb.getNumJoints(body, client))) for body in bodies}
         jointed = [(body, joints) for body, joints in numbers.items() if joints]
-        states = [state for pair in jointed for state in pb.getJointStates(*pair, client)]
-        contents = {
-            _BODIES: bodies,
-            **{name: [state[k] for state in states] for k, name in enumerate(_JOINT)},
-            "base poses": poses,
-            "base velocities": speeds,
-            "link poses": [pb.getLinkStates(*pair, 0, 0, client) for pair in jointed],
-            "contact points": pb.getContactPoints(physicsClientId=client),
-            "masses, frictions and dampings": [
-                pb.getDynamicsInfo(body, link, client)
-                for body in bodies
-                for link in (-1, *numbers[body])
-            ],
-            "constraints": pb.getNumConstraints(client),
-        }
+        states: list[Sequence[Any]] = []
+        for body, joints in jointed:
+            states += pb.getJointStates(body, joints, client)
+        links: list[Any] = []
+        for body, joints in jointed:
+            links.append(pb.getLinkStates(body, joints, 0, 0, client))
+        dynamics: list[Any] = []
+        for body in bodies:
+            for link in (-1, *numbers[body]):
+                dynamics.append(pb.getDynamicsInfo(body, link, client))
+        contents: dict[str, Any] = {_BODIES: bodies}
+        for k, name in enumerate(_JOINT):
+            contents[name] = [state[k] for state in states]
+        contents["base poses"] = poses
+        contents["base velocities"] = speeds
+        contents["link poses"] = links
+        contents["contact points"] = pb.getContactPoints(physicsClientId=client)
+        contents["masses, frictions and dampings"] = dynamics
+        contents["constraints"] = pb.getNumConstraints(client)
         contents |= pb.getPhysicsEngineParameters(client)
         return {name: marshal.dumps(value, 2) for name, value in contents.items()}
 

@@ -269,12 +269,12 @@ def _recomputed(n: Any) -> bool:
 
 
 def _was_reset(n: Any) -> bool:
-    return (
-        n.pb.getNumBodies(n.w) == 1
-        and _joint(n) == (0, 0)
-        and n.pb.getPhysicsEngineParameters(n.w)["gravityAccelerationZ"] == -GRAVITY
-        and near(n.pb.getDynamicsInfo(n.arm, 0, n.w)[2], (INERTIA,) * 3, _SINGLE)
-    )
+    if n.pb.getNumBodies(n.w) != 1 or _joint(n) != (0, 0):
+        return False
+    if n.pb.getPhysicsEngineParameters(n.w)["gravityAccelerationZ"] != -GRAVITY:
+        return False
+    inertia = n.pb.getDynamicsInfo(n.arm, 0, n.w)[2]
+    return near(inertia, (INERTIA, INERTIA, INERTIA), _SINGLE)
 
 
 def _restored(n: Any) -> bool:
@@ -291,6 +291,18 @@ def _apart(n: Any) -> bool:
     return [n.pb.getNumBodies(world) for world in n.worlds] == [0, 1, 0]
 
 
+def _is_loaded(n: Any) -> bool:
+    return n.pb.getNumJoints(n.arm, n.w) == 2 and _joint(n) == (0, 0)
+
+
+def _was_put(n: Any) -> bool:
+    return _joint(n) == (ANGLE, 0)
+
+
+def _read_tip(n: Any) -> bool:
+    return near(n.tip, tip_at(_joint(n)[0]), _SINGLE)
+
+
 _CELLS = {
     "load": Cell(
         "import pybullet as pb\n"
@@ -298,9 +310,9 @@ _CELLS = {
         "pb.setGravity(0, 0, -9.81, w)\n"
         "arm = pb.loadURDF(file, useFixedBase=True, physicsClientId=w,\n"
         "                  flags=pb.URDF_USE_INERTIA_FROM_FILE)",
-        lambda n: n.pb.getNumJoints(n.arm, n.w) == 2 and _joint(n) == (0, 0),
+        _is_loaded,
     ),
-    "state": Cell(f"pb.resetJointState(arm, 0, {ANGLE}, 0, w)", lambda n: _joint(n) == (ANGLE, 0)),
+    "state": Cell(f"pb.resetJointState(arm, 0, {ANGLE}, 0, w)", _was_put),
     "command": Cell(
         "pb.setJointMotorControl2(arm, 0, pb.VELOCITY_CONTROL,\n"
         "                         force=0, physicsClientId=w)  # motor\n"
@@ -317,7 +329,7 @@ _CELLS = {
     ),
     "read a site": Cell(
         "tip = pb.getLinkState(arm, 1, physicsClientId=w)[4]",
-        lambda n: near(n.tip, tip_at(_joint(n)[0]), _SINGLE),
+        _read_tip,
     ),
     "reset": Cell(
         "pb.resetSimulation(physicsClientId=w)  # and all of load again\n"

@@ -30,8 +30,14 @@ from .world import (
 _TURNS = (np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT), *[np.array((0, 0, 0, 1.0))] * 2)
 
 
-def _joint(scene: BulletPile, k: int) -> float:
-    return pb.getJointState(scene.arm, 0, scene.client)[k]
+def _position(scene: BulletPile) -> float:
+    """Return the position of the driven joint [rad]."""
+    return pb.getJointState(scene.arm, 0, scene.client)[0]
+
+
+def _velocity(scene: BulletPile) -> float:
+    """Return the velocity of the driven joint [rad/s]."""
+    return pb.getJointState(scene.arm, 0, scene.client)[1]
 
 
 def _stepped(read: Read) -> Read:
@@ -63,37 +69,50 @@ def _push(scene: BulletPile, value: float) -> None:
 def _moved(scene: BulletPile) -> float:
     """How far the box comes in a step at 100 m/s: what step the engine takes, not what it tells."""
     pb.resetBaseVelocity(scene.box, (100, 0, 0), (0, 0, 0), scene.client)
-    start = pb.getBasePositionAndOrientation(scene.box, scene.client)[0][0]
+    start = _base_position(scene)
     pb.stepSimulation(scene.client)
-    return pb.getBasePositionAndOrientation(scene.box, scene.client)[0][0] - start
+    return _base_position(scene) - start
+
+
+def _set_position(scene: BulletPile, value: float) -> None:
+    pb.resetJointState(scene.arm, 0, value, _velocity(scene), scene.client)
+
+
+def _set_velocity(scene: BulletPile, value: float) -> None:
+    pb.resetJointState(scene.arm, 0, _position(scene), value, scene.client)
+
+
+def _set_base_position(scene: BulletPile, value: float) -> None:
+    pb.resetBasePositionAndOrientation(scene.box, (value, 0, 1), (0, 0, 0, 1), scene.client)
+
+
+def _base_position(scene: BulletPile) -> float:
+    return pb.getBasePositionAndOrientation(scene.box, scene.client)[0][0]
+
+
+def _set_base_velocity(scene: BulletPile, value: float) -> None:
+    pb.resetBaseVelocity(scene.box, (value, 0, 0), (0, 0, 0), scene.client)
+
+
+def _set_gravity(scene: BulletPile, value: float) -> None:
+    """As much as makes up this speed in one step of 1/240 s."""
+    pb.setGravity(240 * value, 0, 0, scene.client)
+
+
+def _set_timestep(scene: BulletPile, value: float) -> None:
+    pb.setTimeStep(value / 100, scene.client)
 
 
 # Nothing else acts while one of these is looked at; the box is in the air.
 _QUANTITIES: Mapping[str, tuple[Write, Read]] = {
-    "joint position": (
-        lambda s, x: pb.resetJointState(s.arm, 0, x, _joint(s, 1), s.client),
-        lambda s: _joint(s, 0),
-    ),
-    "joint velocity": (
-        lambda s, x: pb.resetJointState(s.arm, 0, _joint(s, 0), x, s.client),
-        lambda s: _joint(s, 1),
-    ),
-    "base position": (
-        lambda s, x: pb.resetBasePositionAndOrientation(s.box, (x, 0, 1), (0, 0, 0, 1), s.client),
-        lambda s: pb.getBasePositionAndOrientation(s.box, s.client)[0][0],
-    ),
-    "base velocity": (
-        lambda s, x: pb.resetBaseVelocity(s.box, (x, 0, 0), (0, 0, 0), s.client),
-        _base_velocity,
-    ),
-    "motor target": (_set_target, _stepped(lambda s: _joint(s, 1))),
+    "joint position": (_set_position, _position),
+    "joint velocity": (_set_velocity, _velocity),
+    "base position": (_set_base_position, _base_position),
+    "base velocity": (_set_base_velocity, _base_velocity),
+    "motor target": (_set_target, _stepped(_velocity)),
     "applied force": (_push, _stepped(_base_velocity)),
-    "gravity": (
-        # As much as makes up this speed in one step.
-        lambda s, x: pb.setGravity(240 * x, 0, 0, s.client),
-        _stepped(_base_velocity),
-    ),
-    "timestep": (lambda s, x: pb.setTimeStep(x / 100, s.client), _moved),
+    "gravity": (_set_gravity, _stepped(_base_velocity)),
+    "timestep": (_set_timestep, _moved),
 }
 
 
@@ -159,6 +178,9 @@ class BulletPile(Pile):
         trace = []
         for _ in range(steps):
             pb.stepSimulation(client)
-            poses = [pb.getBasePositionAndOrientation(box, client) for box in self.bases]
-            trace.append((*(x for pos, quat in poses for x in (*pos, *quat)), _joint(self, 0)))
+            numbers: list[float] = []
+            for box in self.bases:
+                place, turn = pb.getBasePositionAndOrientation(box, client)
+                numbers += (*place, *turn)
+            trace.append((*numbers, _position(self)))
         return np.array(trace)

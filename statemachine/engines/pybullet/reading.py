@@ -145,15 +145,17 @@ def _unique(name: str, taken: set[str]) -> str:
 
 
 def _joint(info: Sequence[Any], inner: Placement) -> RobotJoint:
-    low, high = info[8], info[9]
+    low, high, effort = info[8], info[9], info[10]
+    axis = inner.mat @ np.array(info[13])
+    is_limited = low <= high and high - low < UNLIMITED
     return RobotJoint(
         name=info[1].decode(),
         kind=_KINDS[info[2]],
-        axis=inner.mat @ np.array(info[13]),
+        axis=axis,
         anchor=np.zeros(3),
-        limits=(low, high) if low <= high and high - low < UNLIMITED else None,
+        limits=(low, high) if is_limited else None,
         velocity=info[11],
-        effort=info[10] if info[10] < UNLIMITED else math.inf,
+        effort=effort if effort < UNLIMITED else math.inf,
         damping=info[6],
     )
 
