@@ -95,6 +95,8 @@ def of_output(text: str, kind: str) -> Figures:
         marks = "".join(re.findall("^ *([✓✗])", text, re.MULTILINE))
         return {"claims": marks} if marks else {}
     value = json.loads(text)
+    if isinstance(value, dict):
+        value.pop("schema", None)
     top = ("*",) if _WORDS[kind.partition(" ")[0]].get("") == "*" else ()
     return {} if _WORDS.get(kind, {}).get("") == "-" else dict(flatten(value, kind, top))
 

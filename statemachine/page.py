@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -32,14 +31,6 @@ def only_on_pages(get: Callable[[R], V]) -> Callable[[R], V]:
     """
     vars(get)["json"] = False
     return get
-
-
-class Figures(SimpleNamespace):
-    """What was measured, by name: the slots of a page are filled from it, and JSON prints it.
-
-    What each of them is, and its unit, is said where it is measured. One whose name begins with an
-    underscore is for pages alone.
-    """
 
 
 class Markdown(str):

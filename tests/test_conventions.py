@@ -27,7 +27,7 @@ from statemachine.probes.conventions import (
     probe,
     run_phrases,
 )
-from statemachine.probes.conventions.answers import NO_ANSWER, UNDECIDED, Explanation, closest
+from statemachine.probes.conventions.answers import NO_ANSWER, UNDECIDED, BestHypothesis, closest
 from statemachine.probes.conventions.frames import FIXED, ORDERS
 from statemachine.report import conventions as report
 
@@ -260,7 +260,7 @@ def test_no_two_orders_of_the_joints_are_the_same() -> None:
 
 
 def test_what_nothing_explains_is_undecided() -> None:
-    assert closest({"a": 0.1, "b": 1.0, "c": 2.0}) == Explanation("a", 0.1, 1.0)
+    assert closest({"a": 0.1, "b": 1.0, "c": 2.0}) == BestHypothesis("a", 0.1, 1.0)
     for a, b in ((0.9, 1.0), (0.0, 0.0)):
         assert closest({"a": a, "b": b}).hypothesis == UNDECIDED
 

@@ -168,7 +168,10 @@ def _untyped_fields(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
     for statement in node.body:
         if not isinstance(statement, ast.AnnAssign) or not isinstance(statement.target, ast.Name):
             continue
-        names = [part.id for part in ast.walk(statement.annotation) if isinstance(part, ast.Name)]
+        # An array of any kind of number is an array.
+        annotation = ast.unparse(statement.annotation).replace("NDArray[Any]", "NDArray")
+        words = ast.walk(ast.parse(annotation))
+        names = [part.id for part in words if isinstance(part, ast.Name)]
         untyped = [name for name in names if name in _UNTYPED]
         if untyped:
             yield "untyped", f"field {statement.target.id} is of type {untyped[0]}"

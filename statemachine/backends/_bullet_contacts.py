@@ -46,7 +46,7 @@ class Solid:
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class BulletContact:
     """One contact, as `Contacts` has them.
 
     Attributes:
@@ -281,7 +281,7 @@ def contacts_of(
         local = dense.times(turns[b], point - read("xpos")[b])
         return min(candidates, key=lambda g: abs(_distance(raw, g, turns_of_geoms[g], local)))
 
-    touches: list[Touch] = []
+    touches: list[BulletContact] = []
     for point in points:
         _, body_a, body_b, link_a, link_b, on_a, on_b, normal, dist, push = point[:10]
         if dist > 0 and not push:
@@ -295,11 +295,13 @@ def contacts_of(
         if pair[0] > pair[1]:
             pair, normal, force = (pair[1], pair[0]), -normal, -force
         frame = _axes(normal)
-        touches.append(Touch(pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force)))
+        touches.append(
+            BulletContact(pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force))
+        )
     return _as_contacts(touches)
 
 
-def _as_contacts(touches: list[Touch]) -> Contacts:
+def _as_contacts(touches: list[BulletContact]) -> Contacts:
     """Return n contacts as arrays; PyBullet tells of no torque."""
     n = len(touches)
     geoms = np.array([touch.geoms for touch in touches], dtype=np.int64)

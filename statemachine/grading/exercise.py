@@ -36,7 +36,7 @@ from .links import refusal_of
 from .recording import (
     LARGEST,
     FunctionRecording,
-    Limits,
+    TimeLimits,
     copied_to,
     digest,
     has_solutions,
@@ -169,7 +169,7 @@ class ExerciseJudge(ExitStack):
         self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
         if engine:
             self.versions[engine] = engine_version(engine)
-        self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
+        self.limits = TimeLimits(time_limit, max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
         self._lock = threading.Lock()
         self._keys: dict[str, AnswerKey[Any]] = {}

@@ -43,7 +43,7 @@ _KEPT = (
 
 
 @dataclass(frozen=True)
-class Limits:
+class TimeLimits:
     """What a function may take, from when its worlds are ready.
 
     Attributes:
@@ -85,7 +85,7 @@ def record(
     own: Path,
     name: str,
     backend: str,
-    limits: Limits,
+    limits: TimeLimits,
     folder: Path,
     stop: threading.Event,
 ) -> FunctionRecording:

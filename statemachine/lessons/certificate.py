@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..installed import WITNESS
+from ..installed import PAIR, WITNESS
 from ..measures.text import degrees, grouped, millimetres, vector
 from ..page import Page, Table
 from ..show.templates import PageContent, render
@@ -51,7 +51,7 @@ class FingertipPage(PageContent):
 
     Attributes:
         origin: Model, engines and timestep.
-        has_pybullet: Whether PyBullet is among the engines.
+        has_second_engine: Whether the second engine of the course is among the engines.
         readings: What the witness read, by engines.
         findings: What the certificate says, by engines.
         gaps: Tables of the gaps.
@@ -60,7 +60,7 @@ class FingertipPage(PageContent):
 
     template = "certificate.md.j2"
     origin: str
-    has_pybullet: bool
+    has_second_engine: bool
     readings: Sequence[_OfEngines]
     findings: Sequence[_OfEngines]
     gaps: Sequence[Table]
@@ -71,7 +71,7 @@ def page(results: Mapping[str, FingertipResult]) -> Page:
     """Return the page of a certificate: frames first, then the differences."""
     content = FingertipPage(
         template.origin(results),
-        "pybullet" in results,
+        PAIR[1] in results,
         _by_engines(results, _reading_of),
         _by_engines(results, _finding_of),
         tables_of_gaps(results),

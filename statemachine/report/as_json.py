@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from enum import Enum
@@ -10,22 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from ..page import Figures
+SCHEMA = 1  # of the JSON of every command
 
 
 def dumps(value: Any) -> str:
-    """Strict JSON of a result: no NaN (null instead), arrays as lists, SI units."""
-    return json.dumps(plain(value), indent=2, allow_nan=False)
+    """Return strict JSON of a result: no NaN (null instead), arrays as lists, SI units.
+
+    An object says by which schema it was written.
+    """
+    shown = plain(value)
+    if isinstance(shown, dict):
+        shown = {"schema": SCHEMA} | shown
+    return json.dumps(shown, indent=2, allow_nan=False)
 
 
 def plain(value: Any) -> Any:
-    """A result as dicts, lists, strings and numbers."""
-    fields = getattr(type(value), "__dataclass_fields__", {}).values()
-    if fields or isinstance(value, Figures):
-        names = [field.name for field in fields if field.metadata.get("json", True)]
-        names = names or [name for name in vars(value) if not name.startswith("_")]
-        names += [name for name, kind in vars(type(value)).items() if _is_in_json(kind)]
-        return {name: plain(getattr(value, name)) for name in names}
+    """Return a result as dicts, lists, strings and numbers."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {name: plain(getattr(value, name)) for name in _names_in_json(type(value))}
     match value:
         case dict():
             return {str(key): plain(item) for key, item in value.items()}
@@ -40,6 +43,12 @@ def plain(value: Any) -> Any:
         case Path():
             return str(value)
     return value
+
+
+def _names_in_json(kind: type) -> list[str]:
+    """Return the fields and properties of a dataclass, without those that are for pages alone."""
+    names = [field.name for field in dataclasses.fields(kind) if field.metadata.get("json", True)]
+    return names + [name for name, member in vars(kind).items() if _is_in_json(member)]
 
 
 def _is_in_json(attribute: Any) -> bool:

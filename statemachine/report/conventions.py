@@ -142,12 +142,12 @@ def _table(answered: Convention) -> Table:
     headers = ("engine", "of", "answer", "measured")
     has_parts = any(row[1] for row in rows)
     columns = [0, 1, 2, 3] if has_parts else [0, 2, 3]
-    return Table(
-        [headers[column] for column in columns],
-        [[row[column] for column in columns] for row in rows],
-        f"{answered.name}: {answered.question.title}",
-        words=frozenset(range(len(columns))),
-    )
+    cells: list[list[str]] = []
+    for row in rows:
+        cells.append([row[column] for column in columns])
+    title = f"{answered.name}: {answered.question.title}"
+    words = frozenset(range(len(columns)))
+    return Table([headers[column] for column in columns], cells, title, words=words)
 
 
 def _text(figure: Measurement) -> str:
@@ -162,9 +162,11 @@ def _text(figure: Measurement) -> str:
         elif abs(value) <= _ZERO * largest:
             words.append("0")  # beside a large number, one that is only rounding is nothing
         else:
-            words.append(significant(factor * value, 3 if abs(factor * value) >= 1e-3 else 2))
+            digits = 3 if abs(factor * value) >= 1e-3 else 2
+            words.append(significant(factor * value, digits))
     has_numbers = any(not isinstance(value, str) for value in values)
-    shown = (" " if has_numbers else ", ").join(words) if words else "nothing"
+    between = " " if has_numbers else ", "
+    shown = between.join(words) if words else "nothing"
     return f"{figure.name} {shown}{unit}".strip()
 
 
@@ -196,24 +198,24 @@ REMEMBER = (
 
 
 def cheat_sheet(table: Phrasebook) -> str:
-    """The page as Markdown, with a table in HTML.
+    """Return the page as Markdown, with a table in HTML.
 
     Args:
         table: The engines' own cells, as they were run; those that did not work are left out.
     """
-    cells = {
-        engine: {phrase.concept: phrase.code for phrase in phrases if phrase.works}
-        for engine, phrases in table.engines.items()
-    }
-    columns = {"statemachine": OURS} | {name: codes for name, codes in cells.items() if codes}
+    columns = {"statemachine": OURS}
+    for engine, phrases in table.engines.items():
+        working = {phrase.concept: phrase.code for phrase in phrases if phrase.works}
+        if working:
+            columns[engine] = working
     head = "".join(f"<th>{escape(name)}</th>" for name in ("", *columns))
-    rows = []
+    rows: list[str] = []
     for concept in CONCEPTS:
-        row = "".join(
-            f"<td><pre>{escape(column[concept])}</pre></td>" if concept in column else "<td></td>"
-            for column in columns.values()
-        )
-        rows.append(f"<tr><th>{escape(concept)}</th>{row}</tr>")
+        cells = [f"<th>{escape(concept)}</th>"]
+        for column in columns.values():
+            code = f"<pre>{escape(column[concept])}</pre>" if concept in column else ""
+            cells.append(f"<td>{code}</td>")
+        rows.append(f"<tr>{''.join(cells)}</tr>")
     versions = versions_of(table.versions)
     lines = "\n".join(f"- {text} (`lesson {lesson}`)" for lesson, text in REMEMBER)
     body = "\n".join(rows)

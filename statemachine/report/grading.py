@@ -77,28 +77,57 @@ class ClassPage(PageContent):
     """Content of the page of a class.
 
     Attributes:
-        entries: Table with a row for each submission.
-        size: How many students or files count, in words.
-        made_with: Versions and settings.
-        solved: How many have all functions right.
+        submissions: What became of each.
+        entries: Table with a row for each of them.
         ignored: Names of files that were not looked at.
-        is_watched: Whether what some code reads is only watched, not prevented.
-        copies: Submissions with the same code as another.
-        looks: What somebody should look at.
-        unjudged: Submissions that were not judged.
     """
 
     template = "classroom.md.j2"
+    submissions: Sequence[ClassEntry]
     entries: Table
-    size: str
-    made_with: str
-    solved: int
     ignored: Sequence[str]
-    is_watched: bool
-    copies: Sequence[ClassEntry]
-    looks: Sequence[_Look]
-    unjudged: Sequence[ClassEntry]
     only_watched: str = ONLY_WATCHED
+
+    @property
+    def counted(self) -> list[ClassEntry]:
+        """Submissions that count: with a roster, files of nobody on it do not."""
+        of_students = [entry for entry in self.submissions if entry.student]
+        return of_students if of_students else list(self.submissions)
+
+    @property
+    def size(self) -> str:
+        """How many students or files count."""
+        return count(len(self.counted), "student" if self.counted[0].student else "file")
+
+    @property
+    def made_with(self) -> str:
+        """Versions and settings."""
+        return self.submissions[0].made_with
+
+    @property
+    def solved(self) -> int:
+        """How many have all functions right."""
+        return sum(entry.solved for entry in self.counted)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether what some code reads is only watched, not prevented."""
+        return any(entry.watched for entry in self.submissions)
+
+    @property
+    def copies(self) -> list[ClassEntry]:
+        """Submissions with the same code as another."""
+        return [entry for entry in self.submissions if entry.same_as]
+
+    @property
+    def looks(self) -> list[_Look]:
+        """What somebody should look at."""
+        return [_Look(entry.name, text) for entry in self.submissions for text in entry.looks]
+
+    @property
+    def unjudged(self) -> list[ClassEntry]:
+        """Submissions that were not judged."""
+        return [entry for entry in self.submissions if not entry.judged]
 
 
 def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
@@ -108,39 +137,25 @@ def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Pa
         entries: What became of each submission.
         ignored: Names of files that were not looked at.
     """
-    # With a roster, files of nobody on it are not counted.
-    counted = [entry for entry in entries if entry.student]
-    if not counted:
-        counted = list(entries)
-    looks: list[_Look] = []
-    for entry in entries:
-        looks += [_Look(entry.name, text) for text in entry.looks]
-    content = ClassPage(
-        class_table(entries),
-        count(len(counted), "student" if counted[0].student else "file"),
-        entries[0].made_with,
-        solved=sum(entry.solved for entry in counted),
-        ignored=ignored,
-        is_watched=any(entry.watched for entry in entries),
-        copies=[entry for entry in entries if entry.same_as],
-        looks=looks,
-        unjudged=[entry for entry in entries if not entry.judged],
-    )
-    return render(content)
+    return render(ClassPage(entries, class_table(entries), ignored))
 
 
 def class_table(entries: Sequence[ClassEntry]) -> Table:
     """Make the table of a class, without columns in which nothing stands."""
-    columns: dict[str, Callable[[ClassEntry], str]] = {
-        "file": lambda entry: entry.student or entry.name,
-        "right": lambda entry: f"{entry.right} of {len(JUDGES)}" if entry.judged else "?",
-        "what is not right": lambda entry: entry.reasons,
-        "tests": lambda entry: entry.tests.partition(";")[0],
-        "predictions": lambda entry: entry.predictions,
-        "alike": lambda entry: entry.alike,
-    }
+    columns: dict[str, Callable[[ClassEntry], str]] = {}
+    columns["file"] = lambda entry: entry.student if entry.student else entry.name
+    columns["right"] = _right_of
+    columns["what is not right"] = lambda entry: entry.reasons
+    columns["tests"] = lambda entry: entry.tests.partition(";")[0]
+    columns["predictions"] = lambda entry: entry.predictions
+    columns["alike"] = lambda entry: entry.alike
     filled = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
     return Table.of(entries, filled, words=filled, wide={"predictions", "alike"})
+
+
+def _right_of(entry: ClassEntry) -> str:
+    """Return how many functions are right; "?" where the file was not judged."""
+    return f"{entry.right} of {len(JUDGES)}" if entry.judged else "?"
 
 
 @dataclass(frozen=True)

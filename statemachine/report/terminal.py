@@ -82,48 +82,76 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
         reader: Somebody who answers its questions, and is shown a screenful at a time; the
             rest of the page waits for each answer. Without, questions are left out.
     """
-    tell = reader.read if reader else sys.stdout.write
-    _write(tell, [page])
+    printer = _Printer(reader)
+    printer.write([page])
     blocks = [block for block in page.blocks if not isinstance(block, RobotPicture)]
-    views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
-    predicted: list[Block] = []  # what became of a prediction, until the run has said its part
-    answered: list[bool] = []
-    headings: list[Block] = []  # which stay with what is under them
     for block, following in zip(blocks, [*blocks[1:], None], strict=True):
         if isinstance(block, Question):
-            choice = reader.ask(block) if reader else None
-            if choice is not None:
-                answered.append(choice == block.right)
-                predicted = [judged(block, choice)]
-            elif block.always:
-                right = "none of the above" if block.right is None else block.choices[block.right]
-                answer = Text(f"Answer: {right}. {block.because}")
-                _write(tell, [answer] if reader else [Text(block.text), answer])
-            continue
+            printer.ask(block)
+        else:
+            printer.show(block, following)
+    views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
+    printer.end(page, views, footer)
+
+
+class _Printer:
+    """Prints the blocks of a page in their order, and keeps what became of predictions."""
+
+    def __init__(self, reader: Reader | None) -> None:
+        self._reader = reader
+        self._tell = reader.read if reader else sys.stdout.write
+        self._predicted: list[Block] = []  # the last answer, until the run has said its part
+        self._answered: list[bool] = []
+        self._headings: list[Block] = []  # which stay with what is under them
+
+    def write(self, blocks: Sequence[Page | Block]) -> None:
+        """Print blocks."""
+        _write(self._tell, blocks)
+
+    def ask(self, question: Question) -> None:
+        """Let the reader predict; without one, answer a question that is for everybody."""
+        choice = self._reader.ask(question) if self._reader else None
+        if choice is not None:
+            self._answered.append(choice == question.right)
+            self._predicted = [judged(question, choice)]
+        elif question.always:
+            right = "none of the above"
+            if question.right is not None:
+                right = question.choices[question.right]
+            answer = Text(f"Answer: {right}. {question.because}")
+            self.write([answer] if self._reader else [Text(question.text), answer])
+
+    def show(self, block: Block, following: Block | None) -> None:
+        """Print a block, with what became of the prediction before it."""
         if isinstance(block, Heading):
-            headings.append(block)
-            continue
+            self._headings.append(block)
+            return
         # What was printed may say it first; a text explains it.
-        shown = [*predicted, block] if isinstance(block, Text) else [block, *predicted]
-        _write(tell, [*headings, *shown])
-        headings.clear()
-        if reader and predicted:
-            predicted = []
+        is_text = isinstance(block, Text)
+        shown = [*self._predicted, block] if is_text else [block, *self._predicted]
+        self.write([*self._headings, *shown])
+        self._headings.clear()
+        if self._reader and self._predicted:
+            self._predicted = []
             if following and not isinstance(following, Question):
-                reader.go_on()
-    last: list[Block] = []
-    if len(answered) > 2:  # of so few there is no score
-        last.append(Text(f"You had {sum(answered)} of {len(answered)} right."))
-    if reader and views and find_spec("viser"):  # else there is nothing to look at it with
-        last.append(Text(f"To look at it: {views[0]}"))
-    if page.headline:  # last, where it stays in sight
-        last.append(Verdict(page.headline.text, page.headline.holds))
-    if footer:
-        last.append(Text(footer))
-    _write(tell, last)
-    tell("\n")
-    if reader:
-        reader.show()
+                self._reader.go_on()
+
+    def end(self, page: Page, views: Sequence[str], footer: str) -> None:
+        """Print the last lines: the score, how to look at the robot, the headline, the footer."""
+        last: list[Block] = []
+        if len(self._answered) > 2:  # of so few there is no score
+            right = sum(self._answered)
+            last.append(Text(f"You had {right} of {len(self._answered)} right."))
+        if self._reader and views and find_spec("viser"):  # else nothing here can show it
+            last.append(Text(f"To look at it: {views[0]}"))
+        if page.headline:  # last, where it stays in sight
+            last.append(Verdict(page.headline.text, page.headline.holds))
+        if footer:
+            last.append(Text(footer))
+        self.write(last)
+        self._tell("\n")
+        if self._reader:
+            self._reader.show()
 
 
 def spelled(error: Any) -> tuple[str, int]:

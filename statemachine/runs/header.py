@@ -13,6 +13,7 @@ from typing import Any
 from ..errors import TraceError
 from ..interface import OPTIONS, JointType
 from ..interface.checks import HUGE
+from ..interface.options import OptionValue
 from ..release_names import engine_of
 from .provenance import Provenance
 
@@ -82,7 +83,7 @@ class Header:
     command: str
     provenance: Provenance
     defaults: str
-    options: dict[str, Any]
+    options: dict[str, OptionValue]
     keyframe: str | None
     timestep: float
     substeps: int

@@ -36,6 +36,7 @@ from ..interface import (
     step,
 )
 from ..interface.checks import HUGE
+from ..interface.options import OptionValue
 from ..interface.records import Arrays, Defaults
 from .drive import Controller, Progress, drive, part_of, silent, steps_in
 from .header import Header
@@ -96,7 +97,7 @@ class RunMetadata:
     says: str = ""
     command: str = ""
     defaults: Defaults = "model"
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
     seed: int | None = None
 
 

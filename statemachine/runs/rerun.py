@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import TraceError
 from ..interface import MOCAP, Array, Data, Model, make_data, reset
+from ..interface.options import OptionValue
 from ..interface.records import Defaults
 from .drive import Controller, Progress, check_length, silent
 from .header import Header
@@ -55,7 +56,7 @@ class Rerun:
     qpos: Array | None = None
     qvel: Array | None = None
     defaults: Defaults = "model"
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, OptionValue] = field(default_factory=dict)
     experiment: str = ""
     says: str = ""
     seed: int | None = None
@@ -122,7 +123,7 @@ def rerun_of(
     seconds: float | None = None,
     seed: int = 0,
     defaults: Defaults = "model",
-    options: dict[str, Any] | None = None,
+    options: dict[str, OptionValue] | None = None,
 ) -> Rerun:
     """Return how a scenario is run on a Model; arguments are those of `record_scenario`."""
     scenario = scenario.on(model)
@@ -147,7 +148,7 @@ def replayed(
     trace: Trace,
     model: Model,
     defaults: Defaults = "model",
-    options: dict[str, Any] | None = None,
+    options: dict[str, OptionValue] | None = None,
 ) -> Rerun:
     """Return the start and the commands of a trace on a Model of its layout."""
     header = trace.header
@@ -174,7 +175,7 @@ def record_scenario(
     seed: int = 0,
     command: str = "",
     defaults: Defaults = "model",
-    options: dict[str, Any] | None = None,
+    options: dict[str, OptionValue] | None = None,
     progress: Progress = silent,
 ) -> Trace:
     """Record a scenario on a model, which is given as loaded.
@@ -208,7 +209,7 @@ def play(
     *,
     command: str = "",
     defaults: Defaults = "model",
-    options: dict[str, Any] | None = None,
+    options: dict[str, OptionValue] | None = None,
     progress: Progress = silent,
 ) -> Trace:
     """Play the ctrl of a trace, from the state it starts in, on another model or engine.

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from ..errors import BadInputError, check_name
 from ..interface import Array, Data, Model
+from ..interface.options import OptionValue
 from .drive import Controller
 from .robot import has_floor, hold_ctrl, home, is_the_arm, need_actuators, waves
 
@@ -48,7 +48,7 @@ class Scenario:
     elsewhere: str
     needs: Callable[[Model], None]
     keyframe: str | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
     seeded: bool = False
     own: bool = False
 

@@ -35,7 +35,7 @@ _DEEPEST = 2  # conditions inside each other: one, and one in it
 
 
 @dataclass(frozen=True)
-class Fault:
+class TemplateFault:
     """What is wrong in a template.
 
     Attributes:
@@ -52,7 +52,7 @@ class Fault:
         return f"{self.template}:{self.line}: {self.text}"
 
 
-def faults_of(content: type[PageContent], source: str | None = None) -> list[Fault]:
+def faults_of(content: type[PageContent], source: str | None = None) -> list[TemplateFault]:
     """Return what is wrong in the template of a content, from its syntax tree alone.
 
     Args:
@@ -87,7 +87,7 @@ class _Checker:
 
     def __init__(self, template: str) -> None:
         self.template = template
-        self.faults: list[Fault] = []
+        self.faults: list[TemplateFault] = []
 
     def visit_all(self, body: Sequence[nodes.Node], names: Mapping[str, Any], depth: int) -> None:
         """Check statements in their order; what one of them sets, the next may name."""
@@ -225,7 +225,7 @@ class _Checker:
         return found[0]
 
     def _fault(self, node: nodes.Node, text: str) -> None:
-        self.faults.append(Fault(self.template, node.lineno, text))
+        self.faults.append(TemplateFault(self.template, node.lineno, text))
 
 
 def _alternatives(kind: Any) -> Iterator[Any]:

@@ -176,7 +176,8 @@ class PybulletWatch(CallWatch):
     def __init__(self) -> None:
         self.module = require("pybullet")
         # Looks must not come by way of what is replaced.
-        self._bare = types.SimpleNamespace(**vars(self.module))
+        self._bare = types.ModuleType(self.module.__name__)
+        vars(self._bare).update(vars(self.module))
         self._worlds: dict[int, _World] = {}
         self._arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
 

@@ -4,8 +4,8 @@ The judges run in the teacher's process only. A student's process gets the world
 is called on (`inside.worlds`), and nothing of what stands here. A judge is a module with
 
 - `right(world)`: what is right on one, worked out by us;
-- `judge(answer, world, right, course)`: a `Verdict` on what it did there; `course` is what is right
-  on the course's own world. It raises FaultError where there is nothing to look at.
+- `judge(answer, world, right, course)`: a `WorldJudgement` of what it did there; `course` is what
+  is right on the course's own world. It raises FaultError where there is nothing to look at.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ JUDGES = {
 
 
 @dataclass(frozen=True)
-class Verdict:
+class WorldJudgement:
     """What a judge says of an answer on one world.
 
     Attributes:
@@ -45,14 +45,14 @@ class Verdict:
     remarks: tuple[str, ...]
 
 
-def verified(remark: str) -> Verdict:
+def verified(remark: str) -> WorldJudgement:
     """Return the verdict on an answer that is right."""
-    return Verdict(True, (remark,))
+    return WorldJudgement(True, (remark,))
 
 
-def wrong(*remarks: str) -> Verdict:
+def wrong(*remarks: str) -> WorldJudgement:
     """Return the verdict on an answer with these faults."""
-    return Verdict(False, remarks)
+    return WorldJudgement(False, remarks)
 
 
 W_contra = TypeVar("W_contra", bound=ExerciseWorld[Any], contravariant=True)  # a function's world
@@ -66,7 +66,7 @@ class Judge(Protocol[W_contra, S]):
         """Work out what is right on a world."""
         ...
 
-    def judge(self, answer: Answer, world: W_contra, right: S, course: S) -> Verdict:
+    def judge(self, answer: Answer, world: W_contra, right: S, course: S) -> WorldJudgement:
         """Judge an answer.
 
         Args:
@@ -115,7 +115,7 @@ def judged(
 
     None if there are fewer answers than worlds, and no fault.
     """
-    passed: list[Verdict] = []  # one a world
+    passed: list[WorldJudgement] = []  # one a world
     for world, right, answer in zip(worlds, rights, answers, strict=False):
         try:
             if isinstance(answer, FaultError):

@@ -17,7 +17,7 @@ from ..inside.watch import Inputs, inputs_of
 from ..inside.worlds import LIFT, NoArgumentsWorld, address
 from . import (
     TIP,
-    Verdict,
+    WorldJudgement,
     grain,
     near,
     numbers,
@@ -74,7 +74,9 @@ def _places(model: Model, data: Data) -> Arrays:
     return places
 
 
-def judge(answer: Answer, world: NoArgumentsWorld, right: Readings, course: Readings) -> Verdict:
+def judge(
+    answer: Answer, world: NoArgumentsWorld, right: Readings, course: Readings
+) -> WorldJudgement:
     """Judge the four readings, and that no time passed."""
     short = short_float(answer.result)
     tolerance = _SINGLE if short == "float32" else TOLERANCE

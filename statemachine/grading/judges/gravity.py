@@ -13,7 +13,18 @@ from ...interface.records import Ints
 from ...measures.text import count
 from ..inside.answers import Answer
 from ..inside.worlds import LIFT, FallWorld, address
-from . import Verdict, grain, listed, near, numbers, owner, parts, told_apart, verified, wrong
+from . import (
+    WorldJudgement,
+    grain,
+    listed,
+    near,
+    numbers,
+    owner,
+    parts,
+    told_apart,
+    verified,
+    wrong,
+)
 
 TOLERANCE = 0.006  # [degrees]: two decimals will do
 _SAME = 1e-6  # [degrees]: the same figure, come by another way
@@ -69,7 +80,7 @@ def right(world: FallWorld) -> Falls:
     )
 
 
-def judge(answer: Answer, world: FallWorld, right: Falls, course: Falls) -> Verdict:
+def judge(answer: Answer, world: FallWorld, right: Falls, course: Falls) -> WorldJudgement:
     """Judge both traces in degrees; ctrl as a new Data has it; the Model as it was."""
     remarks = _changes_of_model(answer)
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")

@@ -13,7 +13,7 @@ from ..inside.answers import Answer, kind
 from ..inside.watch import EngineRun, Inputs, inputs_of
 from ..inside.worlds import ReplayWorld
 from . import (
-    Verdict,
+    WorldJudgement,
     grain,
     listed,
     near,
@@ -61,7 +61,7 @@ def right(world: ReplayWorld) -> TwoRuns:
     return TwoRuns(start, (first, second))
 
 
-def judge(answer: Answer, world: ReplayWorld, right: TwoRuns, _course: TwoRuns) -> Verdict:
+def judge(answer: Answer, world: ReplayWorld, right: TwoRuns, _course: TwoRuns) -> WorldJudgement:
     """Judge two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")

@@ -14,7 +14,7 @@ from ...measures.text import count
 from ..inside.answers import Answer, kind
 from ..inside.calls import FaultError
 from ..inside.worlds import NoArgumentsWorld
-from . import Verdict, parts, verified, wrong
+from . import WorldJudgement, parts, verified, wrong
 
 _ARRAYS = ("qpos", "qvel")
 
@@ -71,7 +71,7 @@ def _owned(starts: Ints, total: int) -> list[Slot]:
     return [Slot(start, stop) for start, stop in pairwise([*starts.tolist(), total])]
 
 
-def judge(answer: Answer, world: NoArgumentsWorld, right: Layout, course: Layout) -> Verdict:
+def judge(answer: Answer, world: NoArgumentsWorld, right: Layout, course: Layout) -> WorldJudgement:
     """Judge the pair of slices of every joint, and the time."""
     slots, time = parts(answer.result, 2, "(slots, time)")
     faults = (

@@ -21,10 +21,10 @@ from ...errors import check_name
 from ...installed import ENGINES, engine_version, require, silence
 from ...runs.drive import Progress, silent
 from . import answers, frames, motion
-from .answers import NO_ANSWER, Answers, EngineAnswer, Question, Wording
+from .answers import NO_ANSWER, Answers, EngineAnswer, EngineQuestion, Wording
 
 # In the order in which a newcomer meets them.
-QUESTIONS: dict[str, Question[Any]] = {
+QUESTIONS: dict[str, EngineQuestion[Any]] = {
     "quaternion": frames.quaternion,
     "velocity": frames.velocity,
     "gravity": motion.gravity,

@@ -51,7 +51,7 @@ M = TypeVar("M")  # what an engine's measurement returns
 
 
 @dataclass(frozen=True)
-class Question(Generic[M]):
+class EngineQuestion(Generic[M]):
     """Question to the engines, and how its answers follow from a measurement.
 
     Attributes:
@@ -71,8 +71,8 @@ class Question(Generic[M]):
 
 def question(
     title: str, why: str, *inputs: Input
-) -> Callable[[Callable[[M], Iterable[EngineAnswer]]], Question[M]]:
-    """Make a Question of a function that draws answers from a measurement.
+) -> Callable[[Callable[[M], Iterable[EngineAnswer]]], EngineQuestion[M]]:
+    """Make an EngineQuestion of a function that draws answers from a measurement.
 
     Args:
         title: The question.
@@ -80,14 +80,14 @@ def question(
         *inputs: Arguments of an engine's measurement.
     """
 
-    def make(answers: Callable[[M], Iterable[EngineAnswer]]) -> Question[M]:
-        return Question(Wording(title, why), inputs, answers)
+    def make(answers: Callable[[M], Iterable[EngineAnswer]]) -> EngineQuestion[M]:
+        return EngineQuestion(Wording(title, why), inputs, answers)
 
     return make
 
 
 @dataclass(frozen=True)
-class Explanation:
+class BestHypothesis:
     """Hypothesis that explains a measurement best.
 
     Attributes:
@@ -101,7 +101,7 @@ class Explanation:
     next_error: float
 
 
-def closest(errors: Mapping[str, float]) -> Explanation:
+def closest(errors: Mapping[str, float]) -> BestHypothesis:
     """Return the hypothesis with the smallest error.
 
     Args:
@@ -109,8 +109,8 @@ def closest(errors: Mapping[str, float]) -> Explanation:
     """
     (error, hypothesis), (next_error, _), *_ = sorted((off, name) for name, off in errors.items())
     if error < next_error / 4:
-        return Explanation(hypothesis, error, next_error)
-    return Explanation(UNDECIDED, error, next_error)
+        return BestHypothesis(hypothesis, error, next_error)
+    return BestHypothesis(UNDECIDED, error, next_error)
 
 
 # What an engine keeps: derived values after a write and a step, a past after a reset, a save.
