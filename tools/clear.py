@@ -64,7 +64,7 @@ def findings_of(path: Path) -> Iterator[Finding]:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     file = path.resolve().relative_to(ROOT).as_posix()
     for node, where in _with_names(tree, ()):
-        for rule, detail in _faults_of(node):
+        for rule, detail in faults_of(node):
             yield Finding(file, ".".join(where), getattr(node, "lineno", 0), rule, detail)
 
 
@@ -76,7 +76,7 @@ def _with_names(node: ast.AST, where: tuple[str, ...]) -> Iterator[tuple[ast.AST
         yield from _with_names(child, inside)
 
 
-def _faults_of(node: ast.AST) -> Iterator[tuple[str, str]]:
+def faults_of(node: ast.AST) -> Iterator[tuple[str, str]]:
     """Yield rule and detail for each rule that a node breaks."""
     if isinstance(node, ast.stmt) and not isinstance(node, _HEADERS):
         count = _own_nodes(node)
