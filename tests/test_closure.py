@@ -25,6 +25,7 @@ sm.forward(model, data)
 state = sm.get_state(model, data)
 sm.set_state(model, data, state)
 """
+LESSON = "from statemachine.cli import main\nmain(['lesson', 'gravity'])\n"
 
 
 def _statements(file: Path) -> int:
@@ -42,6 +43,7 @@ def _statements(file: Path) -> int:
     ("code", "most"),
     [
         pytest.param(CORE, 2500, id="the core: load on MuJoCo, and the seven verbs"),
+        pytest.param(LESSON, 4500, id="the lesson on gravity"),
     ],
 )
 def test_no_more_is_imported_than_one_can_read(code: str, most: int) -> None:

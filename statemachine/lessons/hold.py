@@ -265,7 +265,12 @@ def _slots_of_touches(result: HoldResult) -> dict[str, Any]:
 def _slots_of_older(older: OlderRelease | None) -> dict[str, Any]:
     """Fill the slots about the older release."""
     if older is None:
-        return {"older": False}
+        texts = ("older_version", "older_joint", "older_at", "older_gap")
+        return dict.fromkeys(texts, "") | {
+            "older": False,
+            "older_right": None,
+            "older_recorded": False,
+        }
     limits = np.radians(1e-3), np.radians(1)  # of the choices
     return {
         "older": True,
