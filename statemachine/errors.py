@@ -145,13 +145,6 @@ class DivergedWarning(UserWarning):
     """Some of many worlds diverged and are left out from now on."""
 
 
-def refuse(*rows: tuple[object, str], error: Callable[[str], Exception] = BadInputError) -> None:
-    """Raise an error with the text of the first row that holds."""
-    for holds, text in rows:
-        if holds:
-            raise error(text)
-
-
 def no_attribute(owner: object, name: str, raw: object) -> AttributeError:
     """That a Model or Data has no such attribute, and whether the engine's own object has it."""
     kind = type(owner).__name__
