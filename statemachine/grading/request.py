@@ -16,7 +16,7 @@ from ..runs.whole import check_place
 from . import classroom, exercise
 from .class_table import ClassEntry
 from .faults import FAULTS
-from .faults.run import examine
+from .faults.run import Examination, examine
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class FaultsRequest:
             check_name("fault", name, FAULTS)
 
 
-def answer(request: CheckRequest, reporter: Reporter = QUIET):
+def answer(request: CheckRequest, reporter: Reporter = QUIET) -> exercise.Grade:
     """Judge each function of a student's file.
 
     Raises:
@@ -149,7 +149,7 @@ def answer_class(request: ClassRequest, reporter: Reporter = QUIET) -> ClassResu
     return ClassResult(tuple(entries), tuple(classroom.not_looked_at(request.paths)))
 
 
-def answer_faults(request: FaultsRequest, reporter: Reporter = QUIET):
+def answer_faults(request: FaultsRequest, reporter: Reporter = QUIET) -> Examination:
     """Run a student's tests on the arm with one fault at a time.
 
     Raises:

@@ -12,7 +12,7 @@ from ..models import AnyPath
 from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
-from .fingertip import certify, checked_poses
+from .fingertip import FingertipResult, certify, checked_poses
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FingertipRequest:
         checked_poses(self.poses, self.seed)
 
 
-def answer(request: FingertipRequest, reporter: Reporter = QUIET):
+def answer(request: FingertipRequest, reporter: Reporter = QUIET) -> dict[str, FingertipResult]:
     """Return a certificate for each backend.
 
     Raises:
@@ -55,7 +55,7 @@ def answer(request: FingertipRequest, reporter: Reporter = QUIET):
         StateMachineError: The model cannot be loaded, or as `certify` does.
     """
 
-    def compute(model: Model, _backend: str, progress: Progress):
+    def compute(model: Model, _backend: str, progress: Progress) -> FingertipResult:
         return certify(
             model,
             poses=request.poses,

@@ -14,7 +14,7 @@ from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
 from . import LESSONS, Lesson
-from .session import take
+from .session import LessonRun, take
 
 OptionValue = bool | int | float | str | Sequence[float] | None  # of a lesson's option
 
@@ -73,7 +73,7 @@ class LessonRequest:
         return on_its_own and self.values == self.lesson.defaults
 
 
-def answer(request: LessonRequest, reporter: Reporter = QUIET):
+def answer(request: LessonRequest, reporter: Reporter = QUIET) -> dict[str, LessonRun]:
     """Take a lesson on each backend, and return what came of it by backend.
 
     Raises:
@@ -84,7 +84,7 @@ def answer(request: LessonRequest, reporter: Reporter = QUIET):
     lesson, values = request.lesson, request.values
     model = request.model or lesson.model
 
-    def compute(loaded: Model, backend: str, progress: Progress):
+    def compute(loaded: Model, backend: str, progress: Progress) -> LessonRun:
         menagerie = None if request.menagerie is None else str(request.menagerie)
         return take(lesson, loaded, backend, values, model, menagerie, progress, request.calls)
 

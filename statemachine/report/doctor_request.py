@@ -12,6 +12,6 @@ class DoctorRequest:
     """Question what works on this machine; it is asked in one way only."""
 
 
-def answer(_request: DoctorRequest):
+def answer(_request: DoctorRequest) -> doctor.Diagnosis:
     """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
     return doctor.examine()

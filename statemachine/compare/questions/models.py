@@ -48,7 +48,7 @@ class ModelsRequest:
         return [f"{file}@{engine}" if engine else str(file) for file, engine in sides]
 
 
-def answer(request: ModelsRequest, reporter: Reporter = QUIET):
+def answer(request: ModelsRequest, reporter: Reporter = QUIET) -> models.ModelsComparison:
     """Find every difference between two descriptions.
 
     Raises:

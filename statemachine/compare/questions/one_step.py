@@ -37,7 +37,7 @@ def check_runs(run: Request, flag: str) -> None:
         )
 
 
-def answer(request: OneStepRequest, reporter: Reporter = QUIET):
+def answer(request: OneStepRequest, reporter: Reporter = QUIET) -> one_step.OneStep:
     """Compare one step of both sides from each recorded state of the left one.
 
     Raises:

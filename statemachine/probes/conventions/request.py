@@ -11,7 +11,7 @@ from ...errors import BadInputError, MissingEngineError
 from ...installed import ENGINES, available
 from ...runs.each_backend import note_missing
 from ...runs.reporter import QUIET, Reporter
-from . import QUESTIONS, check_engine, check_questions, probe, run_phrases
+from . import QUESTIONS, Conventions, Phrasebook, check_engine, check_questions, probe, run_phrases
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class CallsRequest:
         _check_some(self.engines)
 
 
-def answer(request: ConventionsRequest, reporter: Reporter = QUIET):
+def answer(request: ConventionsRequest, reporter: Reporter = QUIET) -> Conventions:
     """Ask each engine each question.
 
     Raises:
@@ -58,7 +58,7 @@ def answer(request: ConventionsRequest, reporter: Reporter = QUIET):
         return probe(engines, request.questions or tuple(QUESTIONS), progress)
 
 
-def answer_calls(request: CallsRequest, reporter: Reporter = QUIET):
+def answer_calls(request: CallsRequest, reporter: Reporter = QUIET) -> Phrasebook:
     """Run every call of each engine's table.
 
     Raises:
