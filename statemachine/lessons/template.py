@@ -11,6 +11,7 @@ A template is Markdown with named slots. Its paragraphs become the blocks of a p
     - One of several.                 an item of a list
     <!-- if moved -->                 what follows stands only where the slot `moved` is true, up to
     <!-- else -->, <!-- end -->       these; "if not moved" is the contrary
+    <!-- lessons/hold.md -->          any other comment is left out
 
 A slot takes a number with its unit or a name. On the page of a lesson a paragraph is filled in for
 each engine. It stands there once for all engines of which it says the same, under their names if
@@ -51,6 +52,7 @@ class HasProvenance(Protocol):
 
 
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
+_COMMENT = re.compile(r"<!--.*-->")
 _PARTS = re.compile(r"^(?:[a-h]\)|>|-) ", re.MULTILINE)  # choices, a reason, items of a list
 _MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)
 
@@ -107,6 +109,8 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
     number = 0
     for line in template.splitlines():
         condition = _CONDITION.fullmatch(line)
+        if condition is None and _COMMENT.fullmatch(line):
+            continue
         if condition is None and not line:
             number += 1
         elif condition is None and all(conditions):

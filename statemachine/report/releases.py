@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from platform import python_version
 
@@ -49,22 +49,52 @@ class RemoveReleaseRequest:
 
 
 @dataclass(frozen=True)
+class InstalledEngine:
+    """An engine beside this program.
+
+    Attributes:
+        name: With its version, as "mujoco==4.0.0".
+        python: Version of this Python.
+    """
+
+    name: str
+    python: str
+
+
+@dataclass(frozen=True)
+class ReleasesResult:
+    """Engines that are installed here.
+
+    Attributes:
+        folder: Where releases are installed.
+        releases: Those in environments of their own, by name.
+        engines: Those beside this program.
+    """
+
+    folder: str
+    releases: tuple[Release, ...]
+    engines: tuple[InstalledEngine, ...]
+
+
+@dataclass(frozen=True)
 class ReleasesPage(PageContent):
     """Content of the page of releases.
 
     Attributes:
-        folder: Where releases are installed.
+        result: What is installed.
         releases: Table with a row for each release.
     """
 
     template = "releases.md.j2"
-    folder: str
+    result: ReleasesResult
     releases: Table
 
 
-def answer(_request: ReleasesRequest) -> list[Release]:
-    """Return the releases that are here, by name."""
-    return list(releases())
+def answer(_request: ReleasesRequest) -> ReleasesResult:
+    """Return the releases that are here, and the engines beside this program."""
+    names = [f"{name}=={engine_version(name)}" for name in available()[0]]
+    engines = tuple(InstalledEngine(name, python_version()) for name in names)
+    return ReleasesResult(str(folder()), tuple(releases()), engines)
 
 
 def answer_add(request: AddReleasesRequest, say: Callable[[str], object]) -> list[Release]:
@@ -98,10 +128,8 @@ def size_of(release: Release) -> str:
     return f"{release.size / 1e6:.0f} MB"
 
 
-def page(here: Sequence[Release]) -> Page:
+def page(result: ReleasesResult) -> Page:
     """Return the page of the releases that are here, and of the engines beside this program."""
-    rows = [(release.name, release.python, size_of(release)) for release in here]
-    for name in available()[0]:
-        rows.append((f"{name}=={engine_version(name)}", python_version(), NONE))
-    table = Table(("release", "python", "size"), rows)
-    return render(ReleasesPage(str(folder()), table))
+    rows = [(release.name, release.python, size_of(release)) for release in result.releases]
+    rows += [(engine.name, engine.python, NONE) for engine in result.engines]
+    return render(ReleasesPage(result, Table(("release", "python", "size"), rows)))
