@@ -20,6 +20,7 @@ from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
+from ..interface.checks import as_count
 from ..interface.options import OptionValue
 from ..measures.text import command, listed
 from ..models import SUFFIXES as MODELS
@@ -288,6 +289,11 @@ class Request:
     names: Mapping[str, str] = field(default_factory=dict)
     every: int = 1
     keyframe: str | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.backends) != 2:
+            raise BadInputError(f"two backends are compared; got {shown(self.backends)}")
+        as_count(self.every, "every")
 
     @property
     def is_traces(self) -> bool:

@@ -36,9 +36,13 @@ def check_place(target: Path, suffixes: Sequence[str] = (), what: str = "the out
     """
     if suffixes and target.suffix.lower() not in suffixes:
         raise BadInputError(f"{what} ends in {' or '.join(suffixes)}; got {target.name!r}")
-    if target.is_dir():
-        raise BadInputError(f"{target} is a folder; name a file in it")
     cannot = f"{target} cannot be written"
+    try:
+        is_folder = target.is_dir()
+    except OSError as error:  # such as a name that is too long
+        raise BadInputError(f"{cannot}: {error.strerror}") from None
+    if is_folder:
+        raise BadInputError(f"{target} is a folder; name a file in it")
     if _special(target):
         if not os.access(target, os.W_OK):
             raise BadInputError(f"{cannot}: it is read-only for you")

@@ -183,6 +183,7 @@ class _Checker:
                     self._fault(node, f"no filter {node.name!r}{did_you_mean(node.name, FILTERS)}")
                 self._type_of(node.node, scope, depth)
                 self._arguments(node.args, scope, depth)
+                self._arguments([keyword.value for keyword in node.kwargs], scope, depth)
                 return str
             case nodes.Call():
                 if not isinstance(node.node, nodes.Name) or node.node.name not in _MACROS:

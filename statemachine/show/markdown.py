@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # What begins markup wherever it stands; an underscore does not within a word.
 _INLINE = re.compile(r"[\\`*{}\[\]<>~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])|&(?=#?\w)|!(?=\[)")
+_BLANKS_AROUND = re.compile(r"^ +| +$")
 # What begins a block where it is the first of a line: headings, lists, rules.
 _LINE_START = re.compile(r"^(?P<number>\d{1,9})?(?P<sign>[#+=.)-])(?=\s|$|[#=-])")
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ue000-\uf8ff]")
@@ -49,7 +50,9 @@ def escape(value: object) -> Markdown:
     """
     text = _CONTROL.sub("?", str(value))
     text = _INLINE.sub(r"\\\g<0>", text)
-    return Markdown(_LINE_START.sub(r"\g<number>\\\g<sign>", text))
+    text = _LINE_START.sub(r"\g<number>\\\g<sign>", text)
+    # A blank as an entity begins no block of code, and ends no emphasis.
+    return Markdown(_BLANKS_AROUND.sub(lambda blanks: "&#32;" * len(blanks[0]), text))
 
 
 def code(value: object) -> Markdown:

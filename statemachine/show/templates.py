@@ -273,7 +273,11 @@ class _Placed:
         tree = SyntaxTreeNode(parser().parse(text))
         blocks: list[Block] = []
         for node in tree.children:
-            blocks += self._blocks_of_node(node)
+            is_below_title = len(blocks) == 1 and isinstance(blocks[0], _Title)
+            if is_below_title and node.type == "paragraph":
+                blocks += self._below_title(node)
+            else:
+                blocks += self._blocks_of_node(node)
         return blocks
 
     def _blocks_of_node(self, node: SyntaxTreeNode) -> Sequence[Block]:
@@ -296,10 +300,14 @@ class _Placed:
         text = _inline(node)
         if text.startswith(_OPEN) and text.endswith(_CLOSE):
             return self._groups[int(text[1:-1])]
-        parts: list[SyntaxTreeNode] = node.children[0].children
-        if len(parts) == 1 and parts[0].type == "em":  # *all of it*
-            return [_Origin(Markdown(text[1:-1]))]
         return [Text(text)]
+
+    def _below_title(self, node: SyntaxTreeNode) -> Sequence[Block]:
+        """Return the line below the title, *all of it*; another paragraph is one."""
+        text = _inline(node)
+        if len(text) > 2 and text.startswith("*") and text.endswith("*"):
+            return [_Origin(Markdown(text[1:-1]))]
+        return self._paragraph(node)
 
 
 def _inline(node: SyntaxTreeNode) -> Markdown:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..compare.perturbed import Uncertainty, displaced
-from ..errors import BadInputError, check_name
+from ..errors import BadInputError, check_name, shown
 from ..interface import Array, JointType, Model
-from ..interface.checks import index_of
+from ..interface.checks import index_of, whole_number
 from ..interface.options import OptionValue
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
@@ -80,6 +80,8 @@ class Sweep:
         _check_at_least(0, "design-seed", self.design_seed)
         _check_at_least(1, "every", self.every)
         _check_at_least(1, "moments", self.moments)
+        if not self.backends:
+            raise BadInputError("a sweep is of at least one backend; none is named")
         if not 0 < self.timeout <= _LONGEST:
             raise BadInputError(f"--timeout must be above 0 s; got {self.timeout:g}")
         if not is_function(self.what):
@@ -130,6 +132,8 @@ def _check_at_least(smallest: int, flag: str, value: int) -> None:
     Raises:
         BadInputError: It is.
     """
+    if whole_number(value) is None:
+        raise BadInputError(f"--{flag} must be a whole number; got {shown(value)}")
     if value < smallest:
         raise BadInputError(f"--{flag} must be at least {smallest}; got {value}")
 

@@ -69,6 +69,9 @@ class RecordingRequest:
             raise BadInputError(f"view shows one trace or two; got {len(self.files)}")
 
 
+_LAST_PORT = 65535
+
+
 @dataclass(frozen=True)
 class ServerSettings:
     """How something is shown, and to whom.
@@ -91,6 +94,8 @@ class ServerSettings:
         checked_speed(self.speed)
         if self.seconds is not None and not 0 < self.seconds < math.inf:
             raise BadInputError(f"seconds must be above 0; got {self.seconds}")
+        if not 0 <= self.port <= _LAST_PORT:
+            raise BadInputError(f"port must be from 0 to {_LAST_PORT}; got {self.port}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ...errors import BadInputError
+from ...errors import BadInputError, check_name
+from ...measures import QUANTITIES
 from ...runs.controllers import is_function
 from ...runs.reporter import QUIET, Reporter
 from ..agreement import Comparison, WitnessResult, compare, witness
@@ -28,6 +29,12 @@ class CompareRequest:
     run: Request
     tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
     uncertainty: Uncertainty | None = EXACT
+
+    def __post_init__(self) -> None:
+        for kind, tolerance in self.tolerances.items():
+            check_name("kind of quantity", kind, QUANTITIES)
+            if not tolerance >= 0:
+                raise BadInputError(f"the tolerance of {kind} must not be {tolerance:g}")
 
     @property
     def names_sides(self) -> bool:

@@ -32,6 +32,8 @@ class ModelsRequest:
     menagerie: AnyPath | None = None
 
     def __post_init__(self) -> None:
+        if len(self.files) != 2 or len(self.engines) != 2:
+            raise BadInputError(f"two files are compared, each of one engine or none; got {self}")
         if self.seed < 0:
             raise BadInputError(f"--seed must not be negative; got {self.seed}")
         (left, right), (engine, other) = self.files, self.engines
