@@ -9,7 +9,7 @@ import io
 import itertools
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -71,8 +71,9 @@ def of(one: Trace, two: Trace) -> Made:
     return of_look(one, two, drawing_of(sm.load(one.header.provenance.model_file)))
 
 
-def page_of(made: Made, looks: Any = None, **more: Any) -> str:
-    return report(compared(made[0], parts=PageParts(**more)), looks or made[3:] * 2)
+def page_of(made: Made, looks: Any = None, said: Sequence[str] = (), **more: Any) -> str:
+    page = compared(made[0], said=said, parts=PageParts(**more))
+    return report(page, looks or made[3:] * 2)
 
 
 def recorded(name: str, kind: Any = "model") -> Made:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from ... import releases
 from ...errors import BadInputError
-from ...releases import around_a_change, backends_of, published
 from ...runs.drive import Progress, part_of, silent
 from ...runs.reporter import QUIET, Reporter
 from ..agreement import Comparison, compare
@@ -57,9 +57,11 @@ def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> list[Compari
         return compare(*run.traces, tolerances=request.tolerances)
 
     if request.bisect:
-        backends = around_a_change(published(request.versions), compared, reporter.note)
+        backends = releases.around_a_change(
+            releases.published(request.versions), compared, reporter.note
+        )
     else:
-        backends = backends_of(request.versions)
+        backends = releases.backends_of(request.versions)
     pairs = list(pairwise(backends))
     with reporter.stage("versions") as progress:
         return [
