@@ -67,6 +67,7 @@ class _Content(PageContent):
     holds: bool = True
     state: Literal["inside", "beyond"] = "inside"
     parts: tuple[_Part, ...] = ()
+    names: tuple[str, ...] = ()
     sizes: Table = field(default_factory=lambda: Table(("what", "size"), []))
 
 
@@ -177,6 +178,13 @@ FAULTS = {
     "{% if holds and name %}a{% endif %}": "a condition tests one field or named property",
     "{% if state == 'insde' %}a{% endif %}": "no value 'insde'",
     "{{ none }}": "a page shows no None",
+    "{{ size }}": "a page shows no float without a filter",
+    "{{ holds }}": "a page shows no bool without a filter",
+    "{{ parts }}": "a page shows no tuple without a filter",
+    "{% for name, part in names %}{{ name }}{% endfor %}": "a text is no pair",
+    "{{ table(sizes, 3) }}": "table: too many positional arguments",
+    "{% call section('More', foldet=true) %}x{% endcall %}": "unexpected keyword argument 'foldet'",
+    "{% call titled() %}x{% endcall %}": "titled: missing a required argument: 'table'",
     "{{ size + 1 }}": "Add has no place in a template",
     "{% if holds %}{% if name %}{% if size %}a{% endif %}{% endif %}{% endif %}": "a condition "
     "stands in a condition that stands in a condition",

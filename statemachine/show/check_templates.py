@@ -17,7 +17,7 @@ from typing import Any
 from jinja2 import nodes
 
 from ..errors import did_you_mean
-from .templates import FILTERS, PageContent, environment
+from .templates import FILTERS, PageContent, environment, signature_of
 
 # What a template calls; the fields of its arguments are checked, their number is not.
 _MACROS = (
@@ -101,7 +101,7 @@ class _Checker:
                 for part in node.nodes:
                     if isinstance(part, nodes.Const) and not isinstance(part.value, str):
                         self._fault(part, f"a page shows no {part.value!r}")
-                    self._type_of(part, scope, depth)
+                    self._check_shown(part, self._type_of(part, scope, depth))
             case nodes.If():
                 self._check_condition(node.test, scope, depth)
                 branches = [node.body, node.else_, *(branch.body for branch in node.elif_)]
@@ -126,12 +126,23 @@ class _Checker:
             case _:
                 self._fault(node, f"{type(node).__name__} has no place in a template")
 
+    def _check_shown(self, node: nodes.Node, kind: Any) -> None:
+        """Report a value that a page shows through a filter alone: a figure, a flag, a list."""
+        kind = _without_none(kind)
+        plain = typing.get_origin(kind) or kind
+        if plain is Any or not isinstance(plain, type):
+            return
+        if plain is bool or not issubclass(plain, (str, int)):
+            self._fault(node, f"a page shows no {plain.__name__} without a filter")
+
     def _bound(self, target: nodes.Node, kind: Any) -> dict[str, Any]:
         """Return the names that a loop or an assignment makes, with their types."""
         if isinstance(target, nodes.Name):
             return {target.name: kind}
         bound: dict[str, Any] = {}
         if isinstance(target, nodes.Tuple):
+            if kind is str:
+                self._fault(target, "a text is no pair: a loop over a table takes its keys")
             parts = _parts_of(kind, len(target.items))
             for item, part in zip(target.items, parts, strict=True):
                 bound |= self._bound(item, part)
@@ -186,7 +197,9 @@ class _Checker:
                 self._arguments([keyword.value for keyword in node.kwargs], scope, depth)
                 return str
             case nodes.Call():
-                if not isinstance(node.node, nodes.Name) or node.node.name not in _MACROS:
+                if isinstance(node.node, nodes.Name) and node.node.name in _MACROS:
+                    self._check_arguments(node, node.node.name)
+                else:
                     self._fault(node, f"a template calls {', '.join(_MACROS)} alone")
                 self._arguments(node.args, scope, depth)
                 self._arguments([keyword.value for keyword in node.kwargs], scope, depth)
@@ -202,6 +215,14 @@ class _Checker:
                 return Any
         self._fault(node, f"{type(node).__name__} has no place in a template: name a property")
         return Any
+
+    def _check_arguments(self, node: nodes.Call, macro: str) -> None:
+        """Report arguments that a macro does not take, or that it lacks."""
+        keywords = [keyword.key for keyword in node.kwargs]
+        try:
+            signature_of(macro).bind(*node.args, **dict.fromkeys(keywords))
+        except TypeError as error:
+            self._fault(node, f"{macro}: {error}")
 
     def _arguments(
         self, arguments: Sequence[nodes.Node], scope: Mapping[str, Any], depth: int

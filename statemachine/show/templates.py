@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from importlib import resources
@@ -194,6 +195,13 @@ class _Origin(Text):
 def macros() -> list[str]:
     """Return the names of what a template calls to place blocks."""
     return list(_Placed().macros())
+
+
+def signature_of(macro: str) -> inspect.Signature:
+    """Return what a macro takes from a template, without the text that a call block gives it."""
+    signature = inspect.signature(_Placed().macros()[macro])
+    names = [parameter for name, parameter in signature.parameters.items() if name != "caller"]
+    return signature.replace(parameters=names)
 
 
 class _Placed:
