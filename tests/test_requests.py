@@ -107,6 +107,16 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: VersionsRequest(Request(("hold",), sides=(Side("a"), Side("b"))), "3"), "one model"),
     (lambda: ModelsRequest(("a", "b"), seed=-1), "--seed must not be negative"),
     (lambda: ModelsRequest(("a", "a"), ("mujoco", "mujoco")), "name two engines, or two files"),
+    # What only Python can ask: argparse has no such value.
+    (lambda: Request(("hold",), backends=("mujoco",)), "two backends are compared"),  # pyright: ignore
+    (lambda: Request(("hold",), every=0), "every must be a whole number of at least 1"),
+    (lambda: CompareRequest(HOLD, {"tipp": 0.1}), "no kind of quantity named 'tipp'"),
+    (lambda: CompareRequest(HOLD, {"tip": float("nan")}), "the tolerance of tip must not be nan"),
+    (lambda: ModelsRequest(("so101",)), "two files are compared"),  # pyright: ignore
+    (lambda: Sweep("hold", backends=()), "at least one backend"),
+    (lambda: Sweep("hold", seeds=1.5), "--seeds must be a whole number"),  # pyright: ignore
+    (lambda: ServerSettings(port=-1), "port must be from 0 to 65535"),
+    (lambda: RobotsRequest(("models",), Path("a" * 2000 + ".csv")), "cannot be written"),
 ]
 
 
@@ -163,25 +173,3 @@ def test_a_request_imports_no_engine(module: str) -> None:
     engines = "{'mujoco', 'pybullet', 'pinocchio', 'viser', 'rich', 'matplotlib'}"
     code = f"import sys, statemachine.{module}; print({engines} & set(sys.modules))"
     assert of_python("-c", code).stdout.strip() == "set()"
-
-
-# What only Python can ask: argparse has no such value.
-ODD: list[tuple[Callable[[], object], str]] = [
-    (lambda: Request(("hold",), backends=("mujoco",)), "two backends are compared"),  # pyright: ignore
-    (lambda: Request(("hold",), every=0), "every must be a whole number of at least 1"),
-    (lambda: CompareRequest(HOLD, {"tipp": 0.1}), "no kind of quantity named 'tipp'"),
-    (lambda: CompareRequest(HOLD, {"tip": float("nan")}), "the tolerance of tip must not be nan"),
-    (lambda: ModelsRequest(("so101",)), "two files are compared"),  # pyright: ignore
-    (lambda: Sweep("hold", backends=()), "at least one backend"),
-    (lambda: Sweep("hold", seeds=1.5), "--seeds must be a whole number"),  # pyright: ignore
-    (lambda: ServerSettings(port=-1), "port must be from 0 to 65535"),
-    (lambda: RobotsRequest(("models",), Path("a" * 2000 + ".csv")), "cannot be written"),
-]
-
-
-@pytest.mark.parametrize(("make", "says"), ODD)
-def test_a_request_from_python_refuses_what_no_command_can_ask(
-    make: Callable[[], object], says: str
-) -> None:
-    with pytest.raises(StateMachineError, match=says):
-        make()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeVar
 
 from ..installed import ENGINES
@@ -154,6 +154,11 @@ def count(number: int, thing: str, zero: str = "0") -> str:
     """A number of things: "1 step", "2,000 steps"."""
     things = thing if number == 1 else f"{thing}s"
     return f"{number:,} {things}" if number else f"{zero} {things}"
+
+
+def versions_of(versions: Mapping[str, str]) -> str:
+    """Return engines and packages with their versions, in a row."""
+    return ", ".join(f"{name} {version}".strip() for name, version in versions.items())
 
 
 def listed(words: Sequence[str]) -> str:

@@ -8,11 +8,10 @@ from html import escape
 from typing import Literal
 
 from ..engines.measured import Measurement
-from ..measures.text import reading, significant
+from ..measures.text import reading, significant, versions_of
 from ..page import Page, Table
 from ..probes.conventions import CONCEPTS, Convention, Conventions, Phrasebook
 from ..show.templates import PageContent, render
-from .template import versions_of
 
 _ZERO = 1e-12
 

@@ -10,10 +10,9 @@ from ..grading.class_table import ClassEntry, verdict_word
 from ..grading.exercise import Grade
 from ..grading.faults.run import Examination, FaultTrial
 from ..grading.judges import JUDGES, Judgement
-from ..measures.text import count
+from ..measures.text import count, versions_of
 from ..page import Page, Table
 from ..show.templates import PageContent, render
-from .template import versions_of
 
 # What is said where a student's code is not kept from the files of this machine.
 ONLY_WATCHED = (

@@ -15,11 +15,12 @@ from ..measures.text import (
     reading,
     rounded,
     sentence,
+    versions_of,
 )
 from ..page import Block, Items, Page, Table, Text
 from . import template
 from .model_diff_subject import APART, MOMENT, Slots, subject_blocks
-from .template import if_true, versions_of
+from .template import if_true
 
 _READ = ("file", "read", "links", "joints", "shapes", "mass")  # rows of the sides
 

@@ -79,8 +79,3 @@ def slots_of(*records: DataclassInstance) -> dict[str, Any]:
 def if_true(holds: object) -> str | None:
     """The value of a slot at the head of a line that stands there only if something holds."""
     return "" if holds else None
-
-
-def versions_of(versions: Mapping[str, str]) -> str:
-    """Engines and packages with their versions, in a row."""
-    return ", ".join(f"{name} {version}".strip() for name, version in versions.items())

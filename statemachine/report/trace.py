@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..measures.text import figure, short_time
+from ..measures.text import figure, short_time, versions_of
 from ..page import Page, Table
 from ..runs import COLUMNS, Header, Trace
 from ..show.templates import PageContent, render
 from .sides import facts_of
-from .template import versions_of
 
 
 @dataclass(frozen=True)

@@ -93,10 +93,10 @@ def render_blocks(content: PageContent) -> list[Block]:
 
 def _names_of(content: PageContent) -> dict[str, object]:
     """Return the fields and properties of a content, by name."""
-    kind = type(content)
-    names = {name for name, member in vars(kind).items() if isinstance(member, property)}
-    names |= set(getattr(kind, "__dataclass_fields__", ())) - {"template"}
-    return {name: getattr(content, name) for name in names}
+    names = set(getattr(type(content), "__dataclass_fields__", ()))
+    for base in type(content).__mro__:  # a property may be inherited, as a field may
+        names |= {name for name, member in vars(base).items() if isinstance(member, property)}
+    return {name: getattr(content, name) for name in names - {"template"}}
 
 
 @functools.cache
@@ -144,20 +144,9 @@ def _raise_if_undefined(value: object) -> None:
         str(value)
 
 
-def _listed(words: Sequence[str], conjunction: str = "and") -> Markdown:
-    """Return words in a row: "a, b and c"."""
-    *first, last = [escape(word) for word in words]
-    return Markdown(f"{', '.join(first)} {conjunction} {last}" if first else last)
-
-
-def _joined(words: Iterable[object], between: str = ", ") -> Markdown:
+def _joined(words: Iterable[object], between: str = ", ") -> str:
     """Return values one after the other."""
-    return Markdown(between.join(escape(word) for word in words))
-
-
-def _versions(versions: dict[str, str]) -> Markdown:
-    """Return engines and packages with their versions, in a row."""
-    return _joined(f"{name} {version}".strip() for name, version in versions.items())
+    return between.join(map(str, words))
 
 
 # What a template may send a value through. Figures are in SI units.
@@ -176,9 +165,9 @@ FILTERS: dict[str, Callable[..., str | int]] = {
     "capital": numbers.capital,
     "sentence": numbers.sentence,
     "few": numbers.few,
-    "listed": _listed,
+    "listed": numbers.listed,
     "joined": _joined,
-    "versions": _versions,
+    "versions": numbers.versions_of,
     "code": code,
     "prose": prose,
 }
@@ -230,8 +219,7 @@ class _Placed:
 
     def titled(self, table: Table, caller: Callable[[], str]) -> Markdown:
         """Place a table under a title."""
-        title = plain_text(Markdown(" ".join(caller().split())))
-        return self.table(replace(table, title=title))
+        return self.table(replace(table, title=plain_text(_on_one_line(caller()))))
 
     def block(self, block: Block) -> Markdown:
         """Place a block of any kind."""
@@ -251,7 +239,7 @@ class _Placed:
 
     def verdict(self, holds: bool, caller: Callable[[], str]) -> Markdown:
         """Place a statement that was checked, and whether it held."""
-        return self._mark([Verdict(Markdown(" ".join(caller().split())), holds)])
+        return self._mark([Verdict(_on_one_line(caller()), holds)])
 
     def small(self, caller: Callable[[], str]) -> Markdown:
         """Place paragraphs in small print."""
@@ -316,6 +304,11 @@ class _Placed:
         if len(text) > 2 and text.startswith("*") and text.endswith("*"):
             return [_Origin(Markdown(text[1:-1]))]
         return self._paragraph(node)
+
+
+def _on_one_line(text: str) -> Markdown:
+    """Return the Markdown that a call block gives a macro, without its line breaks."""
+    return Markdown(" ".join(text.split()))
 
 
 def _inline(node: SyntaxTreeNode) -> Markdown:
