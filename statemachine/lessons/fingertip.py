@@ -35,7 +35,7 @@ _WIDE = 100.0  # a range beyond this [m or rad] is not a limit
 _TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
 
-Verdict = Literal["different frames", "disagrees", "agrees", "same place"]
+CertificateVerdict = Literal["different frames", "disagrees", "agrees", "same place"]
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class FingertipResult:
 
     @property
     @only_on_pages
-    def verdict(self) -> Verdict:
+    def verdict(self) -> CertificateVerdict:
         """Return what the certificate says.
 
         Returns:

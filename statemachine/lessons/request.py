@@ -16,7 +16,7 @@ from ..runs.reporter import QUIET, Reporter
 from . import LESSONS, Lesson
 from .session import LessonRun, take
 
-OptionValue = bool | int | float | str | Sequence[float] | None  # of a lesson's option
+LessonValue = bool | int | float | str | Sequence[float] | None  # of a lesson's option
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class LessonRequest:
     model: str | None = None
     backends: tuple[str, ...] = (DEFAULT,)
     menagerie: AnyPath | None = None
-    options: Mapping[str, OptionValue] = field(default_factory=dict[str, OptionValue])
+    options: Mapping[str, LessonValue] = field(default_factory=dict[str, LessonValue])
     calls: bool = False
 
     def __post_init__(self) -> None:
@@ -57,7 +57,7 @@ class LessonRequest:
         return LESSONS[self.name]
 
     @property
-    def values(self) -> dict[str, OptionValue]:
+    def values(self) -> dict[str, LessonValue]:
         """All options of the lesson, by key."""
         return {**self.lesson.defaults, **self.options}
 

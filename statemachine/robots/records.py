@@ -28,7 +28,7 @@ RUNS = "runs"
 Loading = Literal["with contacts", "without contacts", "never"]
 Exactness = Literal["ended", "refused", "differs", "exact", "not asked"]
 GapOutcome = Literal["explodes", "stops", "rounding", "vanishes", "measured"]
-Comparison = GapOutcome | Literal["refused", "not compared", "still"]
+ComparisonOutcome = GapOutcome | Literal["refused", "not compared", "still"]
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ class ExaminedModel:
             return "differs"
         return "exact" if True in answers else "not asked"
 
-    def comparison(self, backend: str, contacts: bool) -> Comparison:
+    def comparison(self, backend: str, contacts: bool) -> ComparisonOutcome:
         """Return what became of the comparison of a backend with the default one."""
         if backend not in self.backends:
             return "not compared"
