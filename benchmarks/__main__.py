@@ -21,12 +21,12 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import NULL, Ratio, interleaved
 from statemachine import __version__, releases
-from statemachine.compare.why import WhyRequest, explain
-from statemachine.compare.why.causes import built
-from statemachine.lessons.in_turns import in_turns
-from statemachine.runs import recorder
-from statemachine.runs.drive import silent
-from statemachine.runs.scenarios import scenario
+from statemachine.lab.recordings import recorder
+from statemachine.lab.runs.drive import silent
+from statemachine.lab.runs.in_turns import in_turns
+from statemachine.lab.runs.scenarios import scenario
+from statemachine.lab.why import WhyRequest, explain
+from statemachine.lab.why.causes import built
 from statemachine.worlds import make_worlds
 from statemachine.worlds import step as step_worlds
 

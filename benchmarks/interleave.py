@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from statemachine.lessons.in_turns import Ratio, in_turns
+from statemachine.lab.runs.in_turns import Ratio, in_turns
 
 NULL = "the baseline again (null)"
 

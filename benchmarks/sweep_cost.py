@@ -26,10 +26,10 @@ from typing import Any
 import joblib
 
 import statemachine as sm
-from statemachine.runs.robot import TARGET
-from statemachine.sweep import Sweep, prepared
-from statemachine.sweep.rows import CELLS, RowWriter, counted
-from statemachine.sweep.worker import Row, run_batch
+from statemachine.lab.runs.robot import TARGET
+from statemachine.lab.sweep import Sweep, prepared
+from statemachine.lab.sweep.rows import CELLS, RowWriter, counted
+from statemachine.lab.sweep.worker import Row, run_batch
 
 YEAR = 365.25 * 86400
 CELLS_OF_ALL = 10**9

@@ -14,9 +14,9 @@ from collections import Counter
 from importlib.metadata import distributions
 from pathlib import Path
 
-from statemachine.report.notebook import body
-from statemachine.report.robots import page
-from statemachine.robots import examine_all, find
+from statemachine.course.notebook import body
+from statemachine.lab.robots import examine_all, find
+from statemachine.lab.robots.page import page
 
 PACKAGES = {
     "gymnasium": "gymnasium",

@@ -1,3 +1,3 @@
 """The fixtures of test_arm.py, so that `pytest exercises/test_arm.py` runs on the healthy arm."""
 
-pytest_plugins = ["statemachine.grading.faults.plugin"]
+pytest_plugins = ["statemachine.course.grading.faults.plugin"]

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import statemachine as sm
 from statemachine.errors import MissingEngineError, TraceError
-from statemachine.runs import RunStart, export_csv, read, record, write
+from statemachine.lab.recordings import RunStart, export_csv, read, record, write
 
 from ._tally import ROOT, Tally, environment
 
@@ -23,7 +23,7 @@ _OLD = b"what was there before\n"
 # Reads a trace, says that it begins, and writes it again and again.
 _WRITER = """
 import sys
-from statemachine.runs import export_csv, read, write
+from statemachine.lab.recordings import export_csv, read, write
 source, target = sys.argv[1:]
 trace = read(source)
 print("begins", flush=True)

@@ -177,7 +177,7 @@ def typed_words(draw: random.Random, words: Sequence[str], left: Path, right: Pa
 
 def ended_badly(words: list[str]) -> str:
     """Run a command in this process; what is wrong with its end, or ""."""
-    from statemachine import cli
+    from statemachine.cli import main as cli
 
     out, said = io.StringIO(), io.StringIO()
     sys.argv = ["statemachine", *words]
@@ -194,10 +194,10 @@ def ended_badly(words: list[str]) -> str:
 
 def faults_of_robots(file: Path, folder: Path, seed: int) -> str:
     """Examine a model as `robots` does; what it calls a fault, or ""."""
-    from statemachine.report.robots import page
-    from statemachine.robots import Survey
-    from statemachine.robots.examine import examine
-    from statemachine.robots.records import ExaminedModel
+    from statemachine.lab.robots import Survey
+    from statemachine.lab.robots.examine import examine
+    from statemachine.lab.robots.page import page
+    from statemachine.lab.robots.records import ExaminedModel
 
     try:
         with warnings.catch_warnings(action="ignore"):

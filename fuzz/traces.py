@@ -17,7 +17,7 @@ import numpy as np
 
 import statemachine as sm
 from statemachine.errors import MissingEngineError, TraceError
-from statemachine.runs import RunMetadata, RunStart, Trace, files, record, write
+from statemachine.lab.recordings import RunMetadata, RunStart, Trace, files, record, write
 
 from ._tally import Tally
 

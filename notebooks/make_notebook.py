@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from statemachine.report.notebook import build
+from statemachine.course.notebook import build
 
 if __name__ == "__main__":
     Path(__file__).with_name("path.ipynb").write_text(build(), encoding="utf-8")

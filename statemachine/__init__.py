@@ -62,10 +62,16 @@ _HOMES = {
     "freshness": "freshness",
     "watch_freshness": "freshness",
 }
-_MODULES = (
-    "backends", "compare", "conformance", "errors", "kinematics", "models",
-    "rotations", "runs",
-)  # fmt: skip
+_MODULES = {
+    "backends": "backends",
+    "compare": "lab.compare",
+    "conformance": "conformance",
+    "errors": "errors",
+    "kinematics": "kinematics",
+    "models": "models",
+    "recordings": "lab.recordings",
+    "rotations": "rotations",
+}
 
 __all__ = [
     "Data",
@@ -89,7 +95,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         value = getattr(_import_module(f".{_HOMES[name]}", __name__), name)
     elif name in _MODULES:
-        value = _import_module(f".{name}", __name__)
+        value = _import_module(f".{_MODULES[name]}", __name__)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value  # so that the next use is an ordinary look-up

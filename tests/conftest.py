@@ -25,17 +25,17 @@ import pytest
 
 from statemachine import backends, load, releases
 from statemachine.backends import backend_engine, backend_names
-from statemachine.cli import main
-from statemachine.commands._common import FAULT
-from statemachine.compare import perturbed
+from statemachine.cli.common import FAULT
+from statemachine.cli.main import main
+from statemachine.course.lessons import LESSONS
+from statemachine.course.lessons.session import take
 from statemachine.errors import EngineWarning, MissingEngineError, StateMachineError
 from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, forward, make_data, reset, step
-from statemachine.lessons import LESSONS
-from statemachine.lessons.session import take
+from statemachine.lab.compare import perturbed
 from statemachine.measures.quantities import readings
-from statemachine.page import Page
-from statemachine.report import terminal
+from statemachine.show import terminal
+from statemachine.show.blocks import Page
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import statemachine as sm
-from statemachine.compare.why import Explanation, WhyRequest, explain
-from statemachine.runs.scenarios import Scenario
+from statemachine.lab.runs.scenarios import Scenario
+from statemachine.lab.why import Explanation, WhyRequest, explain
 
 from .conftest import written
 

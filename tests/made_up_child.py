@@ -1,7 +1,7 @@
 """A made-up engine in a Python of its own: MuJoCo, of which little is told.
 
 It is the template for an engine of yours that cannot be installed beside this package: the
-functions and the class that `statemachine/backends/_child_server.py` asks for. `load` below is for
+functions and the class that `statemachine/backends/served/child_server.py` asks for. `load` below is for
 this side: the Python and this file make a backend.
 """
 

@@ -26,15 +26,13 @@ from .small_models import TREES
 
 def _parts() -> Any:
     """The modules of the backend, which need the engine to be imported."""
-    from statemachine.backends import (
-        _bullet_driven,
-        _bullet_law,
-        _bullet_plan,
-        _bullet_world,
-        _hidden_data,
-        _hidden_world,
-        pybullet_backend,
-    )
+    from statemachine.backends import hidden_data as _hidden_data
+    from statemachine.backends import hidden_world as _hidden_world
+    from statemachine.backends import pybullet_backend
+    from statemachine.backends.bullet import driven as _bullet_driven
+    from statemachine.backends.bullet import joint_dynamics as _bullet_law
+    from statemachine.backends.bullet import plan as _bullet_plan
+    from statemachine.backends.bullet import world as _bullet_world
 
     class Parts:
         data, hidden, driven = _hidden_data, _hidden_world, _bullet_driven

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 import statemachine as sm
-from statemachine.drawing.scene import Camera
 from statemachine.engines import room
 from statemachine.installed import DEFAULT
+from statemachine.show.drawing.scene import Camera
 
 from .conftest import ROOT, absent, opened
 

@@ -17,17 +17,17 @@ import pytest
 
 import statemachine as sm
 from statemachine import errors, models, robot_packages
-from statemachine.cli import main
-from statemachine.compare import compare
-from statemachine.lessons import LESSONS
-from statemachine.lessons.session import page_of_lesson, take
-from statemachine.page import Code, Page, Question, Table, Text
-from statemachine.report.robots import page as survey_page
-from statemachine.robots import ExaminedModel, Survey
-from statemachine.robots.examine import examine
-from statemachine.runs import record_scenario
-from statemachine.runs.robot import hold_ctrl, is_servo
-from statemachine.runs.scenarios import SCENARIOS, fitting
+from statemachine.cli.main import main
+from statemachine.course.lessons import LESSONS
+from statemachine.course.lessons.session import page_of_lesson, take
+from statemachine.lab.compare import compare
+from statemachine.lab.recordings import record_scenario
+from statemachine.lab.robots import ExaminedModel, Survey
+from statemachine.lab.robots.examine import examine
+from statemachine.lab.robots.page import page as survey_page
+from statemachine.lab.runs.robot import hold_ctrl, is_servo
+from statemachine.lab.runs.scenarios import SCENARIOS, fitting
+from statemachine.show.blocks import Code, Page, Question, Table, Text
 
 from .conftest import (
     Cli,
@@ -201,7 +201,7 @@ def test_no_balance_is_drawn_while_the_rest_moves(model: Any) -> None:
 
 
 def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.runs import drive
+    from statemachine.lab.runs import drive
 
     steps = itertools.count(1)
 

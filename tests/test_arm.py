@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import _bullet_urdf as urdf
+from statemachine.backends.bullet import urdf
 from statemachine.errors import EngineWarning
 from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir

@@ -12,8 +12,8 @@ import pytest
 import statemachine as sm
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.errors import BadInputError, EngineWarning
-from statemachine.probes import Audit, audit
-from statemachine.report.as_json import plain
+from statemachine.lab.probes import Audit, audit
+from statemachine.show.as_json import plain
 
 from .conftest import followed_by, need_engine, refused, registered
 from .small_models import loaded, model_of

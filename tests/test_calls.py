@@ -22,17 +22,17 @@ from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.engines.call_watch import CLOSED, NEW
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.page import Page, Table
-from statemachine.probes import calls
-from statemachine.probes.calls import (
+from statemachine.lab.probes import calls
+from statemachine.lab.probes import calls_page as words
+from statemachine.lab.probes.calls import (
     CallRecorder,
     RecordedStatement,
     Recording,
     record,
     recorded_engines,
 )
-from statemachine.report import calls as words
-from statemachine.report.as_json import dumps
+from statemachine.show.as_json import dumps
+from statemachine.show.blocks import Page, Table
 
 from .conftest import (
     Patch,
@@ -508,7 +508,7 @@ def test_what_cannot_be_recorded_is_refused() -> None:
         (UnknownNameError, "mujoco, pybullet", lambda: record("", "mujco")),
         (BadInputError, "on pybullet", lambda: record(other, "mujoco")),
     )
-    nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
+    nested = 'from statemachine.lab.probes.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
 
 

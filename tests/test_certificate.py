@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.lessons.fingertip import FingertipResult, FrameOffset, certify
-from statemachine.report.as_json import plain
+from statemachine.lab.validate.fingertip import FingertipResult, FrameOffset, certify
+from statemachine.show.as_json import plain
 
 from .conftest import need_engine
 

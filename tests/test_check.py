@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from statemachine.course.grading import exercise, recording
+from statemachine.course.grading.inside.answers import Answer, OtherValue, decode, encode
+from statemachine.course.grading.inside.calls import FaultError, answers_of, answers_of_file
+from statemachine.course.grading.inside.watch import EngineRun, Inputs, engine_watched
+from statemachine.course.grading.inside.worlds import AnyWorld, Scenes, worlds_of
+from statemachine.course.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.errors import MissingEngineError
-from statemachine.grading import exercise, recording
-from statemachine.grading.inside.answers import Answer, OtherValue, decode, encode
-from statemachine.grading.inside.calls import FaultError, answers_of, answers_of_file
-from statemachine.grading.inside.watch import EngineRun, Inputs, engine_watched
-from statemachine.grading.inside.worlds import AnyWorld, Scenes, worlds_of
-from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.processes import sandbox
 
 from .conftest import (
@@ -158,7 +158,7 @@ NOTHING['changed'] = {'dict': []}
 """
 _NO_RECORD = r"what its process recorded is not a record of a run \("
 _REPLACED_JUDGE = """
-from statemachine.grading import judges
+from statemachine.course.grading import judges
 for name in judges.JUDGES:
     judges.judge_of(name).judge = lambda *_: 'patched'
     judges.judge_of(name).right = lambda _: None

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from statemachine.cli import main
-from statemachine.errors import BadInputError
-from statemachine.grading import classroom
-from statemachine.grading.class_table import ClassEntry, few_words, read, rows_of
-from statemachine.grading.classroom import (
+from statemachine.atomic_files import csv_text, replace_csv
+from statemachine.cli.main import main
+from statemachine.course.grading import classroom
+from statemachine.course.grading.class_table import ClassEntry, few_words, read, rows_of
+from statemachine.course.grading.classroom import (
     Submission,
     enrolled,
     is_one_students,
@@ -26,13 +26,13 @@ from statemachine.grading.classroom import (
     submission_in,
     submissions,
 )
-from statemachine.grading.exercise import LOOK, ExerciseJudge, Grade
-from statemachine.grading.faults import FAULTS
-from statemachine.grading.faults.run import Examination, FailedTest, FaultTrial
-from statemachine.grading.judges import JUDGES, Judgement
-from statemachine.page import Text
-from statemachine.report.grading import class_page, gradescope_results
-from statemachine.runs.whole import csv_text, replace_csv
+from statemachine.course.grading.exercise import LOOK, ExerciseJudge, Grade
+from statemachine.course.grading.faults import FAULTS
+from statemachine.course.grading.faults.run import Examination, FailedTest, FaultTrial
+from statemachine.course.grading.judges import JUDGES, Judgement
+from statemachine.course.grading.page import class_page, gradescope_results
+from statemachine.errors import BadInputError
+from statemachine.show.blocks import Text
 
 from .conftest import (
     ROOT,

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from rich.cells import cell_len
 
-from statemachine.lessons import LESSONS
+from statemachine.course.lessons import LESSONS
 from statemachine.models import models_dir
 
 from .conftest import (

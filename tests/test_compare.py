@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.commands._common import EXPERIMENTS
-from statemachine.compare import (
+from statemachine.cli.common import EXPERIMENTS
+from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
+from statemachine.lab.compare import (
     Request,
     compare,
     run_sides,
@@ -22,12 +23,11 @@ from statemachine.compare import (
     touches,
     witness,
 )
-from statemachine.compare.series import normal_forces, total_forces
-from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
+from statemachine.lab.compare.series import normal_forces, total_forces
+from statemachine.lab.questions import compare_page as report
+from statemachine.lab.recordings import Trace, record, write
+from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.measures import COUNT, QUANTITIES, parse_tolerances, tolerance_of
-from statemachine.report import compare as report
-from statemachine.runs import Trace, record, write
-from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import Cli, assert_has, assert_in, one_line, opened, refused, written
 from .small_models import NAMELESS_JOINTS, STILL, model_of

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import (
+from statemachine.errors import BadInputError, StateMachineError, TraceError, UnknownNameError
+from statemachine.lab.compare import (
     Comparison,
     Request,
     Side,
@@ -22,10 +23,9 @@ from statemachine.compare import (
     run_sides,
     split_words,
 )
-from statemachine.errors import BadInputError, StateMachineError, TraceError, UnknownNameError
-from statemachine.report import compare as report
-from statemachine.runs import RunStart, record, write
-from statemachine.runs.controllers import function_scenario
+from statemachine.lab.questions import compare_page as report
+from statemachine.lab.recordings import RunStart, record, write
+from statemachine.lab.runs.controllers import function_scenario
 
 from .conftest import ROOT, Cli, assert_has, need_engine, one_line, refused, written, written_all
 from .explained import with_changes

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.lab.recordings import record, record_scenario, shipped
+from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.measures import (
     ContactNames,
     Gap,
@@ -21,8 +23,6 @@ from statemachine.measures import (
     text,
     together,
 )
-from statemachine.runs import record, record_scenario, shipped
-from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import (
     Cli,

@@ -13,23 +13,28 @@ import pytest
 from rich.cells import cell_len
 
 from statemachine import engines
-from statemachine.cli import main
+from statemachine.cli.main import main
 from statemachine.engines import room, samples
 from statemachine.engines.mujoco import conventions as mujoco_conventions
 from statemachine.engines.samples import TREE
 from statemachine.errors import MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, available, require
-from statemachine.probes.calls import record
-from statemachine.probes.conventions import (
+from statemachine.lab.probes.calls import record
+from statemachine.lab.probes.conventions import (
     CONCEPTS,
     QUESTIONS,
     ask,
     probe,
     run_phrases,
 )
-from statemachine.probes.conventions.answers import NO_ANSWER, UNDECIDED, BestHypothesis, closest
-from statemachine.probes.conventions.frames import FIXED, ORDERS
-from statemachine.report import conventions as report
+from statemachine.lab.probes.conventions import page as report
+from statemachine.lab.probes.conventions.answers import (
+    NO_ANSWER,
+    UNDECIDED,
+    BestHypothesis,
+    closest,
+)
+from statemachine.lab.probes.conventions.frames import FIXED, ORDERS
 
 from .conftest import (
     ROOT,

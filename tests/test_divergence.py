@@ -12,12 +12,12 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends import pybullet_backend
-from statemachine.cli import main
-from statemachine.compare import Request, run_sides
-from statemachine.compare import compare as compare_traces
+from statemachine.cli.main import main
 from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
-from statemachine.report import compare as report
+from statemachine.lab.compare import Request, run_sides
+from statemachine.lab.compare import compare as compare_traces
+from statemachine.lab.questions import compare_page as report
 
 from .conftest import (
     after,

@@ -14,15 +14,25 @@ import pytest
 from nbclient import NotebookClient
 
 import statemachine as sm
+from statemachine.course import notebook as md
+from statemachine.course.lessons import LESSONS
+from statemachine.course.lessons.session import page_of_lesson, take
+from statemachine.course.notebook import _opening, build, lesson
+from statemachine.course.site import make_path
 from statemachine.errors import BadInputError
-from statemachine.lessons import LESSONS
-from statemachine.lessons.session import page_of_lesson, take
-from statemachine.page import Heading, Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
-from statemachine.report import notebook as md
-from statemachine.report import terminal
-from statemachine.report.figures import drawn
-from statemachine.report.notebook import _opening, build, lesson
-from statemachine.report.site import make_path
+from statemachine.show import terminal
+from statemachine.show.blocks import (
+    Heading,
+    Page,
+    Pipeline,
+    Printed,
+    Question,
+    Slots,
+    Table,
+    Text,
+    Traces,
+)
+from statemachine.show.charts import drawn
 
 from .conftest import ROOT, assert_in, blocks, of_python, refused
 
@@ -162,7 +172,7 @@ def test_a_page_that_is_the_same_is_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "statemachine.report.site.LESSONS", {name: LESSONS[name] for name in ("state", "write")}
+        "statemachine.course.site.LESSONS", {name: LESSONS[name] for name in ("state", "write")}
     )
     first = make_path(tmp_path, say=lambda _: None)
     assert all("pybullet" in path.read_text("utf-8") for path in first)  # every engine here

@@ -12,9 +12,9 @@ import pytest
 
 import statemachine as sm
 from statemachine import rotations
-from statemachine.drawing import Drawing, Part, Surface, drawing_of
-from statemachine.drawing import _drawing as shapes
-from statemachine.drawing.scene import Camera
+from statemachine.show.drawing import Drawing, Part, Surface, drawing_of
+from statemachine.show.drawing import _drawing as shapes
+from statemachine.show.drawing.scene import Camera
 
 from .conftest import (
     overlapping,

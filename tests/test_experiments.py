@@ -15,15 +15,17 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.course.lessons import session
+from statemachine.course.lessons._falling import Forces, milestones
+from statemachine.course.lessons.speed import SpeedResult
 from statemachine.errors import BadInputError, ModelError
-from statemachine.lessons import fingertip, in_turns, session
-from statemachine.lessons._falling import Forces, milestones
-from statemachine.lessons.certificate import page
-from statemachine.lessons.fingertip import random_qpos
-from statemachine.lessons.speed import SpeedResult
+from statemachine.lab.runs import in_turns
+from statemachine.lab.runs.provenance import provenance
+from statemachine.lab.validate import fingertip
+from statemachine.lab.validate.certificate import page
+from statemachine.lab.validate.fingertip import random_qpos
 from statemachine.models import models_dir
-from statemachine.page import Verdict
-from statemachine.runs.provenance import provenance
+from statemachine.show.blocks import Verdict
 
 from .conftest import (
     around,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.why import Explanation, WhyRequest, explain
-from statemachine.compare.why.shapley import shapley
-from statemachine.runs.scenarios import scenario
+from statemachine.lab.runs.scenarios import scenario
+from statemachine.lab.why import Explanation, WhyRequest, explain
+from statemachine.lab.why.shapley import shapley
 
 from .conftest import ROOT, assert_has, assert_in, written
 from .explained import (
@@ -415,9 +415,9 @@ ACTS_WITH_AN_OPTION = ("body_gravcomp", "actuator_group", "tree_sleep_policy")
 @pytest.mark.parametrize("model", ["so101/scene_box"])
 def test_each_figure_of_a_model_is_found_and_brought_over(model):
     """One entry of each array is changed: the list has it, and the edits undo it."""
-    from statemachine.compare.matching import match_models
     from statemachine.engines.mujoco import _fields as fields
     from statemachine.engines.mujoco.differences import differences, edited
+    from statemachine.lab.compare.matching import match_models
 
     left, random = sm.load(model), np.random.default_rng(0)
     raw, tried = left.compiled, 0
@@ -742,9 +742,9 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
 
 
 def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
-    from statemachine.compare.matching import match_models
     from statemachine.engines.mujoco._sides import same
     from statemachine.engines.mujoco.differences import differences, edited, entries
+    from statemachine.lab.compare.matching import match_models
 
     for name, case in ALONE.items():
         texts = (ARM, changed(ARM, case))

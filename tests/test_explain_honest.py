@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main
-from statemachine.runs import RunMetadata, RunStart, read, record, write
+from statemachine.cli.main import main
+from statemachine.lab.recordings import RunMetadata, RunStart, read, record, write
 
 from .conftest import assert_has, written, written_all
 
@@ -183,8 +183,8 @@ def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys
 
 
 def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
-    from statemachine.compare.matching import match_models
-    from statemachine.compare.why.causes import sensors_of
+    from statemachine.lab.compare.matching import match_models
+    from statemachine.lab.why.causes import sensors_of
 
     sensor = (
         '<sensor><jointpos name="p" joint="j1"/>'

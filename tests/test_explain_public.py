@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.matching import match_models
-from statemachine.compare.why import WhyRequest, explain
-from statemachine.compare.why.causes import differences_of
 from statemachine.engines.mujoco.differences import edited
 from statemachine.errors import StateMachineError
 from statemachine.interface import Model
-from statemachine.runs.scenarios import SCENARIOS, fitting
+from statemachine.lab.compare.matching import match_models
+from statemachine.lab.runs.scenarios import SCENARIOS, fitting
+from statemachine.lab.why import WhyRequest, explain
+from statemachine.lab.why.causes import differences_of
 
 from .conftest import SHARED, assert_has, shared
 

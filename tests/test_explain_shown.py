@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from statemachine.compare import why as instrument
-from statemachine.compare.why import Explanation, explain
+from statemachine.lab import why as instrument
+from statemachine.lab.why import Explanation, explain
+from statemachine.lab.why import page as why
 from statemachine.measures.text import capital, percent
-from statemachine.page import Table
-from statemachine.report import why
-from statemachine.report.as_json import dumps
+from statemachine.show.as_json import dumps
+from statemachine.show.blocks import Table
 
 from . import test_explain as known
 from .conftest import assert_in, need_engine, written

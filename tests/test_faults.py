@@ -14,12 +14,12 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
-from statemachine import cli as command_line
+from statemachine.cli import main as command_line
+from statemachine.course.grading.faults import FAULTS, Fault, run
+from statemachine.course.grading.faults.patches import PATCHES
+from statemachine.course.grading.faults.run import Examination, FailedTest, FaultTrial, examine
+from statemachine.course.grading.page import faults_page
 from statemachine.errors import BadInputError, EngineError
-from statemachine.grading.faults import FAULTS, Fault, run
-from statemachine.grading.faults.patches import PATCHES
-from statemachine.grading.faults.run import Examination, FailedTest, FaultTrial, examine
-from statemachine.report.grading import faults_page
 
 from .conftest import (
     ROOT,
@@ -139,7 +139,7 @@ def test_the_short_step_keeps_the_clock_right(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plugin", [(), ("-p", "statemachine.grading.faults.plugin")])
+@pytest.mark.parametrize("plugin", [(), ("-p", "statemachine.course.grading.faults.plugin")])
 def test_pytest_alone_runs_the_exercise(plugin: tuple[str, ...]) -> None:
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", *plugin, EXERCISE)
     of_python(*words, folder=EXERCISE.parent, code=0)
@@ -271,7 +271,7 @@ def test_a(request):
     assert not any(word in ("--fault", "STATEMACHINE_FAULT", "xyzw", "degrees") for word in words)
 """,
     "modules": "import sys\nSEEN = set(sys.modules)\n"
-    "def test_a(): assert 'statemachine.grading.faults.patches' in SEEN\n",
+    "def test_a(): assert 'statemachine.course.grading.faults.patches' in SEEN\n",
 }
 
 

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import Uncertainty, chaos_floor, compare, perturbed_runs
-from statemachine.compare.convergence import Convergence, convergence, verdict_of
-from statemachine.compare.matching import match_models
-from statemachine.compare.perturbed import ROUNDING, RUNS, Band, parse_uncertainty
-from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError, EndedEarlyError, EngineWarning
-from statemachine.report import compare as report
-from statemachine.report.finding import headline, leading
-from statemachine.report.steps import convergence as page
-from statemachine.runs import Rerun, Trace, record
+from statemachine.lab.compare import Uncertainty, chaos_floor, compare, perturbed_runs
+from statemachine.lab.compare.convergence import Convergence, convergence, verdict_of
+from statemachine.lab.compare.matching import match_models
+from statemachine.lab.compare.perturbed import ROUNDING, RUNS, Band, parse_uncertainty
+from statemachine.lab.questions import compare_page as report
+from statemachine.lab.questions.finding import headline, leading
+from statemachine.lab.questions.steps import convergence as page
+from statemachine.lab.recordings import Rerun, Trace, record
+from statemachine.lab.why.gap import Ruler
 
 from .conftest import Cli, refused, shown, written
 from .small_models import BAR_OUTSIDE, DOUBLE_PENDULUM, FALLING_BAR, PENDULUM, TILTED_BOX, model_of

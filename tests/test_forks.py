@@ -17,10 +17,10 @@ from unittest.mock import Mock
 import pytest
 
 import statemachine as sm
-from statemachine.compare.why import Explanation
 from statemachine.errors import BadInputError
+from statemachine.lab.why import Explanation
 from statemachine.processes.parallel import forks_for, in_forks
-from statemachine.report.as_json import dumps
+from statemachine.show.as_json import dumps
 
 from .conftest import ROOT, lives, refused, soon, without_estimates, written, written_all
 from .explained import ALONE, ARM, SWING, changed, explained
@@ -174,7 +174,7 @@ def test_a_function_is_run_here_unless_asked(
     """Its threads would not come along."""
 
     monkeypatch.setattr(
-        "statemachine.compare.why.trials.in_forks", Mock(side_effect=AssertionError("forked"))
+        "statemachine.lab.why.trials.in_forks", Mock(side_effect=AssertionError("forked"))
     )
     monkeypatch.setattr("statemachine.processes.parallel._PAYS", 1e-9)
     found = explained(tmp_path, ARM, _apart(ARM), seconds=0.1, scenario=replace(SWING, own=True))

@@ -24,8 +24,8 @@ from statemachine.freshness.gaps import gaps, worth_telling
 from statemachine.freshness.rows import table
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.measures import Gap
-from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
+from statemachine.show.as_json import plain
 
 from .conftest import (
     ROOT,

@@ -16,7 +16,7 @@ import statemachine as sm
 from fuzz import command_lines, kills, models, threads, traces
 from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
-from statemachine.runs import formats
+from statemachine.lab.recordings import formats
 
 from .conftest import ROOT, assert_has, in_its_own_python, of_python
 
@@ -82,7 +82,7 @@ def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
 # Writes in place, and the second file after a moment.
 IN_PLACE = """
 import contextlib, time
-from statemachine.runs import files, whole
+from statemachine.lab.recordings import files, whole
 @contextlib.contextmanager
 def beside(*targets):
     yield [str(target) for target in targets]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.runs.robot import TARGET
+from statemachine.lab.runs.robot import TARGET
 
 from .conftest import opened, path
 from .rendering import overlaps_of_silhouettes

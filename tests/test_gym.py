@@ -19,7 +19,6 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import statemachine as sm
 from examples import held_box, reach
-from statemachine.drawing.scene import Camera
 from statemachine.engines.pictures import renderer_here
 from statemachine.errors import (
     BadInputError,
@@ -28,6 +27,7 @@ from statemachine.errors import (
     UnknownNameError,
 )
 from statemachine.gym import RobotVectorEnv, Start, WorldView, joint_state, make_env, make_vec
+from statemachine.show.drawing.scene import Camera
 
 from .conftest import ROOT, assert_has, refused, runs_in_silence, written
 from .small_models import loaded, mjcf

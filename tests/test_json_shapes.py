@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from statemachine.lessons import LESSONS
+from statemachine.course.lessons import LESSONS
 
 from .conftest import QUICK, ROOT, need_engine, of_python
 

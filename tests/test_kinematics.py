@@ -16,8 +16,8 @@ from hypothesis.extra.numpy import arrays
 
 import statemachine as sm
 from statemachine.errors import BadInputError, ModelError, ModelFileError, UnknownNameError
+from statemachine.lab.runs.provenance import model_digest
 from statemachine.rotations import matrix_from_quat
-from statemachine.runs.provenance import model_digest
 
 from .conftest import assert_has, opened, refused, written_all
 from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND

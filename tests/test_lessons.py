@@ -31,14 +31,20 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
-from statemachine.cli import main
-from statemachine.commands import lesson as lesson_command
+from statemachine.cli import lesson as lesson_command
+from statemachine.cli.main import main
+from statemachine.course import asking, quiz
+from statemachine.course.lessons import LESSONS, PATH, module, worlds
+from statemachine.course.lessons.request import LessonRequest
+from statemachine.course.lessons.session import CodeRun, LessonRun, load_line, page_of_lesson, take
+from statemachine.course.quiz import RecordedReader
 from statemachine.errors import BadInputError, StateMachineError
-from statemachine.lessons import LESSONS, PATH, module, template, worlds
-from statemachine.lessons.in_turns import Ratio
-from statemachine.lessons.request import LessonRequest
-from statemachine.lessons.session import CodeRun, LessonRun, load_line, page_of_lesson, take
-from statemachine.page import (
+from statemachine.lab.recordings import record_scenario
+from statemachine.lab.runs.in_turns import Ratio
+from statemachine.lab.runs.scenarios import SCENARIOS
+from statemachine.show import lesson_template as template
+from statemachine.show import terminal as bar
+from statemachine.show.blocks import (
     Code,
     Heading,
     Page,
@@ -49,11 +55,6 @@ from statemachine.page import (
     Traces,
     Verdict,
 )
-from statemachine.report import asking, quiz
-from statemachine.report import terminal as bar
-from statemachine.report.quiz import RecordedReader
-from statemachine.runs import record_scenario
-from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import (
     ROOT,

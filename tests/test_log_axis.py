@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine.page import Traces
-from statemachine.report.figures import draw_picture
+from statemachine.show.blocks import Traces
+from statemachine.show.charts import draw_picture
 
 from .conftest import assert_has
 

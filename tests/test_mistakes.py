@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from statemachine import load
-from statemachine.runs import record, write
+from statemachine.lab.recordings import record, write
 
 from .conftest import ROOT, Cli, one_line, written_all
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS

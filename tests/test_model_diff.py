@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from statemachine import load
-from statemachine.compare.models import ModelsComparison, compare, read
-from statemachine.compare.models.ledger import ReadingDifference, digits_of
 from statemachine.engines.description.tree import GroupTree
 from statemachine.errors import ModelError, UnknownNameError
 from statemachine.kinematics import Kinematics
+from statemachine.lab.model_differences import ModelsComparison, compare, read
+from statemachine.lab.model_differences.ledger import ReadingDifference, digits_of
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 

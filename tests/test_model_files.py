@@ -17,13 +17,14 @@ from typing import Any
 import pytest
 
 import statemachine as sm
+from statemachine.course.grading import answers_in
 from statemachine.errors import BadInputError, EngineWarning, ModelError, ModelFileError, TraceError
-from statemachine.grading import answers_in
 from statemachine.kinematics import Kinematics
+from statemachine.lab.recordings import read
+from statemachine.lab.robots.records import read_table
+from statemachine.lab.runs import controllers
+from statemachine.lab.sweep import read_manifest
 from statemachine.model_files import check_model_file, checked_file
-from statemachine.robots.records import read_table
-from statemachine.runs import controllers, read
-from statemachine.sweep import read_manifest
 
 from .conftest import ROOT, Cli, of_python, refused, written
 

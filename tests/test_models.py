@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 
 import statemachine as sm
 from statemachine import backends, errors, rotations
-from statemachine.compare import parse_sides
 from statemachine.engines.mujoco.description import read_file
 from statemachine.interface.checks import as_vector
+from statemachine.lab.compare import parse_sides
+from statemachine.lab.robots import find
 from statemachine.models import models_dir, resolve
-from statemachine.report.as_json import dumps
-from statemachine.robots import find
+from statemachine.show.as_json import dumps
 
 from .conftest import assert_has, opened, refused, registered, written, written_all
 from .small_models import MOTORS, PACKAGED_URDF, model_of

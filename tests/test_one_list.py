@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from statemachine.compare.models import compare
-from statemachine.compare.models.ledger import ReadingDifference
+from statemachine.lab.model_differences import compare
+from statemachine.lab.model_differences.ledger import ReadingDifference
 
 from .conftest import Cli, assert_has, written_all
 from .explained import ALONE, ARM, Case, changed

@@ -9,15 +9,15 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.compare import rerun_of
-from statemachine.compare.one_step import RELATIVE, OneStep, StageGap, one_step
-from statemachine.compare.stages import STAGES
-from statemachine.compare.why import WhyRequest, explain
 from statemachine.errors import BadInputError
-from statemachine.page import Verdict
-from statemachine.report.steps import one_step as page
-from statemachine.runs import Rerun
-from statemachine.runs.scenarios import scenario
+from statemachine.lab.compare import rerun_of
+from statemachine.lab.compare.one_step import RELATIVE, OneStep, StageGap, one_step
+from statemachine.lab.compare.stages import STAGES
+from statemachine.lab.questions.steps import one_step as page
+from statemachine.lab.recordings import Rerun
+from statemachine.lab.runs.scenarios import scenario
+from statemachine.lab.why import WhyRequest, explain
+from statemachine.show.blocks import Verdict
 
 from .conftest import assert_has, assert_in, refused
 from .small_models import LINKS_AND_BALL, TWO_LINKS, model_of

@@ -20,22 +20,21 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import compare
-from statemachine.drawing.scene import Camera, Shot, compose, framed, smaller
 from statemachine.engines import pictures as probe
 from statemachine.engines import pybullet as pybullet_room
 from statemachine.engines.mujoco import rendering as mujoco_rendering
 from statemachine.errors import BadInputError, MissingEngineError, TraceError
-from statemachine.report.film import (
+from statemachine.lab.compare import compare
+from statemachine.lab.questions.film import (
     FILM_SIZE,
     Timing,
     frames,
     motion_of,
     write_film,
 )
-from statemachine.report.film_overlay import STRIP, Overlay
-from statemachine.report.over_time import charts_of
-from statemachine.report.plot import (
+from statemachine.lab.questions.film_overlay import STRIP, Overlay
+from statemachine.lab.questions.over_time import charts_of
+from statemachine.lab.questions.plot import (
     FIGURE_SETTINGS,
     draw,
     drawn,
@@ -43,8 +42,9 @@ from statemachine.report.plot import (
     of_trace,
     write_plot,
 )
-from statemachine.runs import RunMetadata, Trace, record, shipped, write
-from statemachine.runs.header import INPUTS
+from statemachine.lab.recordings import RunMetadata, Trace, record, shipped, write
+from statemachine.lab.recordings.header import INPUTS
+from statemachine.show.drawing.scene import Camera, Shot, compose, framed, smaller
 
 from .conftest import (
     ROOT,

@@ -122,7 +122,7 @@ def test_a_fast_ball_has_the_signs_of_mujoco(tmp_path: Path) -> None:
 
 def test_two_free_bodies_are_two(tmp_path: Path) -> None:
     """Each is loaded from a text of its own, under a name that may be the other's again."""
-    from statemachine.backends._bullet_client import pb
+    from statemachine.backends.bullet.client import pb
 
     balls = "".join(
         f"<body name='b{k}' pos='{k} 0 {radius}'><freejoint/>"
@@ -307,7 +307,7 @@ _as_it_comes = partial(load, "so101/scene", defaults="engine")
 
 def test_engine_frictions_are_pybullets() -> None:
     """The rest of what it comes with shows bit for bit in the run of a script of its own."""
-    from statemachine.backends._bullet_client import pb
+    from statemachine.backends.bullet.client import pb
 
     with sm.make_data(_as_it_comes()) as data:
         for tree in data.raw.trees:
@@ -395,7 +395,7 @@ def test_what_is_dropped_gives_its_clients_back_at_once(monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("memory", ["free", "gone"])
 def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch, memory: str) -> None:
-    from statemachine.backends import _bullet_client
+    from statemachine.backends.bullet import client as _bullet_client
 
     model, answers = load("so101"), [-1, -1]
     where, name, said = {

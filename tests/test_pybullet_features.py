@@ -180,8 +180,8 @@ def test_a_call_that_sets_the_largest_speed_ignores_damping(
 
 def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int) -> None:
     """At the arm's fingertip, over random poses: why sites are links without mass."""
-    from statemachine.backends._bullet_plan import Plan
-    from statemachine.backends._bullet_world import World
+    from statemachine.backends.bullet.plan import Plan
+    from statemachine.backends.bullet.world import World
 
     raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
     data, world = mujoco.MjData(raw), World(Plan(raw), "ghost")

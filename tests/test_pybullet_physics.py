@@ -321,7 +321,7 @@ def test_a_reset_forgets_what_the_links_of_one_arm_touched() -> None:
 
 def test_a_joint_on_its_limit_is_no_slower(tmp_path: Path) -> None:
     """Counted, not timed: friction and limit of one joint are found in a few solutions."""
-    from statemachine.backends import _bullet_law
+    from statemachine.backends.bullet import joint_dynamics as _bullet_law
 
     model = sm.load("so101/scene", backend="pybullet")
     solved = []

@@ -14,8 +14,8 @@ import pytest
 import statemachine as sm
 import statemachine.worlds as many
 from statemachine.errors import TraceError, UnsupportedError
-from statemachine.runs import files, play, replayed
-from statemachine.runs.recorder import record
+from statemachine.lab.recordings import files, play, replayed
+from statemachine.lab.recordings.recorder import record
 from statemachine.worlds import make_worlds
 
 from .conftest import after, opened, refused, warnings_of, written
@@ -405,7 +405,7 @@ def test_an_activation_that_is_off_stays_as_it_was(tmp_path: Path) -> None:
 
 def test_gravity_is_turned_back_when_a_step_is_interrupted(tmp_path: Path) -> None:
     """The copy whose dynamics are asked is that of all Data of a Model."""
-    from statemachine.backends import _bullet_world as world
+    from statemachine.backends.bullet import world
 
     model: Any = loaded(tmp_path, TREE.format(base="<freejoint/>"), backend="pybullet")
     with (

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.models import compare as compare_models
-from statemachine.compare.why import Explanation, WhyRequest, explain
-from statemachine.runs.controllers import function_scenario
+from statemachine.lab.model_differences import compare as compare_models
+from statemachine.lab.runs.controllers import function_scenario
+from statemachine.lab.why import Explanation, WhyRequest, explain
 
 SECONDS = 0.4
 HEAD = '<mujoco><option timestep="0.002" gravity="0 0 0"/>'

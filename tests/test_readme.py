@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from statemachine.grading.faults import FAULTS
-from statemachine.grading.judges import JUDGES
+from statemachine.course.grading.faults import FAULTS
+from statemachine.course.grading.judges import JUDGES
+from statemachine.course.lessons import PATH
+from statemachine.course.lessons.questions import ASKED
 from statemachine.interface import Model
-from statemachine.lessons import PATH
-from statemachine.lessons.questions import ASKED
-from statemachine.probes.conventions import QUESTIONS
+from statemachine.lab.probes.conventions import QUESTIONS
 
 from .conftest import ROOT, Cli, assert_in, need_engine, of_python, opened, written_all
 

@@ -15,11 +15,11 @@ from .conftest import ROOT, assert_in, distribution, need_engine, of_python, wri
 RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in _KINDS": how the line of the file begins after which its lines go.
 PLACES = {
-    "statemachine/lessons/__init__.py, in _LESSONS": "_LESSONS = (",
+    "statemachine/course/lessons/__init__.py, in _LESSONS": "_LESSONS = (",
     "statemachine/measures/quantities.py, in _KINDS": '    Quantity("force"',
     "statemachine/measures/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
-    "statemachine/compare/series.py, in series": "            curves += _joint(",
-    "statemachine/probes/conventions/__init__.py, in QUESTIONS": '    "timestep": ',
+    "statemachine/lab/compare/series.py, in series": "            curves += _joint(",
+    "statemachine/lab/probes/conventions/__init__.py, in QUESTIONS": '    "timestep": ',
 }
 
 

@@ -21,17 +21,26 @@ import pytest
 from PIL import Image
 
 import statemachine as sm
-from statemachine.compare import Comparison, compare, touches
-from statemachine.compare.series import total_forces
-from statemachine.compare.why import Explanation, Share
-from statemachine.compare.why.gap import FirstTouch
-from statemachine.compare.why.locate import Localisation
-from statemachine.compare.why.written import FigureValues
-from statemachine.drawing import drawing_of
+from statemachine.course.notebook import markdown
 from statemachine.errors import BadInputError, MissingEngineError
+from statemachine.lab.compare import Comparison, compare, touches
+from statemachine.lab.compare.series import total_forces
+from statemachine.lab.questions.compare_page import PageParts
+from statemachine.lab.questions.compare_page import page as compared
+from statemachine.lab.questions.finding import events_of, headline, leading, subject
+from statemachine.lab.questions.over_time import CHARTS_SHOWN, charts_of
+from statemachine.lab.questions.sides_page import commanded
+from statemachine.lab.recordings import Trace, record_scenario, shipped
+from statemachine.lab.runs.scenarios import SCENARIOS
+from statemachine.lab.why import Explanation, Share
+from statemachine.lab.why.answer_page import answer, parts
+from statemachine.lab.why.gap import FirstTouch
+from statemachine.lab.why.locate import Localisation
+from statemachine.lab.why.page import causes, steps
+from statemachine.lab.why.written import FigureValues
 from statemachine.measures import Deviation
 from statemachine.measures.text import quantity
-from statemachine.page import (
+from statemachine.show.blocks import (
     Headline,
     Items,
     Page,
@@ -41,19 +50,10 @@ from statemachine.page import (
     Text,
     Verdict,
 )
-from statemachine.report.compare import PageParts
-from statemachine.report.compare import page as compared
-from statemachine.report.finding import events_of, headline, leading, subject
-from statemachine.report.html import Look, check_target, report, write_report
-from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
-from statemachine.report.html.scene import moments_of, rows_at
-from statemachine.report.notebook import markdown
-from statemachine.report.over_time import CHARTS_SHOWN, charts_of
-from statemachine.report.sides import commanded
-from statemachine.report.why import causes, steps
-from statemachine.report.why_answer import answer, parts
-from statemachine.runs import Trace, record_scenario, shipped
-from statemachine.runs.scenarios import SCENARIOS
+from statemachine.show.drawing import drawing_of
+from statemachine.show.html import Look, check_target, report, write_report
+from statemachine.show.html.geometry import bones_of, mesh_as_data, mesh_of
+from statemachine.show.html.scene import moments_of, rows_at
 
 from .browser import Tab, browser
 from .conftest import ROOT, assert_has, assert_in, refused, soon
@@ -956,7 +956,7 @@ def test_a_page_without_matplotlib_says_where_its_charts_are(
     hold: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "statemachine.report.html.blocks.chart",
+        "statemachine.show.html.blocks.chart",
         Mock(side_effect=MissingEngineError("a figure needs matplotlib")),
     )
     text = page_of(hold)

@@ -11,25 +11,25 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine import cli
-from statemachine.compare import Request, Side
-from statemachine.compare.questions.causes import ExplainRequest
-from statemachine.compare.questions.converge import ConvergeRequest
-from statemachine.compare.questions.gap import CompareRequest
-from statemachine.compare.questions.models import ModelsRequest
-from statemachine.compare.questions.one_step import OneStepRequest
-from statemachine.compare.questions.versions import VersionsRequest
+from statemachine.cli import main as cli
+from statemachine.course.grading.request import CheckRequest, FaultsRequest
+from statemachine.course.lessons.request import LessonRequest
 from statemachine.errors import StateMachineError
-from statemachine.grading.request import CheckRequest, FaultsRequest
-from statemachine.lessons.fingertip_request import FingertipRequest
-from statemachine.lessons.request import LessonRequest
-from statemachine.probes.conventions.request import CallsRequest, ConventionsRequest
-from statemachine.report.releases import ReleasesRequest
-from statemachine.robots.request import RobotsRequest
-from statemachine.runs.reporter import QUIET
-from statemachine.runs.request import RecordRequest, answer_record
-from statemachine.sweep import Sweep
-from statemachine.sweep.questions import SweepReportRequest, SweepRequest
+from statemachine.lab.compare import Request, Side
+from statemachine.lab.installation.engines import ReleasesRequest
+from statemachine.lab.probes.conventions.request import CallsRequest, ConventionsRequest
+from statemachine.lab.questions.requests.causes import ExplainRequest
+from statemachine.lab.questions.requests.converge import ConvergeRequest
+from statemachine.lab.questions.requests.gap import CompareRequest
+from statemachine.lab.questions.requests.models import ModelsRequest
+from statemachine.lab.questions.requests.one_step import OneStepRequest
+from statemachine.lab.questions.requests.versions import VersionsRequest
+from statemachine.lab.recordings.request import RecordRequest, answer_record
+from statemachine.lab.robots.request import RobotsRequest
+from statemachine.lab.runs.reporter import QUIET
+from statemachine.lab.sweep import Sweep
+from statemachine.lab.sweep.questions import SweepReportRequest, SweepRequest
+from statemachine.lab.validate.fingertip_request import FingertipRequest
 from statemachine.view.request import RecordingRequest, ServerSettings, SimulationRequest
 
 from .conftest import of_python
@@ -73,7 +73,7 @@ def test_what_is_typed_is_a_request(
     monkeypatch.delenv("MENAGERIE", raising=False)
     words = typed.split()
     options = cli._options(words)
-    command = importlib.import_module(f"statemachine.commands.{words[0]}")
+    command = importlib.import_module(f"statemachine.cli.{words[0]}")
     requests = importlib.import_module(command.run.__module__)
     assert requests.request_of(options) == request_made
 

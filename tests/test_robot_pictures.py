@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine import cli
+from statemachine.cli import main as cli
+from statemachine.course import notebook as md
+from statemachine.course import site
+from statemachine.course.lessons import LESSONS, PATH
+from statemachine.course.lessons.pictures import PICTURES, with_picture
+from statemachine.course.quiz import Reader
 from statemachine.errors import MissingEngineError
-from statemachine.lessons import LESSONS, PATH
-from statemachine.lessons.pictures import PICTURES, with_picture
-from statemachine.page import Page, Printed, Question, RobotPicture, Text
-from statemachine.report import film, site, terminal
-from statemachine.report import notebook as md
-from statemachine.report.quiz import Reader
+from statemachine.lab.questions import film
+from statemachine.show import terminal
+from statemachine.show.blocks import Page, Printed, Question, RobotPicture, Text
 
 from .conftest import assert_has, assert_in
 from .rendering import rendering_environment

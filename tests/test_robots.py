@@ -18,11 +18,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from statemachine import robots
 from statemachine.backends import load
 from statemachine.errors import BadInputError
-from statemachine.report.robots import page
-from statemachine.robots import (
+from statemachine.lab import robots
+from statemachine.lab.recordings import record_scenario
+from statemachine.lab.robots import (
     BackendRow,
     EngineTally,
     ExaminedModel,
@@ -34,10 +34,10 @@ from statemachine.robots import (
     find,
     gaps,
 )
-from statemachine.robots.records import read_table, write_table
-from statemachine.runs import record_scenario
-from statemachine.runs.provenance import model_files
-from statemachine.runs.scenarios import scenario
+from statemachine.lab.robots.page import page
+from statemachine.lab.robots.records import read_table, write_table
+from statemachine.lab.runs.provenance import model_files
+from statemachine.lab.runs.scenarios import scenario
 
 from .conftest import (
     ROOT,
@@ -78,7 +78,7 @@ URDF = """<robot name='r'><link name='base'/><link name='tip'><inertial><mass va
 # Read before anything else by the Python that examines; by the name of its model it goes wrong.
 SABOTAGE = """
 import os, sys, time
-if "statemachine.robots.examine" in " ".join(sys.orig_argv):
+if "statemachine.lab.robots.examine" in " ".join(sys.orig_argv):
     file = os.path.basename(sys.orig_argv[-4])
     if "crash" in file:
         os.abort()
@@ -276,7 +276,7 @@ def test_an_error_in_one_part_costs_that_part(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from statemachine.engines import room
-    from statemachine.robots import examine, gaps
+    from statemachine.lab.robots import examine, gaps
 
     monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
     tell = Mock()

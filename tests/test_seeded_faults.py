@@ -2,7 +2,7 @@
 
 The faults are put into the backend of an engine, one at a time, as a third-party backend that is
 registered under the name "faulty"; those of PyBullet's stand in `pybullet_faults`. Those that
-students' tests have to catch too come from `statemachine.grading.faults`.
+students' tests have to catch too come from `statemachine.course.grading.faults`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.backends import _delays, _edits
-from statemachine.backends._mujoco_alarms import Alarms
+from statemachine.backends.mujoco import delays as _delays
+from statemachine.backends.mujoco import edits as _edits
+from statemachine.backends.mujoco.alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
-from statemachine.grading.faults import patches
+from statemachine.course.grading.faults import patches
 from statemachine.interface import Model, State, read_only
 
 from .conftest import Patch, around, followed_by, need_engine, refused, registered

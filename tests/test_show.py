@@ -12,11 +12,11 @@ from typing import Literal
 import jinja2
 import pytest
 
-from statemachine.page import Items, Markdown, Page, Section, Table, Text, Verdict
-from statemachine.report import terminal
-from statemachine.report.html.blocks import Html, drawn
-from statemachine.report.notebook import markdown
+from statemachine.course.notebook import markdown
+from statemachine.show import terminal
+from statemachine.show.blocks import Items, Markdown, Page, Section, Table, Text, Verdict
 from statemachine.show.check_templates import faults_of
+from statemachine.show.html.blocks import Html, drawn
 from statemachine.show.markdown import code, escape, inline_html, plain_text, spans
 from statemachine.show.templates import FILTERS, PageContent, environment, render
 from tools import check_templates

@@ -17,15 +17,20 @@ from pathlib import Path
 import pytest
 
 import statemachine as sm
+from statemachine.course.grading import exercise, recording
+from statemachine.course.grading.classroom import judge_all, submissions
+from statemachine.course.grading.faults.run import examine
+from statemachine.course.grading.inside.guard import PUBLIC, ROOMS
+from statemachine.course.grading.judges import JUDGES, Judgement
+from statemachine.course.grading.links import leads_out
+from statemachine.course.grading.page import (
+    ONLY_WATCHED,
+    class_page,
+    grade_page,
+    gradescope_results,
+)
 from statemachine.errors import BadInputError
-from statemachine.grading import exercise, recording
-from statemachine.grading.classroom import judge_all, submissions
-from statemachine.grading.faults.run import examine
-from statemachine.grading.inside.guard import PUBLIC, ROOMS
-from statemachine.grading.judges import JUDGES, Judgement
-from statemachine.grading.links import leads_out
 from statemachine.processes import sandbox
-from statemachine.report.grading import ONLY_WATCHED, class_page, grade_page, gradescope_results
 
 from .conftest import ROOT, refused, shown, written, written_all
 from .exercises import SOLUTION, TEMPLATE
@@ -37,12 +42,12 @@ JUDGE = ROOT / "statemachine" / "grading" / "judges" / "gravity.py"
 Attacks = dict[str, tuple[str, str]]
 SEEN_BY_THE_WATCH: Attacks = {
     "import a judge": (
-        "from statemachine.grading.judges import gravity\nreturn 'GOT', gravity.TOLERANCE",
+        "from statemachine.course.grading.judges import gravity\nreturn 'GOT', gravity.TOLERANCE",
         r"it imports statemachine\.grading",
     ),
     "import a judge by its name": (
         "import importlib\n"
-        "return 'GOT', importlib.import_module('statemachine.grading.judges.state').right",
+        "return 'GOT', importlib.import_module('statemachine.course.grading.judges.state').right",
         r"it opens __init__\.\S+ of the judges",
     ),
     "unpickle a judge": (
@@ -52,7 +57,7 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "load the file of a judge": (
         "from importlib.machinery import SourceFileLoader\n"
-        "return 'GOT', SourceFileLoader('statemachine.grading.judges', {judge!r}).load_module()",
+        "return 'GOT', SourceFileLoader('statemachine.course.grading.judges', {judge!r}).load_module()",
         "of the judges|it imports statemachine",
     ),
     "what a judge was compiled to": (
@@ -67,7 +72,7 @@ SEEN_BY_THE_WATCH: Attacks = {
         "it opens gravity.py of the judges",
     ),
     "a lesson": (
-        "from statemachine.lessons import gravity\nreturn 'GOT', gravity",
+        "from statemachine.course.lessons import gravity\nreturn 'GOT', gravity",
         r"it imports statemachine\.lessons",
     ),
     "a file of the teacher's": ("return 'GOT', open({secret!r}).read()", "it reads {secret}"),
@@ -174,9 +179,9 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "by a function of this package": (
         "import statemachine.models as own\n"
-        "exec(compile('def get():\\n import statemachine.grading.judges as j; return j',"
+        "exec(compile('def get():\\n import statemachine.course.grading.judges as j; return j',"
         " own.__file__, 'exec'), vars(own))\nreturn 'GOT', own.get()",
-        "of the judges|No module named 'statemachine.grading.judges'",
+        "of the judges|No module named 'statemachine.course.grading.judges'",
     ),
     "as a database": (
         "import sqlite3\nfile = sqlite3.connect({secret!r})\n"
@@ -234,7 +239,7 @@ SHUT_IN_ONLY: Attacks = {
     ),
     "objects that know what is right": (
         "import gc, sys\n"
-        "known = [n for n in sys.modules if 'judge' in n or n.startswith('statemachine.grading')]\n"
+        "known = [n for n in sys.modules if 'judge' in n or n.startswith('statemachine.course.grading')]\n"
         "known += [o for o in gc.get_objects() if isinstance(o, dict) and 'TOLERANCE' in o"
         " and '_mistakes' in o]\n"
         "frame = sys._getframe()\n"
@@ -376,7 +381,7 @@ def test_tests_on_arms_with_faults_read_nothing_either(
         "        except OSError: continue\n"
         "        raise AssertionError(name)\n"
         "def test_judges():\n"
-        "    try: import statemachine.grading.judges.gravity\n"
+        "    try: import statemachine.course.grading.judges.gravity\n"
         "    except (OSError, ImportError): return\n"
         "    raise AssertionError('it is there')\n"
         "def test_help(): assert helper.ONE == 1\n"

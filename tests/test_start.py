@@ -13,7 +13,7 @@ from unittest.mock import Mock
 import pytest
 
 import statemachine as sm
-from statemachine import cli as command_line
+from statemachine.cli import main as command_line
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.installed import ENGINES, require
 
@@ -93,7 +93,12 @@ THEIRS = {
         ),
         # Theirs is found first, alone or with our files around it.
         (THEIRS, ("statemachine_sim.py",), ("-m", "statemachine_sim"), 2),
-        (THEIRS, ("statemachine_sim.py", "statemachine/cli.py"), ("-m", "statemachine_sim"), 2),
+        (
+            THEIRS,
+            ("statemachine_sim.py", "statemachine/cli/main.py"),
+            ("-m", "statemachine_sim"),
+            2,
+        ),
         # No clash: only ours is there.
         ((), (), ("-m", "statemachine_sim", "--version"), 0),
     ],
@@ -174,7 +179,9 @@ sys.exit(statemachine_sim.main())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
-@pytest.mark.parametrize("module", ["numpy", "statemachine.commands", "statemachine.report.doctor"])
+@pytest.mark.parametrize(
+    "module", ["numpy", "statemachine.cli", "statemachine.lab.installation.doctor"]
+)
 def test_ctrl_c_while_it_imports_ends_it_without_a_traceback(module: str) -> None:
     done = in_its_own_python(INTERRUPT.format(module=module), ROOT)
     assert done.returncode in (130, -2)  # a shell shows both as 130
@@ -196,7 +203,7 @@ def test_what_no_command_expects_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
     here: Cli,
 ) -> None:
-    monkeypatch.setattr("statemachine.commands.doctor.run", Mock(side_effect=error))
+    monkeypatch.setattr("statemachine.cli.doctor.run", Mock(side_effect=error))
     one_line(here("doctor"), says, code)
 
 
@@ -205,7 +212,7 @@ def test_an_exception_that_nobody_meant_has_an_exit_code_of_its_own(
 ) -> None:
     """Never 1, which is an answer; with the traceback, and a line that says whose fault it is."""
     fault = Mock(side_effect=IndexError("index 1 is out of bounds"))
-    monkeypatch.setattr("statemachine.commands.doctor.run", fault)
+    monkeypatch.setattr("statemachine.cli.doctor.run", fault)
     lines = here("doctor", code=70).stderr.splitlines()
     assert lines[0] == "Traceback (most recent call last):"
     assert lines[-2] == "IndexError: index 1 is out of bounds"
@@ -229,7 +236,7 @@ def test_an_import_that_an_interrupt_broke_is_an_interrupt(monkeypatch: pytest.M
         except KeyboardInterrupt as interrupt:
             raise SystemError("initialization failed") from interrupt
 
-    monkeypatch.setattr("statemachine.commands.doctor.run", fails)
+    monkeypatch.setattr("statemachine.cli.doctor.run", fails)
     assert command_line.main(["doctor"]) == 130
 
 

@@ -14,12 +14,20 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import Agreement, Comparison, compare, witness
+from statemachine.atomic_files import check_place, replace_file
 from statemachine.errors import ModelFileError, TraceError
 from statemachine.interface import JointType
-from statemachine.report import compare as report
-from statemachine.runs import RunMetadata, RunStart, Trace, model_file, read, record, write
-from statemachine.runs.whole import check_place, replace_file
+from statemachine.lab.compare import Agreement, Comparison, compare, witness
+from statemachine.lab.questions import compare_page as report
+from statemachine.lab.recordings import (
+    RunMetadata,
+    RunStart,
+    Trace,
+    model_file,
+    read,
+    record,
+    write,
+)
 
 from .conftest import Cli, assert_has, refused, shown, written_all
 from .small_models import TWO_NAMELESS, model_of
@@ -224,8 +232,8 @@ def test_the_command_of_a_played_trace_says_what_was_asked(
 
 def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Model) -> None:
     """A table of 60 000 × 60 000 numbers would be 29 GB."""
-    from statemachine.compare.matching import match_models
-    from statemachine.compare.why.gap import Ruler
+    from statemachine.lab.compare.matching import match_models
+    from statemachine.lab.why.gap import Ruler
 
     short = record(mujoco_arm, seconds=0.1, derive=False)
     time = np.arange(60_000) * 0.005

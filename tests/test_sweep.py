@@ -28,9 +28,9 @@ from statemachine.errors import (
     MissingEngineError,
     StateMachineError,
 )
-from statemachine.runs import record_scenario
-from statemachine.runs.scenarios import scenario
-from statemachine.sweep import (
+from statemachine.lab.recordings import record_scenario
+from statemachine.lab.runs.scenarios import scenario
+from statemachine.lab.sweep import (
     COLUMNS,
     Design,
     Sweep,
@@ -41,10 +41,10 @@ from statemachine.sweep import (
     read_manifest,
     run_sweep,
 )
-from statemachine.sweep.design import parse_vary, with_kinds
-from statemachine.sweep.folder import locked, settle_manifest
-from statemachine.sweep.rows import KEY, RowWriter, counted, remove_failed
-from statemachine.sweep.worker import differing, run_batch
+from statemachine.lab.sweep.design import parse_vary, with_kinds
+from statemachine.lab.sweep.folder import locked, settle_manifest
+from statemachine.lab.sweep.rows import KEY, RowWriter, counted, remove_failed
+from statemachine.lab.sweep.worker import differing, run_batch
 
 from .conftest import (
     ROOT,
@@ -376,7 +376,7 @@ def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
 def test_two_drivers_are_refused(tmp_path: Path) -> None:
     with locked(tmp_path):
         code = (
-            "from pathlib import Path; from statemachine.sweep.folder import locked\n"
+            "from pathlib import Path; from statemachine.lab.sweep.folder import locked\n"
             f"with locked(Path({str(tmp_path)!r})): pass"
         )
         assert "another sweep runs in" in in_its_own_python(code, tmp_path).stderr
@@ -417,7 +417,7 @@ def test_rows_are_written_whole_and_read_in_order(two_rows: Any, tmp_path: Path)
 @pytest.fixture
 def dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A sweep of one file."""
-    monkeypatch.setattr("statemachine.sweep.rows._SOON", 60.0)
+    monkeypatch.setattr("statemachine.lab.sweep.rows._SOON", 60.0)
     run_sweep(small("hold", "damping=0.5x,1x", "timestep=0.005"), tmp_path / "s", jobs=1)
     return tmp_path / "s"
 
@@ -450,8 +450,8 @@ def test_a_flipped_bit_is_never_another_value(dataset: Path) -> None:
 def test_a_dataset_is_read_without_another_thread(dataset: Path) -> None:
     """One of Arrow's that still has the file when Python ends would abort the process."""
     code = (
-        "import os; from statemachine.sweep import read_cells\n"
-        "from statemachine.sweep.rows import require_parquet\n"
+        "import os; from statemachine.lab.sweep import read_cells\n"
+        "from statemachine.lab.sweep.rows import require_parquet\n"
         "require_parquet()\n"
         "before = len(os.listdir('/proc/self/task'))\n"
         "read_cells('s'); print(len(os.listdir('/proc/self/task')) - before)"
@@ -567,7 +567,7 @@ def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> Non
 def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> None:
     code = (
         "import resource, sys; from statemachine.cli import main\n"
-        "from statemachine.sweep import rows\n"
+        "from statemachine.lab.sweep import rows\n"
         "flush = rows.RowWriter.flush\n"
         "def full(self):\n"
         "    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048)); flush(self)\n"
@@ -614,7 +614,7 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
 
 NO_ALARM = """
 import signal, time
-from statemachine.sweep import worker
+from statemachine.lab.sweep import worker
 del signal.setitimer
 worker._GRACE = 0.1
 with worker._limited(0.2, True):
@@ -797,7 +797,7 @@ def test_a_worker_with_another_version_or_file_is_told_of(policy: str) -> None:
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("statemachine.sweep._PATIENCE", 0.5)
+    monkeypatch.setattr("statemachine.lab.sweep._PATIENCE", 0.5)
     refused(
         (
             BadInputError,

@@ -13,17 +13,17 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from statemachine.cli import main
+from statemachine.cli.main import main
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.report.sweep_report import page
-from statemachine.sweep import Design, Sweep, Vary, run_sweep
-from statemachine.sweep.analysis import SweepEffects, effects
-from statemachine.sweep.folder import write_manifest
-from statemachine.sweep.main_effects import MainEffects, main_effects
-from statemachine.sweep.manifest import SweepManifest
-from statemachine.sweep.quantities import cell_values, parse_quantity
-from statemachine.sweep.request import MANIFEST_VERSION
-from statemachine.sweep.rows import DONE, FAILED, RowWriter, schema_of
+from statemachine.lab.sweep import Design, Sweep, Vary, run_sweep
+from statemachine.lab.sweep.analysis import SweepEffects, effects
+from statemachine.lab.sweep.folder import write_manifest
+from statemachine.lab.sweep.main_effects import MainEffects, main_effects
+from statemachine.lab.sweep.manifest import SweepManifest
+from statemachine.lab.sweep.page import page
+from statemachine.lab.sweep.quantities import cell_values, parse_quantity
+from statemachine.lab.sweep.request import MANIFEST_VERSION
+from statemachine.lab.sweep.rows import DONE, FAILED, RowWriter, schema_of
 
 from .conftest import assert_has, assert_in, refused, shown
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from statemachine.grading.faults import FAULTS
-from statemachine.lessons import LESSONS
-from statemachine.probes.conventions import CONCEPTS
-from statemachine.report.conventions import OURS, REMEMBER
+from statemachine.course.grading.faults import FAULTS
+from statemachine.course.lessons import LESSONS
+from statemachine.lab.probes.conventions import CONCEPTS
+from statemachine.lab.probes.conventions.page import OURS, REMEMBER
 
 from .conftest import ROOT, assert_not_in, refused, written_all
 from .exercises import WRONG

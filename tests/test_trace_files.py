@@ -19,8 +19,17 @@ import pytest
 from numpy.lib import format as npy
 
 import statemachine as sm
+from statemachine import atomic_files as whole
 from statemachine.errors import TraceError
-from statemachine.runs import RunMetadata, RunStart, Trace, export_csv, read, record, whole, write
+from statemachine.lab.recordings import (
+    RunMetadata,
+    RunStart,
+    Trace,
+    export_csv,
+    read,
+    record,
+    write,
+)
 
 from .conftest import Cli, around, refused, written
 from .test_traces import same
@@ -254,7 +263,7 @@ def test_a_csv_and_its_contacts_are_replaced_together(
 
     before = table.read_bytes()
     monkeypatch.setattr(
-        "statemachine.runs.files._write_contacts",
+        "statemachine.lab.recordings.files._write_contacts",
         Mock(side_effect=OSError(28, "No space left on device")),
     )
     refused((OSError, "No space", lambda: export_csv(box, table)))

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.course.lessons.hold import OLDER
 from statemachine.errors import (
     BadInputError,
     EngineError,
@@ -23,9 +24,7 @@ from statemachine.errors import (
     UnknownNameError,
 )
 from statemachine.interface import MOCAP
-from statemachine.lessons.hold import OLDER
-from statemachine.release_names import is_release
-from statemachine.runs import (
+from statemachine.lab.recordings import (
     COLUMNS,
     CONTACTS,
     RunStart,
@@ -39,7 +38,8 @@ from statemachine.runs import (
     shipped_names,
     write,
 )
-from statemachine.runs.scenarios import SCENARIOS
+from statemachine.lab.runs.scenarios import SCENARIOS
+from statemachine.release_names import is_release
 
 from .conftest import ROOT, Cli, assert_has, lesson_result, opened, refused, runs_in_silence
 from .small_models import ROTOR_PENDULUM, mjcf, model_of
@@ -216,7 +216,7 @@ def test_a_controller_that_kicks_is_repeated_exactly(scene: sm.Model) -> None:
 
 
 def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.runs import drive
+    from statemachine.lab.runs import drive
 
     honest, calls = drive.step, []
 
@@ -316,8 +316,8 @@ def test_opening_one_needs_no_engine(tmp_path: Path, box: Trace) -> None:
     code = (
         "import sys\n"
         "for name in ('mujoco', 'pybullet', 'pinocchio'): sys.modules[name] = None\n"
-        "from statemachine.runs import read\n"
-        "from statemachine.compare import compare\n"
+        "from statemachine.lab.recordings import read\n"
+        "from statemachine.lab.compare import compare\n"
         f"trace = read({str(path)!r})\n"
         "print(len(trace), compare(trace, trace).agrees)"
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from statemachine.cli import main
-from statemachine.compare.sides import parse_sides
+from statemachine.cli.main import main
 from statemachine.errors import BadInputError
+from statemachine.lab.compare.sides import parse_sides
+from statemachine.lab.sweep.design import parse_vary, with_kinds
 from statemachine.measures import parse_tolerances
-from statemachine.sweep.design import parse_vary, with_kinds
 from statemachine.typed_numbers import is_count, typed_float, typed_int
 
 from .conftest import refused

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import statemachine as sm
-from statemachine.compare.matching import match_models
-from statemachine.compare.why.causes import causes, differences_of
 from statemachine.engines.records import ModelDifference
+from statemachine.lab.compare.matching import match_models
+from statemachine.lab.why.causes import causes, differences_of
 
 MODEL = """
 <mujoco><compiler angle="radian"/><worldbody>

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.models import read
-from statemachine.compare.sides import Request, Side
-from statemachine.compare.two_sides import run_sides
-from statemachine.compare.why import WhyRequest, explain
 from statemachine.errors import EngineWarning, ModelError, UnsupportedError
 from statemachine.installed import silence
+from statemachine.lab.compare.sides import Request, Side
+from statemachine.lab.compare.two_sides import run_sides
+from statemachine.lab.model_differences import read
+from statemachine.lab.runs.scenarios import SCENARIOS
+from statemachine.lab.why import WhyRequest, explain
 from statemachine.models import models_dir
-from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import opened, refused, warnings_of, written
 

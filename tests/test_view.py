@@ -23,8 +23,8 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
+from statemachine.lab.recordings import RunMetadata, RunStart, record, write
 from statemachine.measures import Gap
-from statemachine.runs import RunMetadata, RunStart, record, write
 from statemachine.view import server as serving
 from statemachine.view.live import Command, Live, Tempo
 from statemachine.view.server import Door

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.drawing import drawing_of
-from statemachine.runs import record
+from statemachine.lab.recordings import record
+from statemachine.show.drawing import drawing_of
 from statemachine.view.live import Live, Tempo
 from statemachine.view.server import Door
 from statemachine.view.session import LiveSession, TraceSession

@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare.why import Explanation, WhyRequest, explain
-from statemachine.compare.why.settings import NEEDS, TITLES
-from statemachine.compare.why.shapley import shapley
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, UnknownNameError
 from statemachine.interface import Model
-from statemachine.report import why as report
-from statemachine.report.as_json import dumps
-from statemachine.runs import record_scenario, rerun
-from statemachine.runs.scenarios import Scenario, scenario
+from statemachine.lab.recordings import record_scenario, rerun
+from statemachine.lab.runs.scenarios import Scenario, scenario
+from statemachine.lab.why import Explanation, WhyRequest, explain
+from statemachine.lab.why import page as report
+from statemachine.lab.why.settings import NEEDS, TITLES
+from statemachine.lab.why.shapley import shapley
+from statemachine.show.as_json import dumps
 
 from .conftest import (
     ROOT,
@@ -305,7 +305,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
-    from statemachine.runs.robot import TARGET
+    from statemachine.lab.runs.robot import TARGET
 
     fresh, found = dialled()
     ours = path_of(found.build({}, {}), HOLD)

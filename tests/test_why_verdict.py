@@ -10,8 +10,8 @@ from itertools import product
 
 import pytest
 
-from statemachine.compare.perturbed import against_floor
-from statemachine.compare.why.verdict import (
+from statemachine.lab.compare.perturbed import against_floor
+from statemachine.lab.why.verdict import (
     Answer,
     CausePart,
     Facts,

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from statemachine.page import Page, Table, Text, Verdict
-from statemachine.report import terminal
+from statemachine.show import terminal
+from statemachine.show.blocks import Page, Table, Text, Verdict
 
 from .conftest import ROOT, assert_in, need_engine, of_python
 

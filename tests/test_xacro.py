@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main
-from statemachine.compare.models import read
+from statemachine.cli.main import main
 from statemachine.errors import ModelError
 from statemachine.kinematics import Kinematics
+from statemachine.lab.model_differences import read
+from statemachine.lab.robots import examine_all, find
 from statemachine.models import refuse_xacro, resolve
-from statemachine.robots import examine_all, find
 
 from .conftest import refused, written
 

@@ -14,9 +14,9 @@ from typing import Any
 import statemachine as sm
 from statemachine import releases
 from statemachine.backends import BackendChoice
-from statemachine.lessons.hold import OLDER
-from statemachine.runs import Trace, record_scenario, write
-from statemachine.runs.scenarios import SCENARIOS
+from statemachine.course.lessons.hold import OLDER
+from statemachine.lab.recordings import Trace, record_scenario, write
+from statemachine.lab.runs.scenarios import SCENARIOS
 
 FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "runs" / "recorded"
 

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import statemachine as sm
-from statemachine.backends import _bullet_urdf
+from statemachine.backends.bullet import urdf as _bullet_urdf
 
 HERE = Path(__file__).resolve().parent
 

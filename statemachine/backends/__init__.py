@@ -46,17 +46,17 @@ __all__ = [
 
 
 if TYPE_CHECKING:
-    from ._hidden_data import HiddenData as HiddenData
-    from ._hidden_data import HiddenModel as HiddenModel
-    from ._hidden_world import HiddenWorld as HiddenWorld
-    from ._hidden_world import Moment as Moment
+    from .hidden_data import HiddenData as HiddenData
+    from .hidden_data import HiddenModel as HiddenModel
+    from .hidden_world import HiddenWorld as HiddenWorld
+    from .hidden_world import Moment as Moment
 
 # Where the parts are of a backend for an engine with a world of its own; MuJoCo needs none.
 _HIDDEN = {
-    "HiddenData": "_hidden_data",
-    "HiddenModel": "_hidden_data",
-    "HiddenWorld": "_hidden_world",
-    "Moment": "_hidden_world",
+    "HiddenData": "hidden_data",
+    "HiddenModel": "hidden_data",
+    "HiddenWorld": "hidden_world",
+    "Moment": "hidden_world",
 }
 
 
@@ -281,7 +281,7 @@ def on_default(model: Model) -> Model:
 
 def _find(name: str) -> str:
     if isinstance(name, str) and is_release(name):
-        return f"{__name__}.release_backend:load"
+        return f"{__name__}.served.release_backend:load"
     known = isinstance(name, str) and name in _BACKENDS
     if not known:
         _discover()

@@ -33,8 +33,6 @@ from ..interface import (
 from ..interface.checks import HUGE, TINY, check_vector, engine_steps, unsupported
 from ..interface.records import Defaults, StateLayout
 from ..models import AnyPath
-from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
-from ._release_child import constraint_part, contact_arrays
 from .compiled import (
     ENGINE_ERRORS,
     check_numbers,
@@ -42,6 +40,8 @@ from .compiled import (
     compiler_warnings,
     facts,
 )
+from .mujoco.alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
+from .served.release_child import constraint_part, contact_arrays
 
 # Not RK4: after its step the derived values are neither of the state before nor after.
 INTEGRATORS = {
@@ -163,7 +163,7 @@ class MujocoModel(Model):
         Raises:
             OSError: It cannot be written.
         """
-        from ._delays import saved
+        from .mujoco.delays import saved
 
         Path(path).write_bytes(saved(self.raw).tobytes())
 
@@ -182,8 +182,8 @@ class MujocoModel(Model):
     def _make_worlds(
         self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
     ) -> Any:
-        from ._edits import CONSTANTS_FOLLOW
-        from ._mujoco_worlds import MujocoWorlds
+        from .mujoco.edits import CONSTANTS_FOLLOW
+        from .mujoco.worlds import MujocoWorlds
 
         base, arrays = self._varied(options) if options else (self, {})
         follow = bool(CONSTANTS_FOLLOW & options.keys())
@@ -199,7 +199,7 @@ class MujocoModel(Model):
         Returns:
             A Model, and (n, ...) arrays by name; see `changes`.
         """
-        from ._edits import step_length, varied
+        from .mujoco.edits import step_length, varied
 
         self._check_friction(options)
         given = {name: np.array(values) for name, values in options.items()}
@@ -226,7 +226,7 @@ class MujocoModel(Model):
             raise unsupported(self, "friction", reason)
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
-        from ._edits import edited, step_length
+        from .mujoco.edits import edited, step_length
 
         self._check_friction(options)
         substeps = options.get("substeps", self.substeps)
@@ -296,7 +296,7 @@ class MujocoData(Data):
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
             if self._home._holds_start:
-                from ._delays import hold
+                from .mujoco.delays import hold
 
                 hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()

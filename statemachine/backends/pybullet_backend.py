@@ -33,16 +33,14 @@ from ..interface.options import checked_options
 from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
-from . import _bullet_urdf as urdf
-from . import _edits
-from ._bullet_client import MOST_CLIENTS
-from ._bullet_driven import Act, DrivenWorld
-from ._bullet_file import UrdfFile
-from ._bullet_plan import Plan
-from ._bullet_scope import as_targets, check, ignored, otherwise, softness
-from ._bullet_weights import weighed_as_it_comes
-from ._bullet_world import ENGINE_TIMESTEP, World
-from ._hidden_data import HiddenModel
+from .bullet import urdf
+from .bullet.client import MOST_CLIENTS
+from .bullet.driven import Act, DrivenWorld
+from .bullet.file import UrdfFile
+from .bullet.plan import Plan
+from .bullet.scope import as_targets, check, ignored, otherwise, softness
+from .bullet.weights import weighed_as_it_comes
+from .bullet.world import ENGINE_TIMESTEP, World
 from .compiled import (
     check_numbers,
     compile_file,
@@ -50,6 +48,8 @@ from .compiled import (
     facts,
     fastest,
 )
+from .hidden_data import HiddenModel
+from .mujoco import edits as _edits
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",

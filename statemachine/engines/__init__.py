@@ -25,8 +25,8 @@ from ..errors import BadInputError, MissingEngineError, UnsupportedError
 from ..installed import raise_if_interrupted
 
 if TYPE_CHECKING:
-    from ..drawing.scene import Camera, Drawer
     from ..interface import Array, Data, Model
+    from ..show.drawing.scene import Camera, Drawer
     from .call_watch import CallWatch
     from .description.records import Robot
     from .measured import Phrases

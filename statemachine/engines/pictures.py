@@ -25,11 +25,11 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing.scene import Camera, Motion, Pixels, compose, smaller
 from ..errors import EngineError, MissingEngineError
 from ..installed import DEFAULT, require
 from ..interface import Array
 from ..processes import PipedChild, fresh_python
+from ..show.drawing.scene import Camera, Motion, Pixels, compose, smaller
 from . import room, rooms_with
 
 _BIAS = 2  # pixels that the ghost must be nearer by than the solid side before it is seen

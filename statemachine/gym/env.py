@@ -8,10 +8,10 @@ import gymnasium
 from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike
 
-from ..drawing.scene import Camera
 from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import Array, Model, forward, make_data, step
 from ..models import AnyPath
+from ..show.drawing.scene import Camera
 from .pictures import Pictures, Poses
 from .task import (
     RENDER_MODES,

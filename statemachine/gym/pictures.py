@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import drawing_of
-from ..drawing.scene import Camera, Motion, camera_for
 from ..engines.pictures import LivePictures, renderer_here
 from ..errors import ClosedDataError, check_name
 from ..interface import Array
+from ..show.drawing import drawing_of
+from ..show.drawing.scene import Camera, Motion, camera_for
 from .task import RENDER_MODES, Task
 
 SIZE = (480, 360)  # width and height in pixels

@@ -13,11 +13,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from ..drawing.scene import Camera
 from ..errors import BadInputError, DivergedWarning, check_name, shown
 from ..interface import Array, Model
 from ..interface.checks import as_count
 from ..models import AnyPath
+from ..show.drawing.scene import Camera
 from ..worlds import forward, make_worlds, reset, step
 from .pictures import Pictures
 from .task import (

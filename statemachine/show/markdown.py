@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from ..page import Markdown
+from .blocks import Markdown
 
 if TYPE_CHECKING:
     from markdown_it import MarkdownIt

@@ -32,7 +32,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..measures import text as numbers
-from ..page import (
+from .blocks import (
     Block,
     Code,
     Heading,

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from ..backends import load
 from ..backends.chosen import chosen_backends
 from ..backends.starts import overlap_warning, places_in
-from ..drawing import Drawing, drawing_of
 from ..errors import BadInputError, TraceError
 from ..installed import DEFAULT
 from ..interface import Model
+from ..lab.recordings import model_file, read
+from ..lab.runs.reporter import QUIET, Reporter
 from ..models import AnyPath
 from ..release_names import engine_of
-from ..runs import model_file, read
-from ..runs.reporter import QUIET, Reporter
+from ..show.drawing import Drawing, drawing_of
 from ..typed_numbers import is_count
 from .session import LiveSession, Session, TraceSession, checked_speed
 

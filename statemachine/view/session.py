@@ -27,8 +27,8 @@ from ..interface import (
     step,
     usual_site,
 )
+from ..lab.recordings import Trace
 from ..measures import Gap, distances, joint_gap
-from ..runs import Trace
 
 SLOWEST, FASTEST = 0.001, 1000.0
 _STEPS_MOST = 100_000  # of one press of a button

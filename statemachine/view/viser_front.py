@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import Drawing, Part
-from ..drawing.scene import Camera
 from ..measures.text import millimetres, position, short_time
+from ..show.drawing import Drawing, Part
+from ..show.drawing.scene import Camera
 from .live import Command, Tempo
 from .session import FASTEST, SLOWEST, Frame, Session
 

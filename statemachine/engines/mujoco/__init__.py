@@ -153,7 +153,7 @@ class MujocoEngine(RawEngine):
 
     def data_in_other_order(self, model: Model, elements: Mapping[str, Any]) -> Any:
         """One whose derived arrays are looked up in the Data that it shows."""
-        from ...backends._mujoco_other_order import DataInOtherOrder
+        from ...backends.mujoco.other_order import DataInOtherOrder
 
         return DataInOtherOrder(model, elements)
 

@@ -248,7 +248,7 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
 
 def as_geoms(raw: Any, k: Any) -> tuple[Edit, ...]:
     """What makes a pair of its own touch as its two geoms would without it."""
-    from ...backends._contact_rules import bodies_meet, masks_meet, mixed
+    from ...backends.contact_rules import bodies_meet, masks_meet, mixed
 
     g, h = int(raw.pair_geom1[k]), int(raw.pair_geom2[k])
     bodies = int(raw.geom_bodyid[g]), int(raw.geom_bodyid[h])

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from ...backends import load
-from ...drawing.scene import GHOST, Camera, Shot
 from ...installed import require
 from ...interface import Array
 from ...rotations import matrix_from_quat
+from ...show.drawing.scene import GHOST, Camera, Shot
 
 _PATIENCE = 60  # seconds for a probe; a software renderer starts slowly
 _RENDER = """
@@ -64,7 +64,7 @@ class MujocoDrawer:
         self._camera.azimuth, self._camera.elevation = camera.azimuth, camera.elevation
         self._scene = mj.MjvScene(raw, maxgeom=raw.ngeom + 1000)
         self._shown = mj.MjvOption()
-        seen = raw.geom_group < 3  # as MuJoCo's viewer, and as statemachine.drawing
+        seen = raw.geom_group < 3  # as MuJoCo's viewer, and as statemachine.show.drawing
         self._shown.geomgroup[:] = (1, 1, 1, 0, 0, 0) if raw.geom_bodyid[seen].any() else 1
         self._shown.sitegroup[:] = 0
         self._shown.tendongroup[:] = 0

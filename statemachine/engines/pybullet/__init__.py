@@ -56,7 +56,7 @@ class PybulletEngine(RawEngine):
         return PybulletDials(model.replace(**options), emulated)
 
     def unlike_its_users(self, model: Model) -> list[str]:
-        from ...backends._bullet_file import UrdfFile
+        from ...backends.bullet.file import UrdfFile
         from ...backends.pybullet_backend import PybulletModel
 
         if not isinstance(model, PybulletModel) or model.defaults == "engine":
@@ -72,7 +72,7 @@ class PybulletEngine(RawEngine):
         ]
 
     def ignored(self, model: Model) -> list[str]:
-        from ...backends._bullet_scope import as_targets, ignored
+        from ...backends.bullet.scope import as_targets, ignored
         from ...backends.pybullet_backend import PybulletModel
 
         if not isinstance(model, PybulletModel):
@@ -90,7 +90,7 @@ class PybulletEngine(RawEngine):
 
         NaN for free bodies, of which the engine does not tell it, and between trees.
         """
-        from ...backends._bullet_driven import ghost_of
+        from ...backends.bullet.driven import ghost_of
 
         # What is stepped carries the armature in links of its own: the ghost is the true arm.
         own = cast("backend.PybulletModel", model)

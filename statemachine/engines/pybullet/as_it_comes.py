@@ -14,10 +14,10 @@ from typing import cast
 
 import numpy as np
 
-from ...backends._bullet_client import joint_infos, pb
-from ...backends._bullet_plan import Plan
-from ...backends._bullet_weights import weighed_as_it_comes
-from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
+from ...backends.bullet.client import joint_infos, pb
+from ...backends.bullet.plan import Plan
+from ...backends.bullet.weights import weighed_as_it_comes
+from ...backends.bullet.world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..records import EngineTerm, UncommandedJoint, WayBack

@@ -12,7 +12,7 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...backends._hidden_data import HiddenData, Machine
+from ...backends.hidden_data import HiddenData, Machine
 from ...backends.pybullet_backend import PybulletModel
 from ...installed import require
 from ...interface import DERIVED, INPUTS

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...backends._bullet_client import joint_infos, pb
+from ...backends.bullet.client import joint_infos, pb
 from ...interface import Array
 from .. import samples
 from ..measured import (

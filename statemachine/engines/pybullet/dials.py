@@ -15,12 +15,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...backends._bullet_client import pb
-from ...backends._bullet_contacts import Surfaces
-from ...backends._bullet_driven import Act
-from ...backends._bullet_plan import Plan
-from ...backends._bullet_weights import weights, with_weights, with_weights_of
-from ...backends._bullet_world import UNCLAMPED, World
+from ...backends.bullet.client import pb
+from ...backends.bullet.contacts import Surfaces
+from ...backends.bullet.driven import Act
+from ...backends.bullet.plan import Plan
+from ...backends.bullet.weights import weights, with_weights, with_weights_of
+from ...backends.bullet.world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..records import Dials, Setting

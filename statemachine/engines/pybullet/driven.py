@@ -11,8 +11,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from ...backends._bullet_client import pb
-from ...backends._bullet_world import World
+from ...backends.bullet.client import pb
+from ...backends.bullet.world import World
 from ...interface import Array, Model, make_data
 
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...backends._bullet_client import pb
+from ...backends.bullet.client import pb
 from ...interface import Array
 from ..pile import HALF, PLACES, TILT, Pile, Read, Write
 from ..samples import GRAVITY, PENDULUM_URDF

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...backends._bullet_client import joint_infos, pb
-from ...backends._bullet_file import UrdfFile
-from ...backends._bullet_urdf import UNLIMITED
+from ...backends.bullet.client import joint_infos, pb
+from ...backends.bullet.file import UrdfFile
+from ...backends.bullet.urdf import UNLIMITED
 from ...installed import engine_version
 from ...interface import make_data
 from ...rotations import HERE, Placement, matrix_from_quat, wxyz_from_xyzw

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...backends import load
-from ...backends._bullet_client import connect, pb
-from ...drawing import Part, drawing_of
-from ...drawing.scene import GHOST, Camera, Shot
+from ...backends.bullet.client import connect, pb
 from ...interface import Array
 from ...rotations import xyzw_from_wxyz
+from ...show.drawing import Part, drawing_of
+from ...show.drawing.scene import GHOST, Camera, Shot
 
 _MOST = 20_000  # faces of one shape; PyBullet takes 131072 vertices
 _TILE = 0.1  # [m] of a floor without an end, laid out so that its perspective is seen

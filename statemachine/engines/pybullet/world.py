@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from ...backends._bullet_client import as_file, connect, disconnect, load_urdf, pb
+from ...backends.bullet.client import as_file, connect, disconnect, load_urdf, pb
 from ...installed import silence
 
 

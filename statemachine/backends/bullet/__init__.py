@@ -1,0 +1,1 @@
+"""PyBullet behind the contract: what it lacks and we compute."""

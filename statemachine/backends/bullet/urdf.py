@@ -1,0 +1,421 @@
+"""Write URDF from a compiled MJCF, one file for each tree of bodies.
+
+URDF knows one joint between two links, no armature, no servo and no site. A site
+becomes a link of its own without mass, fixed to its body, so that an engine that
+reports centres of mass to full precision reports the site to full precision too.
+Numbers are written so that reading them back gives the same float64.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import mujoco
+import numpy as np
+
+from ...interface import Array, JointType
+from ...rotations import matrix_from_quat
+from .. import dense
+
+_BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
+_CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+_PRIMITIVES = {_BOX: "box", _SPHERE: "sphere", _CAPSULE: "capsule", _CYLINDER: "cylinder"}
+_MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
+# [kg] mass, and a thousandth of it [kg m²] inertia, of what only carries a tree; and the largest
+# part of the tree's own.
+LIGHT, LIGHTEST = 1e-9, 1e-8
+UNLIMITED = 1e9  # a range or a force where there is none: PyBullet wants a number
+_LONGEST = 200  # PyBullet cuts names at 1,023 bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Dialect:
+    """What the reader of a URDF wants of it.
+
+    Attributes:
+        capsules: Write <capsule>, which PyBullet reads and the format does not know;
+            else a cylinder and two spheres, which are the same solid.
+        looks: Write <visual> elements.
+        folder: Write the names of meshes relative to it; absolute without it.
+        solids: Write <collision> elements.
+        dynamics: Write the ranges, damping and dry friction of the joints.
+        anchored: Fix the root to a massless link "world", at its place. PyBullet's
+            inverse dynamics takes gravity in the principal axes of a fixed base, which
+            is gravity in another direction unless the base has no mass. A tree that floats
+            is fixed to a link of next to no mass at the origin of its root, which is then
+            what the engine moves; of another it moves the centre of mass.
+        tips: Write a link for each site.
+        hulls: Geoms that are read from a file of their own, see `hull_file`.
+        parts: Of a geom that touches, in which link of its body it is: 0 is the body's own,
+            others have a link without mass each, fixed to it.
+        padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
+            J times `padding_shape` [kg m²] more inertia about its centre of mass, the
+            link that a slide carries J [kg] more mass.
+    """
+
+    capsules: bool = False
+    looks: bool = True
+    folder: Path | None = None
+    solids: bool = True
+    dynamics: bool = True
+    anchored: bool = False
+    padding: Array | None = None
+    tips: bool = True
+    hulls: frozenset[int] = frozenset()
+    parts: Mapping[int, int] = field(default_factory=dict)
+
+
+def roots(raw: mujoco.MjModel) -> list[int]:
+    """Bodies that hang directly in the world, each the root of a tree."""
+    return [b for b in range(1, raw.nbody) if raw.body_parentid[b] == 0]
+
+
+def tree(raw: mujoco.MjModel, root: int) -> list[int]:
+    """The bodies of a tree, parents first; the world is a tree of its own."""
+    return [b for b in range(raw.nbody) if raw.body_rootid[b] == root]
+
+
+def axes(raw: mujoco.MjModel, body: int) -> list[int]:
+    """The joints of a body that URDF writes, its hinges and slides, in order."""
+    start = int(raw.body_jntadr[body])
+    joints = range(start, start + int(raw.body_jntnum[body]))
+    return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
+
+
+def floats(raw: mujoco.MjModel, root: int) -> bool:
+    """Whether the root of a tree has a free joint."""
+    return bool(raw.body_jntnum[root]) and not axes(raw, root)
+
+
+def write(
+    raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect(), names: Names | None = None
+) -> str:
+    """URDF of one tree of bodies.
+
+    Args:
+        raw: The compiled model.
+        root: The body at the root of the tree; a joint of its own is left out if it
+            is free, and stands between a massless link "world" and it otherwise. 0 for
+            the geoms of the world itself; planes, which URDF does not know, are left out.
+        dialect: What the reader wants.
+        names: Those of the model, where they are known already.
+    """
+    names = names or Names(raw)
+    robot = Element("robot", name=raw.names[: raw.names.index(b"\0")].decode() or "robot")
+    on_world = bool(axes(raw, root)) or dialect.anchored
+    if on_world:
+        light = floats(raw, root) * min(LIGHT, LIGHTEST * float(raw.body_subtreemass[root]))
+        robot.append(_bare_link("world", light, 1e-3 * light * np.eye(3)))
+    for body in tree(raw, root):
+        robot.append(_link(raw, body, dialect, names))
+        if body != root or on_world:
+            robot.extend(_joints(raw, body, root, dialect, names))
+        geoms = range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body])
+        for part in sorted({dialect.parts.get(geom, 0) for geom in geoms} - {0}):
+            name, fixed = names.part(body, part)
+            link = _bare_link(name, 0.0, np.zeros((3, 3)))
+            link.extend(_geoms(raw, body, part, dialect))
+            where = _origin(np.zeros(3), np.eye(3))
+            robot.extend([link, _joint(fixed, "fixed", names.links[body], name, where)])
+    for site in range(raw.nsite if dialect.tips else 0):
+        if raw.body_rootid[raw.site_bodyid[site]] == root and root:
+            robot.extend(_tip(raw, site, names))
+    ElementTree.indent(robot)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
+
+
+class Names:
+    """What bodies, joints and sites are called in a URDF, each name once.
+
+    MuJoCo lets a joint and a body, or two things without names, go by one name; a URDF
+    that does is not a file to some readers and the end of the process to others.
+
+    Attributes:
+        links: Of each body's link; joints: of each joint; tips: of each site's link.
+        between: Of the link between two joints of one body, by the first of them.
+        fixed: Of the fixed joint of each body; tips_fixed: of each site's link.
+    """
+
+    def __init__(self, raw: mujoco.MjModel) -> None:
+        self._taken = links, joints = set[str](), set[str]()
+        bodies = range(raw.nbody)
+        self.links = {b: _once(raw.body(b).name or f"body_{b}", links) for b in bodies}
+        self.joints = {j: _once(raw.joint(j).name or f"joint_{j}", joints) for j in range(raw.njnt)}
+        self.tips = {
+            s: _once(raw.site(s).name or f"site_{s}", links, "_site") for s in range(raw.nsite)
+        }
+        self.between = {j: _once(f"{name}_link", links) for j, name in self.joints.items()}
+        self.fixed = {b: _once(f"{name}_fixed", joints) for b, name in self.links.items()}
+        self.tips_fixed = {s: _once(f"{name}_fixed", joints) for s, name in self.tips.items()}
+        self._parts: dict[tuple[int, int], tuple[str, str]] = {}
+
+    def part(self, body: int, part: int) -> tuple[str, str]:
+        """Of the link of a part of a body, and of its fixed joint."""
+        if (body, part) not in self._parts:
+            name = f"{self.links[body]}_part_{part}"
+            link, fixed = (
+                _once(text, taken)
+                for text, taken in zip((name, f"{name}_fixed"), self._taken, strict=True)
+            )
+            self._parts[body, part] = link, fixed
+        return self._parts[body, part]
+
+
+def _once(name: str, taken: set[str], suffix: str = "") -> str:
+    """A name that is not taken yet, and not so long that a reader cuts it."""
+    first = name = name.encode()[:_LONGEST].decode(errors="ignore")
+    if name in taken and suffix:
+        name = first + suffix
+    number = 2
+    while name in taken:
+        name, number = f"{first}{suffix}_{number}", number + 1
+    taken.add(name)
+    return name
+
+
+def anchor(raw: mujoco.MjModel, body: int) -> Array:
+    """Where a body's last joint is, in the body's frame: the origin of its link."""
+    joints = axes(raw, body)
+    return raw.jnt_pos[joints[-1]] if joints else np.zeros(3)
+
+
+def padding_shape(axis: Array) -> Array:
+    """Inertia (3, 3) of a unit of padding about an axis: ½·1.0001·1 + ½·a·aᵀ.
+
+    Turning about the axis alone would be enough, and is refused as no body's inertia.
+    """
+    return 0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis)
+
+
+def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, Array]:
+    """Mass and inertia (3, 3), in the body's axes, on top of what the joint carries."""
+    if dialect.padding is None:
+        return 0.0, np.zeros((3, 3))
+    size, axis = float(dialect.padding[raw.jnt_dofadr[joint]]), raw.jnt_axis[joint]
+    if raw.jnt_type[joint] == int(JointType.SLIDE):
+        return size, np.zeros((3, 3))
+    return 0.0, size * padding_shape(axis)
+
+
+def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Element:
+    origin, joints = anchor(raw, body), axes(raw, body)
+    frame = matrix_from_quat(raw.body_iquat[body])
+    mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
+    if joints:
+        extra, around = _padding(raw, joints[-1], dialect)
+        mass, inertia = mass + extra, inertia + dense.product(dense.product(frame.T, around), frame)
+    link = _element(
+        "link",
+        _element(
+            "inertial",
+            _origin(raw.body_ipos[body] - origin, frame),
+            _element("mass", value=mass),
+            _inertia(inertia),
+        ),
+        name=names.links[body],
+    )
+    link.extend(_geoms(raw, body, 0, dialect))
+    return link
+
+
+def _geoms(raw: mujoco.MjModel, body: int, part: int, dialect: Dialect) -> Iterator[Element]:
+    """What of a body's geoms is in one of its links."""
+    for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
+        touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom] or geom in dialect.parts
+        wanted = dialect.solids if touches else dialect.looks
+        if wanted and dialect.parts.get(geom, 0) == part:
+            tag = "collision" if touches else "visual"
+            yield from _geom(raw, geom, anchor(raw, body), tag, dialect)
+
+
+def _geom(
+    raw: mujoco.MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect
+) -> Iterator[Element]:
+    pos, mat = raw.geom_pos[geom] - anchor, matrix_from_quat(raw.geom_quat[geom])
+    size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
+    shape = _PRIMITIVES.get(kind, "")
+    solids: list[tuple[Array, Element]] = []
+    if geom in dialect.hulls:
+        solids.append((pos, _element("mesh", filename=hull_file(geom))))
+    elif kind == _BOX:
+        solids.append((pos, _element(shape, size=2 * size)))
+    elif kind == _SPHERE:
+        solids.append((pos, _element(shape, radius=size[0])))
+    elif shape:
+        ends = kind == _CAPSULE and not dialect.capsules
+        shape = "cylinder" if ends else shape
+        solids.append((pos, _element(shape, radius=size[0], length=2 * size[1])))
+        for side in (-1, 1) if ends else ():
+            ball = _element("sphere", radius=size[0])
+            solids.append((pos + side * size[1] * mat[:, 2], ball))
+    elif kind == _MESH:
+        mesh = int(raw.geom_dataid[geom])
+        # MuJoCo moved the mesh to its centre and axes; the file has it where it was.
+        # Rounded, so that a look that was never moved is at 0 0 0 and not at 1e-17.
+        mat = np.round(dense.product(mat, matrix_from_quat(raw.mesh_quat[mesh]).T), 12)
+        pos = np.round(pos - dense.times(mat, raw.mesh_pos[mesh]), 12)
+        file = _mesh_file(raw, mesh, dialect.folder)
+        solids.append((pos, _element("mesh", filename=file, scale=raw.mesh_scale[mesh])))
+    elif kind != _PLANE:  # which URDF does not know
+        raise ValueError(f"geom {geom} has no counterpart in URDF")
+    name = raw.geom(geom).name
+    for k, (where, solid) in enumerate(solids):
+        label = {"name": name} if name and not k else {}  # each name once
+        yield _element(tag, _origin(where, mat), _element("geometry", solid), **label)
+
+
+def hull_file(geom: int) -> str:
+    """The name of the file with the hull of a geom, beside the URDF."""
+    return f"hull_{geom}.obj"
+
+
+def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:
+    start = int(raw.mesh_pathadr[mesh])
+    name = raw.paths[start : raw.paths.index(b"\0", start)].decode() if start >= 0 else ""
+    return os.path.relpath(name, folder) if folder and os.path.isabs(name) else name
+
+
+def _joints(
+    raw: mujoco.MjModel, body: int, root: int, dialect: Dialect, names: Names
+) -> Iterator[Element]:
+    """The joints between a body and its parent, with massless links between them."""
+    upper = int(raw.body_parentid[body])
+    parent = "world" if body == root else names.links[upper]
+    turn = matrix_from_quat(raw.body_quat[body])
+    place = raw.body_pos[body] - (np.zeros(3) if body == root else anchor(raw, upper))
+    if body == root and floats(raw, root):
+        turn, place = np.eye(3), np.zeros(3)
+    joints = axes(raw, body)
+    if not joints:
+        where, name = _origin(place, turn), names.fixed[body]
+        yield _joint(name, "fixed", parent, names.links[body], where)
+        return
+    place = place + dense.times(turn, raw.jnt_pos[joints[0]])
+    for joint in joints:
+        child = names.links[body]
+        if joint != joints[-1]:
+            child = names.between[joint]
+            yield _bare_link(child, *_padding(raw, joint, dialect))
+        kind = _kind(raw, joint, dialect)
+        bounds: dict[str, float] = {}
+        if kind != "continuous":
+            bounds["lower"], bounds["upper"] = _bounds(raw, joint, dialect)
+        dof = int(raw.jnt_dofadr[joint])
+        extra = [
+            _element("axis", xyz=raw.jnt_axis[joint]),
+            _element("limit", **bounds, effort=_effort(raw, joint), velocity=100.0),
+        ]
+        if dialect.dynamics:
+            damping, friction = raw.dof_damping[dof], raw.dof_frictionloss[dof]
+            extra.append(_element("dynamics", damping=damping, friction=friction))
+        where = _origin(*_at_zero(raw, joint, place, turn))
+        yield _joint(names.joints[joint], kind, parent, child, where, *extra)
+        if joint != joints[-1]:
+            parent, turn = child, np.eye(3)
+            place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
+
+
+def _is_limited(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> bool:
+    return bool(raw.jnt_limited[joint]) and dialect.dynamics
+
+
+def _kind(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> str:
+    """Return the type of a joint in a URDF."""
+    if raw.jnt_type[joint] == int(JointType.SLIDE):
+        return "prismatic"
+    return "revolute" if _is_limited(raw, joint, dialect) else "continuous"
+
+
+def _bounds(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, float]:
+    """Return the range of a joint that must have one in a URDF, as a slide must."""
+    if _is_limited(raw, joint, dialect):
+        low, high = raw.jnt_range[joint]
+        return low, high
+    if dialect.dynamics:
+        return -UNLIMITED, UNLIMITED
+    return 1, -1  # the wrong way round, which PyBullet takes for none
+
+
+def _at_zero(raw: mujoco.MjModel, joint: int, place: Array, turn: Array) -> tuple[Array, Array]:
+    """Where a joint's frame is when its position is 0, from where it is in the file's pose.
+
+    There the position is the joint's `ref`.
+    """
+    ref, axis = float(raw.qpos0[raw.jnt_qposadr[joint]]), raw.jnt_axis[joint]
+    if not ref:
+        return place, turn
+    if raw.jnt_type[joint] == int(JointType.SLIDE):
+        return place - ref * dense.times(turn, axis), turn
+    half = -ref / 2
+    back = matrix_from_quat(np.array([np.cos(half), *(np.sin(half) * axis)]))
+    return place, dense.product(turn, back)
+
+
+def _joint(
+    name: str, kind: str, parent: str, child: str, origin: Element, *extra: Element
+) -> Element:
+    ends = _element("parent", link=parent), _element("child", link=child)
+    return _element("joint", origin, *ends, *extra, name=name, type=kind)
+
+
+def _effort(raw: mujoco.MjModel, joint: int) -> float:
+    """The largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
+    on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    drives = on_joint & (raw.actuator_trnid[:, 0] == joint)
+    limited = drives & raw.actuator_forcelimited.astype(bool)
+    if not limited.any():
+        return UNLIMITED
+    return float(np.abs(raw.actuator_forcerange[limited]).max())
+
+
+def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[Element]:
+    body, name = int(raw.site_bodyid[site]), names.tips[site]
+    mat = matrix_from_quat(raw.site_quat[site])
+    yield _bare_link(name, 0.0, np.zeros((3, 3)))
+    where = _origin(raw.site_pos[site] - anchor(raw, body), mat)
+    yield _joint(names.tips_fixed[site], "fixed", names.links[body], name, where)
+
+
+def _bare_link(name: str, mass: float, inertia: Array) -> Element:
+    """A link without geoms, whose centre of mass is its frame."""
+    inside = _element("inertial", _element("mass", value=mass), _inertia(inertia))
+    return _element("link", inside, name=name)
+
+
+def _inertia(tensor: Array) -> Element:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor
+    return _element("inertia", ixx=xx, ixy=xy, ixz=xz, iyy=yy, iyz=yz, izz=zz)
+
+
+def _origin(pos: Array, mat: Array) -> Element:
+    return _element("origin", xyz=pos, rpy=_rpy(mat))
+
+
+def _rpy(mat: Array) -> Array:
+    """Angles (3,) with mat = Rz(yaw)·Ry(pitch)·Rx(roll), to full precision everywhere.
+
+    At a pitch of ±90° roll is arbitrary; yaw is computed from the roll that was
+    chosen, so that the product is right whatever it is.
+    """
+    pitch = np.arctan2(-mat[2, 0], np.hypot(mat[0, 0], mat[1, 0]))
+    roll = np.arctan2(mat[2, 1], mat[2, 2])
+    s, c = np.sin(roll), np.cos(roll)
+    yaw = np.arctan2(s * mat[0, 2] - c * mat[0, 1], c * mat[1, 1] - s * mat[1, 2])
+    return np.array([roll, pitch, yaw])
+
+
+def _element(tag: str, *inside: Element, **attributes: Any) -> Element:
+    """An element; a number is the shortest text that reads back as the same float64."""
+    element = Element(tag)
+    for name, value in attributes.items():
+        if not isinstance(value, str):  # no negative zero
+            value = " ".join(map(repr, (np.atleast_1d(value) + 0.0).tolist()))  # noqa: PLW2901
+        element.set(name, value)
+    element.extend(inside)
+    return element

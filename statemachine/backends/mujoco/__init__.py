@@ -1,0 +1,1 @@
+"""MuJoCo behind the contract: what stands beside `mujoco_backend.py`."""

@@ -1,0 +1,285 @@
+"""An engine in a Python of its own behind the contract: another release of one, or any other.
+
+Its process compiles the file itself. Here the same file is compiled by the release that is
+installed, and takes over every number that the process reads in it: so a Model shows what the
+engine there makes of the file, and edits reach it by the names of fields.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ...errors import EngineError, ModelError
+from ...interface import Capabilities
+from ...interface.checks import unsupported_by
+from ...interface.records import Arrays, Defaults
+from ...models import AnyPath
+from ...release_names import is_release, version_of
+from ...releases import python_of
+from ..binary import is_binary
+from ..compiled import check_numbers, facts, fastest, spec_with_packages
+from ..hidden_data import HiddenModel
+from ..mujoco.edits import put
+from ..mujoco_backend import MujocoModel
+from ..mujoco_backend import load as load_installed
+from . import release_child as child
+from .engine_process import AnswerError, LoadedModel, LostError, ServedEngine, ServedWorld, Server
+
+# Arrays that no motion depends on, and what each release computes of the others in its own way.
+_OWN = (
+    *("bvh", "cam", "hfield_path", "light", "mat_", "mesh_path", "name", "sensor", "skin", "tex"),
+    *("paths", "efm", "B_", "D_", "M_", "mapM", "mapD", "flg_", "ten_J", "dof_length"),
+    *("actuator_history", "sensor_history", "flexedge_invweight0"),
+)
+# What is large and laid out in each release's own way: nobody sends it to another.
+_UNSENT = ("flex", "mesh", "oct")
+_SAME = (
+    *("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "nsite", "ntendon", "neq", "nkey"),
+    "nmocap",
+)
+_NO_EDITS = MappingProxyType[str, Any]({})
+_FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mjtEnableBit}
+
+
+def load(path: AnyPath, defaults: Defaults = "model", *, release: str) -> HiddenModel:
+    """Compile a file in both releases.
+
+    Args:
+        path: An MJCF or URDF file.
+        defaults: As of the installed engine.
+        release: As "mujoco==3.3.7".
+
+    Raises:
+        MissingEngineError: That release has no environment here.
+        ModelError: One of the two cannot read the file, or they read different parts in it.
+    """
+    python, version = str(python_of(release)), version_of(release)
+    engine = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
+    return served(engine)(path, defaults)
+
+
+def served(
+    engine: ServedEngine, capabilities: Capabilities | None = None
+) -> Callable[..., ServedModel]:
+    """The loader of an engine that runs in a Python of its own.
+
+    Args:
+        engine: Its Python, and the file that knows it there.
+        capabilities: What the backend says of itself; None for what is said of MuJoCo.
+    """
+
+    def load_there(path: AnyPath, defaults: Defaults = "model") -> ServedModel:
+        if is_binary(os.fspath(path)):
+            raise ModelError(
+                f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML"
+            )
+        return ServedModel(_compiled(engine, load_installed(path, defaults)), capabilities)
+
+    return load_there
+
+
+@dataclass(frozen=True, eq=False)
+class EngineReading:
+    """What an engine makes of a file that the installed release has compiled.
+
+    Attributes:
+        engine: That read it.
+        version: Of the engine.
+        model: In the installed release's terms.
+        shared: Names of the fields that both have.
+        digest: Of what was read, by which a file that changed since then is seen.
+    """
+
+    engine: ServedEngine
+    version: str
+    model: MujocoModel
+    shared: frozenset[str]
+    digest: str
+
+
+def _opened(reading: EngineReading, edits: Mapping[str, Any], server: Server) -> int:
+    """Return the number that the model of a file with some fields edited has there."""
+    return _loaded(server, reading.model, edits, digest=reading.digest).number
+
+
+def _compiled(engine: ServedEngine, installed: MujocoModel) -> EngineReading:
+    """Let an engine read a file that the installed release has compiled.
+
+    Raises:
+        ModelError: It cannot read the file, or finds other parts in it.
+        EngineError: It cannot be run.
+    """
+    raw, path, title = copy.copy(installed.raw), installed.path, engine.title
+    try:
+        server = Server.of(engine)
+        loaded = _loaded(server, installed)
+    except AnswerError as error:
+        raise ModelError(f"{title} cannot read {path}: {error}") from error
+    except (LostError, OSError) as error:
+        anew = f"; to make it anew: {engine.anew}" if is_release(engine.name) else ""
+        raise EngineError(f"{title} cannot be run: {error}{anew}") from error
+    server.forgotten.append(loaded.number)
+    fields = loaded.fields
+    for name in _SAME:
+        if name in fields and int(fields[name]) != getattr(raw, name):
+            raise ModelError(
+                f"{title} reads {path} as another robot: {name} is {int(fields[name])} there "
+                f"and {getattr(raw, name)} in MuJoCo {mujoco.__version__}"
+            )
+    shared = _take_over(raw, fields) | set(loaded.flags)
+    for name, set_there in loaded.flags.items():
+        _take_over_flags(raw, name, set_there)
+    check_numbers(raw, f"{path} in {title}")
+    return EngineReading(
+        engine=engine,
+        version=loaded.version,
+        model=MujocoModel(raw, path, installed.substeps),
+        shared=frozenset(shared),
+        digest=loaded.digest,
+    )
+
+
+def _take_over(raw: mujoco.MjModel, fields: Arrays) -> set[str]:
+    """Write the numbers that an engine read into a compiled model; the fields that both have.
+
+    Args:
+        raw: The compiled model of the installed release.
+        fields: What the engine read, by name.
+    """
+    shared = set[str]()
+    for name in _fields(raw):
+        now = np.asarray(_field(raw, name))
+        if name not in fields or fields[name].shape != now.shape:
+            continue
+        shared.add(name)
+        if not name.endswith("type") and not np.array_equal(fields[name], now):
+            put(raw, name, fields[name] if now.ndim else fields[name].item())
+    return shared
+
+
+def _take_over_flags(raw: mujoco.MjModel, name: str, set_there: list[str]) -> None:
+    """Set the flags of a compiled model that are set in an engine.
+
+    Args:
+        raw: The compiled model of the installed release.
+        name: Of `_FLAGS`.
+        set_there: Names of the flags that are set in the engine.
+    """
+    kinds, bits = _FLAGS[name].__members__, 0
+    for flag in set_there:
+        for own in child.SPLIT.get(flag, (flag,)):
+            if own in kinds:
+                bits += int(kinds[own])
+    setattr(*child.held(raw, name), bits)
+
+
+def _loaded(
+    server: Server, model: MujocoModel, edits: Mapping[str, Any] = _NO_EDITS, **digest: str
+) -> LoadedModel:
+    """Let an engine read the file of a model: as `Server.load`.
+
+    Args:
+        server: Its process.
+        model: What the installed release makes of the file.
+        edits: Numeric fields that are then another than in the file; flags by their names.
+        **digest: Of what was read in the file before.
+    """
+    spec = spec_with_packages(model.path)
+    text, file = spec.to_xml() if spec else "", str(model.path.absolute())
+    numbers = {name: value for name, value in edits.items() if name not in _FLAGS}
+    flags = {name: value for name, value in edits.items() if name in _FLAGS}
+    fields = [*_SAME, *_fields(model.raw)]
+    return server.load(text, file, numbers, fields=fields, flags=flags, **digest)
+
+
+def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
+    """Names of the numeric fields of a compiled model that releases may have in common."""
+    for name in dir(raw):
+        sent = not name.startswith(("_", *_OWN, *without))
+        if sent and isinstance(getattr(raw, name), np.ndarray):
+            yield name
+    for holder in ("opt", "stat"):
+        names = {f"{holder}.{name}" for name in dir(getattr(raw, holder)) if name[0] != "_"}
+        yield from sorted(names - _FLAGS.keys())
+
+
+def _field(raw: mujoco.MjModel, name: str) -> Any:
+    return getattr(*child.held(raw, name))
+
+
+def _edits(reading: EngineReading, raw: mujoco.MjModel) -> dict[str, Any]:
+    """Fields of a compiled model that are another than those of the file; flags by their names.
+
+    Raises:
+        UnsupportedError: The engine has no such field.
+    """
+    edits, base = dict[str, Any](), reading.model.raw
+    for name in (*_fields(raw, ()), *_FLAGS):
+        if np.array_equal(_field(raw, name), _field(base, name)):
+            continue
+        if name not in reading.shared:
+            reason = "it has no such field, or lays it out in a way of its own"
+            raise unsupported_by(reading.engine.name, name, reason)
+        kind = name.removeprefix("opt.").removesuffix("flags")
+        edits[name] = child.flags_of(raw, kind) if name in _FLAGS else np.array(_field(raw, name))
+    return edits
+
+
+def _taken_over(model: MujocoModel) -> dict[str, Any]:
+    """Return the facts that a Model of another engine has of the installed release's Model."""
+    known = facts(model.raw)
+    known["raw"], known["path"] = model.raw, model.path
+    known["timestep"], known["substeps"] = model.timestep, model.substeps
+    known["max_qvel"] = fastest(model.raw)
+    return known
+
+
+class ServedModel(HiddenModel):
+    """What an engine in a Python of its own makes of a file, with what was edited in it."""
+
+    _reading: EngineReading
+    _inner: MujocoModel
+    _own: Capabilities | None
+
+    def __init__(
+        self,
+        reading: EngineReading,
+        capabilities: Capabilities | None = None,
+        inner: MujocoModel | None = None,
+    ) -> None:
+        inner = reading.model if inner is None else inner
+        record = inner.capabilities if capabilities is None else capabilities
+        engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
+        opened = partial(_opened, reading, _edits(reading, engine.raw))
+        timestep = float(inner.raw.opt.timestep)
+        super().__init__(
+            partial(ServedWorld, reading.engine, opened, inner.raw, timestep),
+            backend=reading.engine.name,
+            engine_version=reading.version,
+            capabilities=record,
+            _reading=reading,
+            _inner=inner,
+            _own=capabilities,
+            **_taken_over(inner),
+        )
+
+    @property
+    def compiled(self) -> mujoco.MjModel:
+        """In the terms of the installed release."""
+        return self.raw
+
+    def with_compiled(self, compiled: mujoco.MjModel) -> ServedModel:
+        inner = self._inner.with_compiled(compiled)
+        return ServedModel(self._reading, self._own, inner)._started_as(self, {})
+
+    def _replace(self, options: dict[str, Any]) -> ServedModel:
+        return ServedModel(self._reading, self._own, self._inner._replace(options))

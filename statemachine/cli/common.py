@@ -1,0 +1,264 @@
+"""What the commands share: options, exit codes, progress, and how a page is shown."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import BadInputError, printable
+from ..installed import DEFAULT
+from ..typed_numbers import typed_float, typed_int
+
+if TYPE_CHECKING:
+    from ..course.quiz import Reader
+    from ..show.blocks import Page
+
+PROGRAM = "statemachine"
+# Exit codes: the result says no; bad input; an engine is missing; a fault of this program; nowhere
+# to write. The last two are those of sysexits.h.
+SAYS_NO, BAD_INPUT, MISSING, FAULT, NO_OUTPUT = 1, 2, 3, 70, 74
+
+
+def complain(error: Exception | str, code: int) -> int:
+    """Print it in one line on standard error, and return `code`."""
+    print(f"{PROGRAM}: {printable(error)}", file=sys.stderr)
+    return code
+
+
+@contextmanager
+def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
+    """Say, where a Ctrl-C ends it, what there is already, and how to go on.
+
+    Args:
+        written: The file or the folder that it is in.
+        what: What was done with what is there.
+        but: What is to be typed otherwise.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        if written is not None and written.exists():
+            text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
+            raise SystemExit(complain(text, 130)) from None
+        raise
+
+
+def is_given(options: argparse.Namespace, name: str) -> bool:
+    """Tell whether an option is given that is None, False or empty where it is not."""
+    value = getattr(options, name)
+    return value is not None and value is not False and value != []  # 0 is given
+
+
+class _HelpAll(argparse.Action):
+    """--help-all: the help of every option; `const` has what --help leaves out."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        for action, text in (self.const or {}).items():
+            action.help = text
+        self.help = "every option: this list"
+        parser.print_help()
+        parser.exit()
+
+
+def shorten_help(parser: argparse.ArgumentParser, first: Collection[str]) -> None:
+    """Let --help show the options that are needed first, and --help-all all of them.
+
+    Args:
+        parser: Of the command, with all its options.
+        first: The names of those that are needed first.
+    """
+    later = {
+        action: action.help
+        for action in parser._actions
+        if action.dest != "help" and action.dest not in first and action.help != argparse.SUPPRESS
+    }
+    for action in later:
+        action.help = argparse.SUPPRESS
+    says = f"every option: {len(later)} more"
+    parser.add_argument("--help-all", action=_HelpAll, nargs=0, const=later, help=says)
+
+
+def flag_of(name: str) -> str:
+    """Return an option as it is typed."""
+    return f"--{name.replace('_', '-')}"
+
+
+def number_list(text: str) -> list[float]:
+    """Read numbers of a list like 0,-0.6,1.2, as an option's type."""
+    try:
+        return [typed_float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 0,-0.6") from None
+
+
+def file_name(text: str) -> Path:
+    """Read the name of a file to be written, as an option's type."""
+    if not text:
+        raise argparse.ArgumentTypeError("expected the name of a file")
+    return Path(text)
+
+
+# As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
+EXPERIMENTS = {
+    "hold": "the servos go to one pose and hold it",
+    "gravity": "actuators off: what can move falls",
+    "droop": "nobody writes ctrl: the servos keep their first targets",
+    "fall": "actuators off, and nothing can touch",
+    "box": "the SO-101 swings with a box in its jaws",
+    "waves": "every actuator follows waves that a seed draws",
+}
+
+
+def experiments() -> str:
+    """Return a line for each experiment."""
+    return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
+
+
+class TerminalReporter:
+    """A `Reporter` that shows a bar of progress and prints each note, on standard error."""
+
+    def stage(self, what: str) -> AbstractContextManager[Callable[[float], None]]:
+        """Show a bar for a stage of the work."""
+        from ..show.terminal import progress
+
+        return progress(what)
+
+    def note(self, text: str) -> None:
+        """Print a note in one line."""
+        complain(text, 0)
+
+
+# Options that several commands have.
+_RUNS = "mujoco, pybullet or a release, mujoco==3.3.7"
+_EACH = f"all: those that are installed; may be repeated (default {DEFAULT})"
+ONE_BACKEND = f"{_RUNS}; pybullet:engine: as its own users meet it (default {DEFAULT})"
+EACH_BACKEND = f"{_RUNS}; pybullet:engine: as its own users meet it; {_EACH}"
+CONTRACT_BACKENDS = f"{_RUNS}; {_EACH}"  # each with the contract of this library
+SIDES = ("left", "right")
+
+
+def add_backend(parser: argparse._ActionsContainer, says: str) -> None:
+    """Add --backend, which may be repeated; the command says how often."""
+    parser.add_argument("--backend", action="append", metavar="NAME", help=says)
+
+
+def add_json(
+    parser: argparse._ActionsContainer, what: str = "result", default: object = False
+) -> None:
+    """Add --json, which prints the result as JSON.
+
+    Args:
+        parser: The parser that gets the option.
+        what: What the help calls the result.
+        default: `argparse.SUPPRESS` where a parser above this one has the option, too.
+    """
+    says = f"print the {what} as JSON"
+    parser.add_argument("--json", action="store_true", default=default, help=says)
+
+
+def add_seed(parser: argparse._ActionsContainer, what: str) -> None:
+    """Add --seed, of what is drawn at random."""
+    says = f"random seed of {what} (0)"
+    parser.add_argument("--seed", type=typed_int, default=0, metavar="N", help=says)
+
+
+def add_seconds(parser: argparse._ActionsContainer) -> None:
+    """Add --seconds, the simulated time."""
+    parser.add_argument("--seconds", type=typed_float, metavar="S", help="simulated time")
+
+
+def add_timestep(parser: argparse._ActionsContainer) -> None:
+    """Add --timestep, the length of a step."""
+    parser.add_argument("--timestep", type=typed_float, metavar="S", help="length of a step [s]")
+
+
+def add_jobs(parser: argparse._ActionsContainer) -> None:
+    """Add --jobs, the number of processes."""
+    says = "parallel processes (default: one a processor)"
+    parser.add_argument("--jobs", type=typed_int, metavar="N", help=says)
+
+
+def add_model(
+    parser: argparse._ActionsContainer, says: str = "the model", default: str | None = None
+) -> None:
+    """Add the model, as a word that may be left out."""
+    if default is not None:
+        says += f" (default {default})"
+    parser.add_argument("model", nargs="?", default=default, metavar="NAME|FILE", help=says)
+
+
+def add_trust(parser: argparse._ActionsContainer) -> None:
+    """Add --trust-binary, which `cli.main` obeys."""
+    says = "read a binary model (.mjb); a damaged one can do harm"
+    parser.add_argument("--trust-binary", action="store_true", help=says)
+
+
+def add_menagerie(parser: argparse._ActionsContainer) -> None:
+    """Add --menagerie, the folder in which models are looked up, and --trust-binary."""
+    add_trust(parser)
+    folder = os.environ.get("MENAGERIE") or None
+    says = "look the model up in this folder of public models (default $MENAGERIE)"
+    parser.add_argument("--menagerie", default=folder, metavar="DIR", help=says)
+
+
+def word_of_one_backend(words: Sequence[str] | None, what: str) -> str:
+    """Return the one backend that --backend names, as it was typed; MuJoCo where nothing was.
+
+    Args:
+        words: What was typed.
+        what: The command, for the message.
+
+    Raises:
+        BadInputError: Several are named.
+        UnknownNameError: There is no such backend.
+    """
+    from ..backends.chosen import one_backend
+
+    return str(one_backend(words or [DEFAULT], what))
+
+
+def pairs_of(words: Iterable[str], option: str) -> dict[str, str]:
+    """Read names of the left and what the right calls them, from words A=B.
+
+    Args:
+        words: As typed.
+        option: The option, for the message.
+
+    Raises:
+        BadInputError: A word is not of that form.
+    """
+    names: dict[str, str] = {}
+    for text in words:
+        left, sign, right = text.partition("=")
+        if not (left and sign and right):
+            raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
+        names[left] = right
+    return names
+
+
+def show(
+    page: Page, result: object, as_json: bool, footer: str = "", reader: Reader | None = None
+) -> int:
+    """Print a page, or the result that it was made from as JSON, and return the exit code.
+
+    Args:
+        page: The page.
+        result: What JSON shows.
+        as_json: Whether JSON is printed, and not the page.
+        footer: The last line of the page.
+        reader: Somebody at a terminal who answers the questions of the page.
+    """
+    if as_json:
+        from ..show.as_json import dumps
+
+        print(dumps(result))
+    else:
+        from ..show import terminal
+
+        terminal.show(page, footer, reader)
+    return 0 if page.holds else SAYS_NO

@@ -1,0 +1,184 @@
+"""The answers of `statemachine compare`: computed, written where that is asked for, shown."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import EndedEarlyError
+from ..common import TerminalReporter, complain, show
+from .options import check_options
+from .requests import explain_request_of, request_of, typed
+
+if TYPE_CHECKING:
+    from ...engines.pictures import Renderer
+    from ...lab.compare import Request
+    from ...lab.questions.requests.causes import ExplainRequest
+    from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.gap import CompareRequest, CompareResult
+    from ...lab.questions.requests.models import ModelsRequest
+    from ...lab.questions.requests.one_step import OneStepRequest
+    from ...lab.questions.requests.versions import VersionsRequest
+    from ...lab.questions.run_files import RunFiles, ShownModels
+
+    Question = (
+        CompareRequest
+        | ExplainRequest
+        | OneStepRequest
+        | ConvergeRequest
+        | VersionsRequest
+        | ModelsRequest
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare, and show."""
+    from ...lab.questions.requests.causes import ExplainRequest
+    from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.models import ModelsRequest
+    from ...lab.questions.requests.one_step import OneStepRequest
+    from ...lab.questions.requests.versions import VersionsRequest
+
+    check_options(options)
+    match request_of(options):
+        case ModelsRequest() as request:
+            return _run_models(options, request)
+        case OneStepRequest() as request:
+            return _run_one_step(options, request)
+        case ConvergeRequest() as request:
+            return _run_converge(options, request)
+        case VersionsRequest() as request:
+            return _run_versions(options, request)
+        case ExplainRequest() as request:
+            return _run_explain(options, request)
+        case request:
+            return _run_compare(options, request)
+
+
+def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
+    """Compare two files."""
+    from ...lab.model_differences import page as model_diff
+    from ...lab.questions.requests.models import answer
+
+    result = answer(request, TerminalReporter())
+    return show(model_diff.page(result, request.labels, options.all), result, options.json)
+
+
+def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
+    """Compare one step of both sides."""
+    from ...lab.compare.labels import numbered
+    from ...lab.questions import steps
+    from ...lab.questions.requests.one_step import answer
+
+    run = request.run
+    result = answer(request, TerminalReporter())
+    labels = run.backends
+    if run.sides:
+        labels = run.sides[0].label, run.sides[1].label
+    page = steps.one_step(result, numbered(labels), Path(run.what[0]).name)
+    return show(page, result, options.json)
+
+
+def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
+    """Run both sides with ever finer steps."""
+    from ...lab.questions import steps
+    from ...lab.questions.requests.converge import answer
+
+    result = answer(request, TerminalReporter())
+    page = steps.convergence(result, Path(request.run.what[0]).name)
+    return show(page, result, options.json)
+
+
+def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
+    """Compare each release with the next one."""
+    from ...lab.questions import steps
+    from ...lab.questions.requests.versions import answer
+    from ...lab.questions.run_files import write_tests
+    from ...show.charts import write_pictures
+
+    _files_of(options).check(TerminalReporter())
+    comparisons = answer(request, TerminalReporter())
+    if options.junit is not None:
+        write_tests(options.junit, comparisons)
+    page = steps.versions(comparisons, request.run)
+    if options.plot is not None:
+        write_pictures(page.blocks, options.plot)
+    return show(page, comparisons, options.json)
+
+
+def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
+    """Explain the gap; of runs that end early, say what there is until then, and no cause."""
+    from ...lab.questions.requests.causes import answer
+    from ...lab.questions.requests.gap import CompareRequest
+    from ...lab.why import page as why
+
+    try:
+        result = answer(request, TerminalReporter())
+    except EndedEarlyError as error:
+        until_then = CompareRequest(request.run, uncertainty=request.uncertainty)
+        return _run_compare(options, until_then, f"No cause is named: {error}.")
+    lines = [*request.run.taken]
+    if request.run.is_traces:
+        lines.append(why.PLAYED)
+    return show(why.page(result, lines), result, options.json)
+
+
+def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause: str = "") -> int:
+    """Compare both runs, write what is asked for, and show."""
+    from ...lab.questions import comparison
+    from ...lab.questions.requests.gap import answer
+    from ...lab.questions.run_files import find_renderer, write_page, write_tests
+
+    reporter = TerminalReporter()
+    files = _files_of(options)
+    files.check(reporter)
+    renderer = None if files.film is None else find_renderer(reporter)
+    asked = None
+    if files.html is not None and not options.no_why:
+        asked = explain_request_of(options, request.run)
+    result = answer(request, reporter)
+    if files.html is None:
+        page = comparison.page(result, no_cause)
+    else:
+        page = comparison.whole_page(result, asked, typed(options, request.run), reporter)
+        line = write_page(files.html, result.run.traces, _shown(request.run), page)
+        print(line, file=sys.stderr)
+    if files.junit is not None:
+        write_tests(files.junit, [result.comparison])
+    if options.json:
+        for line in (*result.run.unmatched, *result.run.said):
+            complain(line, 0)
+    code = show(page, result.figures(), options.json)
+    _write_pictures(files, result, renderer)
+    return code
+
+
+def _files_of(options: argparse.Namespace) -> RunFiles:
+    """Return the files that are to be written."""
+    from ...lab.questions.run_files import RunFiles
+
+    html = None if options.html is None else Path(options.html)
+    return RunFiles(html=html, junit=options.junit, plot=options.plot, film=options.film)
+
+
+def _shown(run: Request) -> ShownModels:
+    """Return what both runs are drawn with."""
+    from ...lab.questions.run_files import ShownModels
+
+    if run.sides:
+        return ShownModels([side.path for side in run.sides], run.menagerie, own_names=True)
+    return ShownModels([run.model, run.model], run.menagerie)
+
+
+def _write_pictures(files: RunFiles, result: CompareResult, renderer: Renderer | None) -> None:
+    """Write the figure and the film that are asked for."""
+    from ...lab.questions.run_files import write_figure, write_film
+
+    reporter, traces = TerminalReporter(), result.run.traces
+    if files.plot is not None:
+        write_figure(files.plot, traces, result.comparison, result.floor, reporter)
+    if files.film is not None and renderer is not None:
+        shown = _shown(result.request.run)
+        write_film(files.film, traces, shown, renderer, result.comparison, reporter)

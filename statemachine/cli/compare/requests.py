@@ -1,0 +1,285 @@
+"""What was typed behind `statemachine compare`, as a Request: one for each question."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import BadInputError
+from ...installed import PAIR
+from ..common import EXPERIMENTS, PROGRAM, flag_of, pairs_of
+from .options import PARTS, refuse_options
+
+if TYPE_CHECKING:
+    from ...interface.options import OptionValue
+    from ...lab.compare import Request, Side
+    from ...lab.compare.perturbed import Uncertainty
+    from ...lab.questions.requests.causes import ExplainRequest
+    from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.gap import CompareRequest
+    from ...lab.questions.requests.models import ModelsRequest
+    from ...lab.questions.requests.one_step import OneStepRequest
+    from ...lab.questions.requests.versions import VersionsRequest
+
+    Question = (
+        CompareRequest
+        | ExplainRequest
+        | OneStepRequest
+        | ConvergeRequest
+        | VersionsRequest
+        | ModelsRequest
+    )
+
+
+def request_of(options: argparse.Namespace) -> Question:
+    """Return what was asked for.
+
+    Raises:
+        BadInputError: What is typed contradicts itself, or is out of range.
+        UnknownNameError: There is no such experiment, model, backend or kind of quantity.
+    """
+    from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.gap import CompareRequest
+    from ...lab.questions.requests.one_step import OneStepRequest
+    from ...lab.questions.requests.versions import VersionsRequest
+    from ...measures import parse_tolerances
+
+    if options.models is not None:
+        return _models_request_of(options)
+    if not options.what:
+        raise BadInputError(
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
+            f"{PROGRAM} compare hold"
+        )
+    run = run_of(options)
+    if options.one_step:
+        return OneStepRequest(run)
+    if options.converge:
+        return ConvergeRequest(run)
+    tolerances = parse_tolerances(options.tolerance)
+    if options.versions is not None:
+        return VersionsRequest(run, options.versions, options.bisect, tolerances)
+    if options.why and options.html is None:
+        return explain_request_of(options, run)
+    if run.is_traces and len(run.what) == 2:
+        refuse_options(
+            options, ["backend"], "{} is of a run, and two traces are runs that were made"
+        )
+    return CompareRequest(run, tolerances, _uncertainty(options))
+
+
+def _uncertainty(options: argparse.Namespace) -> Uncertainty | None:
+    """Return how uncertain the start is; None where no chaos floor is asked for."""
+    from ...lab.compare.perturbed import parse_uncertainty
+
+    return None if options.no_chaos else parse_uncertainty(options.uncertainty)
+
+
+def explain_request_of(options: argparse.Namespace, run: Request) -> ExplainRequest:
+    """Return what is asked of causes, with --why or on a page."""
+    from ...lab.questions.requests.causes import ExplainRequest
+
+    return ExplainRequest(
+        run,
+        quantity=options.quantity,
+        measure=options.measure or "worst",
+        finer=options.finer,
+        budget=200 if options.budget is None else options.budget,
+        uncertainty=_uncertainty(options),
+        jobs=options.jobs,
+    )
+
+
+def run_of(options: argparse.Namespace) -> Request:
+    """Return what is run on two sides, or which traces are opened."""
+    from ...lab.compare import Request, split_words
+
+    what, sides = split_words(options.what, options.menagerie)
+    common: dict[str, OptionValue] = {}
+    if options.timestep is not None:
+        common["timestep"] = options.timestep
+    model = None
+    if len(sides) == 1:  # of both engines
+        model = sides[0].file
+        common |= sides[0].options
+        sides = ()
+    _check_options_of_run(options, what, sides)
+    names = pairs_of(options.map, "--map")
+    if sides:
+        sides = _with_parts(options, sides[0], sides[1], names)
+    every = 1 if options.every is None else options.every
+    return Request(
+        what=what,
+        backends=_backends(options, what),
+        model=model,
+        menagerie=options.menagerie,
+        seconds=options.seconds,
+        seed=options.seed,
+        options=common,
+        sides=sides,
+        names=names,
+        every=every,
+        keyframe=options.keyframe,
+    )
+
+
+def _check_options_of_run(
+    options: argparse.Namespace, what: Sequence[str], sides: Sequence[Side]
+) -> None:
+    """Check that an option of a run has a meaning for what is run.
+
+    Raises:
+        BadInputError: It has none.
+    """
+    from ...lab.runs.controllers import is_function
+
+    if sides:
+        text = "{} goes without sides: each side names its engine: FILE@ENGINE"
+        refuse_options(options, ["backend"], text)
+    else:
+        refuse_options(
+            options, ("map", *PARTS), f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT"
+        )
+    if not (len(what) == 1 and is_function(what[0])):
+        refuse_options(options, ["every"], "{} goes with FILE.py:FUNCTION")
+    if options.every is not None and options.every < 1:
+        raise BadInputError(f"--every wants a number of steps, at least 1; got {options.every}")
+
+
+def _with_parts(
+    options: argparse.Namespace, left: Side, right: Side, names: dict[str, str]
+) -> tuple[Side, Side]:
+    """Return two sides, each with the parts that it has of the other."""
+    of_left = [part for part in PARTS if getattr(options, part) == "left"]
+    of_right = [part for part in PARTS if getattr(options, part) == "right"]
+    back = {there: here for here, there in names.items()}
+    return left.taking(of_right, right, back), right.taking(of_left, left, names)
+
+
+def _backends(options: argparse.Namespace, what: Sequence[str]) -> tuple[str, str]:
+    """Return the two backends; one that is named is where a trace is played.
+
+    Raises:
+        BadInputError: There are not two.
+        UnknownNameError: There is no such backend.
+    """
+    from ...backends.chosen import chosen_backends
+    from ...lab.compare.sides import is_trace
+
+    if not options.backend:
+        return PAIR
+    chosen = [str(backend) for backend in chosen_backends(options.backend)]
+    if len(chosen) == 1 and len(what) == 1 and is_trace(what[0]):
+        return chosen[0], chosen[0]
+    if len(chosen) != 2:
+        raise BadInputError(
+            "compare takes two engines, as in --backend mujoco --backend pybullet:engine; "
+            f"got {' and '.join(chosen)}"
+        )
+    return chosen[0], chosen[1]
+
+
+def _models_request_of(options: argparse.Namespace) -> ModelsRequest:
+    """Return which files are compared."""
+    from ...backends.chosen import chosen_backends
+    from ...lab.compare.sides import parse_sides
+    from ...lab.questions.requests.models import ModelsRequest
+
+    _check_words_of_models(options)
+    words = [*options.what, *options.models]
+    sides = [side for word in words for side in parse_sides([word], options.menagerie)]
+    # The file itself, unless an engine is named.
+    engines = [None if s.file == word else s.engine for s, word in zip(sides, words, strict=True)]
+    if options.backend and any(engines):
+        raise BadInputError("--backend and FILE@ENGINE say the same: give one of them")
+    if any(side.options for side in sides):
+        raise BadInputError("--models compares what the files say, without options of a run")
+    files = [side.file for side in sides]
+    if options.backend:
+        engines = [backend.name for backend in chosen_backends(options.backend)]
+        if len(files) == 1:
+            files *= 2
+    if len(files) != 2 or len(engines) != 2:
+        raise BadInputError(
+            f"--models wants two models, or one and --backend A --backend B; got {len(words)}"
+        )
+    return ModelsRequest(
+        files=(files[0], files[1]),
+        engines=(engines[0], engines[1]),
+        frames=pairs_of(options.frame, "--frame"),
+        names=pairs_of(options.map, "--map"),
+        seed=options.seed,
+        menagerie=options.menagerie,
+    )
+
+
+def _check_words_of_models(options: argparse.Namespace) -> None:
+    """Check that nothing is named that is run.
+
+    Raises:
+        BadInputError: Something is.
+    """
+    from ...lab.compare.sides import is_trace
+    from ...lab.runs.controllers import is_function
+    from ...lab.runs.scenarios import SCENARIOS
+
+    for word in options.what:
+        if word in SCENARIOS or is_trace(word) or is_function(word):
+            others = " ".join(options.what[1:]) or "LEFT RIGHT"
+            run = " ".join([*options.what, *options.models])
+            raise BadInputError(
+                f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
+                f"{others}; to run something, type {PROGRAM} compare {run}"
+            )
+
+
+def typed(options: argparse.Namespace, run: Request) -> str:
+    """Return the command that makes a page again, without folders of this machine."""
+    from ...lab.compare.labels import typed_option
+    from ...measures.text import command
+
+    words = [PROGRAM, "compare", *run.words, *(side.label for side in run.sides)]
+    for name, value in run.options.items():
+        if name != "timestep":
+            words.append(typed_option(name, value))
+    if not run.sides and tuple(run.backends) != PAIR:
+        for backend in run.backends:
+            words += ["--backend", backend]
+    return command(words, *_typed_of_run(run), *_typed_of_page(options, run))
+
+
+# A flag, its value, and the value that needs no flag.
+Flag = tuple[str, object, object]
+
+
+def _typed_of_run(run: Request) -> list[Flag]:
+    """Return the options that say how something is run."""
+    menagerie = None if run.menagerie is None else "DIR"
+    return [
+        ("--menagerie", menagerie, None),
+        ("--seconds", run.seconds, None),
+        ("--timestep", run.options.get("timestep"), None),
+        ("--seed", run.seed, 0),
+        ("--every", run.every, 1),
+        ("--keyframe", run.keyframe, None),
+    ]
+
+
+def _typed_of_page(options: argparse.Namespace, run: Request) -> list[Flag]:
+    """Return the options that say how two runs are compared, and what is written."""
+    flags: list[Flag] = []
+    for left, right in run.names.items():
+        flags.append(("--map", f"{left}={right}", None))
+    for text in options.tolerance:
+        flags.append(("--tolerance", text, None))
+    for part in PARTS:
+        flags.append((flag_of(part), getattr(options, part), None))
+    for text in options.uncertainty:
+        flags.append(("--uncertainty", text, None))
+    flags.append(("--no-chaos", options.no_chaos, False))
+    flags.append(("--quantity", options.quantity or None, None))
+    flags.append(("--no-why", options.no_why, False))
+    flags.append(("--html", Path(options.html).name, None))
+    return flags

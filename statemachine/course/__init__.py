@@ -1,0 +1,1 @@
+"""The course: its lessons, and how a student's work is graded."""

@@ -1,0 +1,46 @@
+"""Exercises judged by what they do: `statemachine check`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ...errors import BadInputError
+from ...models import check_is_file
+
+# A student's predictions, as `statemachine lesson --record FILE` keeps them.
+
+KIND = "statemachine predictions"
+
+
+def answers_in(file: Path) -> dict[str, dict[str, Any]]:
+    """The first answer to each question, by lesson and question.
+
+    Raises:
+        BadInputError: The file is no such record.
+    """
+    check_is_file(file)
+    try:
+        record = json.loads(file.read_text(encoding="utf-8"))
+        if record["kind"] != KIND:
+            raise ValueError("another kind of file")
+        answers = {
+            f"{answer['lesson']}: {answer['question']}": answer for answer in record["answers"]
+        }
+        if not all(isinstance(answer["right"], bool) for answer in answers.values()):
+            raise ValueError("an answer is neither right nor wrong")
+    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+        raise BadInputError(
+            f"{file.name} is there and is not a record of predictions ({error}): name another file"
+        ) from None
+    return answers
+
+
+def score(file: Path) -> str:
+    """How many predictions were right, of how many."""
+    try:
+        answers = answers_in(file).values()
+    except BadInputError:
+        return f"{file.name} is not a record of predictions"
+    return f"{sum(answer['right'] for answer in answers)} of {len(answers)}"

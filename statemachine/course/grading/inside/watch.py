@@ -1,0 +1,242 @@
+"""See what a student's function does to a simulation, through the interface or past it.
+
+A *run* is what an engine did without anybody touching qpos, qvel or time in between: so it
+begins at a fresh Data, a reset to whatever state, or a write, however that was made.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from ....engines import room
+from ....errors import ClosedDataError
+from ....installed import require
+from ....interface import INPUTS, Array, Data, Model
+
+_MOST = 1000  # runs, forwards and Data that are noted
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The inputs of a Data at some moment: (nq,), (nv,), (nu,), and its time [s].
+
+    Attributes:
+        data: The number of the Data, in the order in which they were met.
+    """
+
+    data: int
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+    time: float
+
+
+@dataclass
+class EngineRun:
+    """One run, from its first step on.
+
+    Attributes:
+        own: Whether it is on a Data of the Model that the function got, or of a variant of it.
+        start: Where it began.
+        end: Where it is after the last step.
+        nstep: How many steps it took.
+        ctrl_changed: After how many steps ctrl was another; None if it never was.
+    """
+
+    own: bool
+    start: Inputs
+    end: Inputs
+    nstep: int = 0
+    ctrl_changed: int | None = None
+
+
+@dataclass(frozen=True)
+class Nudge:
+    """Push to the state at the end of a run, by the smallest amount there is.
+
+    Attributes:
+        place: Entry of qpos that becomes the next double.
+        towards: In which direction, infinite [rad or m].
+        after: How many steps a run must have for it.
+    """
+
+    place: int
+    towards: float
+    after: int
+
+
+def inputs_of(number: int, data: Any) -> Inputs:
+    """What they are now of a Data, or of the engine's own, of this number."""
+    qpos, qvel, ctrl = (np.array(getattr(data, name)) for name in INPUTS)
+    time = math.nan
+    with suppress(ClosedDataError):  # of which the inputs alone are told
+        time = float(data.time)
+    return Inputs(number, qpos, qvel, ctrl, time)
+
+
+def _is_same_state(one: Inputs, two: Inputs) -> bool:
+    """Return whether time, qpos and qvel are equal."""
+    return bool(
+        one.time == two.time and (one.qpos == two.qpos).all() and (one.qvel == two.qvel).all()
+    )
+
+
+class StudentWatch:
+    """Record of what was done while a function ran.
+
+    Attributes:
+        runs: In the order in which they began.
+        forwards: What the inputs were when derived values were recomputed, in order.
+        datas: Every Data that was used, or the engine's own, in order.
+    """
+
+    def __init__(self, model: Model, nudge: Nudge | None) -> None:
+        """Watch what is done with `model`; every run but the first is pushed by `nudge`.
+
+        So that an engine that repeats itself to the bit does not.
+
+        Args:
+            model: What the function got.
+            nudge: Of every run but the first; None for none.
+        """
+        self.runs: list[EngineRun] = []
+        self.forwards: list[Inputs] = []
+        self.datas: list[Any] = []
+        self._room = room(model.backend)
+        self._origin = self._origin_of(model.raw if self._room.can("origin") else model)
+        self._nudge = nudge
+        self._current: dict[int, EngineRun] = {}
+
+    def meet(self, data: Any) -> int:
+        """The number of a Data; the engine's own object behind a known one is no other.
+
+        Raises:
+            RuntimeError: There are too many.
+        """
+        for number, known in enumerate(self.datas):
+            if data is known or data is getattr(known, "_raw", None):
+                return number
+        if len(self.datas) == _MOST:
+            raise RuntimeError(f"more than {_MOST} Data, which no exercise needs")
+        self.datas.append(data)
+        return len(self.datas) - 1
+
+    def recomputed(self, data: Any) -> None:
+        """Note that what is derived was."""
+        if len(self.forwards) < _MOST:
+            self.forwards.append(inputs_of(self.meet(data), data))
+
+    def step(self, model: Any, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
+        """Let `advance` move `data`, and note where from and where to."""
+        now = inputs_of(self.meet(data), data)
+        run = self._current.get(now.data)
+        if run is None or not _is_same_state(now, run.end):  # somebody touched the state
+            run = EngineRun(self._origin_of(model) == self._origin, now, now)
+            if len(self.runs) < _MOST:
+                self.runs.append(run)
+            self._current[now.data] = run
+        elif run.ctrl_changed is None and (now.ctrl != run.start.ctrl).any():
+            run.ctrl_changed = run.nstep
+        result = advance()
+        run.nstep += nstep
+        if self._nudge and run is not self.runs[0] and run.nstep >= self._nudge.after:
+            place = self._nudge.place
+            data.qpos[place] = np.nextafter(data.qpos[place], self._nudge.towards)
+        run.end = inputs_of(now.data, data)
+        return result
+
+    def _origin_of(self, model: Any) -> object:
+        """What a Model and its variants have in common, and the engine's own with its copies."""
+        if isinstance(model, Model) or not self._room.can("origin"):
+            return model.path
+        return self._room.origin(model)
+
+
+_watch: StudentWatch | None = None
+
+
+@contextmanager
+def watching(model: Model, nudge: Nudge | None = None) -> Iterator[StudentWatch]:
+    """Note what happens meanwhile, where `engine_watched` holds."""
+    global _watch  # noqa: PLW0603  (the engine's functions are the process's too)
+    _watch = StudentWatch(model, nudge)
+    try:
+        yield _watch
+    finally:
+        _watch = None
+
+
+@contextmanager
+def engine_watched(backend: str) -> Iterator[None]:
+    """Every Data made from now on is seen, and the engine's own functions that its room names.
+
+    Before a student's file can import them.
+    """
+    with ExitStack() as stack:
+        own = room(backend)
+        for name in own.steps:
+            stack.enter_context(_replaced(require(backend), name, _seen_step))
+        for name in own.forwards:
+            stack.enter_context(_replaced(require(backend), name, _seen_forward))
+        watched = own.watched_data()
+        for kind in Data.__subclasses__():
+            if kind is not watched:
+                stack.enter_context(_replaced(kind, "_recompute", _seen_forward))
+        telling = backend if watched else None
+        stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, telling)))
+        yield
+
+
+def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> AbstractContextManager[Any]:
+    return mock.patch.object(owner, name, seen(vars(owner)[name]))
+
+
+def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[..., None]:
+    """`Data.__init__`; of the steps on a backend that is `telling` its own functions tell."""
+
+    @functools.wraps(original)
+    def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
+        if model.backend != telling:
+            advance = _seen_step(advance, (model, data))
+        original(data, model, advance, *more)
+        if _watch is not None:
+            _watch.meet(data)
+
+    return seen
+
+
+def _seen_step(
+    original: Callable[..., Any], of: tuple[Any, Any] | None = None
+) -> Callable[..., Any]:
+    """What steps the engine's own model and data, or with these a Model and a Data: `of`."""
+
+    @functools.wraps(original)
+    def seen(m: Any, d: Any, nstep: int = 1) -> Any:
+        arguments = (m, d) if nstep == 1 else (m, d, nstep)
+        if _watch is None:
+            return original(*arguments)
+        model, data = (m, d) if of is None else of
+        return _watch.step(model, data, functools.partial(original, *arguments), nstep)
+
+    return seen
+
+
+def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
+    """What recomputes what is derived of a Data, or of the engine's own, its last argument."""
+
+    @functools.wraps(original)
+    def seen(*arguments: Any, **named: Any) -> Any:
+        result = original(*arguments, **named)
+        if _watch is not None:
+            _watch.recomputed(named["d"] if "d" in named else arguments[-1])
+        return result
+
+    return seen

@@ -1,0 +1,372 @@
+"""What a function of a student's file did, recorded by a process of its own."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import os
+import re
+import secrets
+import stat
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ...errors import BadInputError
+from ...processes import ALONE, sandbox
+from ...processes.places import python_path
+from .inside.answers import Answer, decode
+from .inside.calls import FaultError
+from .judges import JUDGES
+from .links import leads_out, links_out, refusal_of
+from .shown import modules_of, view_of
+
+START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
+_MEMORY_MOST = 2 * sandbox.GB
+_RECORD_MOST = 40_000_000  # bytes
+_TEXT_MOST = 2000  # characters
+_PACKAGES = Path(__file__).resolve().parents[2]
+_CHILD = (
+    "import sys; sys.path.insert(0, sys.argv[2]); "
+    "from statemachine.course.grading.inside.child import main; main(sys.argv[1])"
+)
+# What a program needs to start; the rest does not concern a student.
+_KEPT = (
+    "SYSTEMROOT", "LANG", "LC_ALL",
+    "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME", "CONDA_PREFIX",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TimeLimits:
+    """What a function may take, from when its worlds are ready.
+
+    Attributes:
+        cpu: What it may compute [s].
+        wall: What it may take on the clock [s].
+    """
+
+    cpu: float
+    wall: float
+
+
+@dataclass
+class FunctionRecording:
+    """What a process left behind, which the student's code may have had a hand in.
+
+    Attributes:
+        outcome: How it ended.
+        began: Whether it came as far as the student's code.
+        refusal: The kind of an error, and what it said, where there is no engine.
+        answers: What came of the function, world after world, as far as it came.
+        forbidden: What the student's code tried and may not do.
+        reads: Names of the files that it opened and that are not its own; see `guard.Guard`.
+        trace: What its fault handler wrote.
+        broken: Why the record is invalid, if it is.
+    """
+
+    outcome: sandbox.ProcessOutcome
+    trace: str
+    began: bool = False
+    refusal: tuple[str, str] | None = None
+    answers: list[Answer | FaultError] = field(default_factory=list)
+    forbidden: list[str] = field(default_factory=list)
+    reads: list[str] = field(default_factory=list)
+    broken: str = ""
+
+
+def record(
+    path: Path,
+    own: Path,
+    name: str,
+    backend: str,
+    limits: TimeLimits,
+    folder: Path,
+    stop: threading.Event,
+) -> FunctionRecording:
+    """Run a function of a file on its worlds.
+
+    Args:
+        path: The file.
+        own: The folder of all files that belong to it.
+        name: Of the function.
+        backend: Of the backend.
+        limits: What it may take.
+        folder: A new one for what it writes.
+        stop: Ends it.
+    """
+    scratch = folder / "scratch"  # where the student's code runs
+    scratch.mkdir(parents=True)
+    nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
+    job = folder / "job"
+    facts = {
+        "file": str(path),
+        "own": str(own),
+        "function": name,
+        "backend": backend,
+        "cpu": limits.cpu,
+        "answers": str(answers),
+        "trace": str(trace),
+        "nonce": nonce,
+        "alone": not sandbox.shut_in(),
+    }
+    job.write_text(json.dumps(facts), encoding="utf-8")
+    command = [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)]
+
+    def has_begun() -> bool:
+        return bool(content(answers, 1))
+
+    outcome = sandbox.run(
+        command,
+        sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
+        started=has_begun,
+        cwd=scratch,
+        env=environment(backend),
+        writable=folder,
+        view=view_of(backend, [own]),
+        stop=stop,
+    )
+    recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
+    try:
+        for line in content(answers, _RECORD_MOST).splitlines():
+            _add(recording, line, nonce)
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        recording.broken = f"{type(error).__name__}: {error}"[:_TEXT_MOST]
+    is_empty = not (recording.began or recording.refusal)
+    if outcome.started and is_empty and not recording.broken:
+        recording.broken = "it is gone"
+    return recording
+
+
+def environment(backend: str) -> dict[str, str]:
+    """Return the environment of a student's process: of ours what a program needs to start.
+
+    Where it is shut in, it is told of no folder that it is not shown.
+    """
+    names = _KEPT if sandbox.shut_in() else (*_KEPT, "PATH", "PYTHONPATH")
+    kept = {name: os.environ[name] for name in names if name in os.environ}
+    if sandbox.shut_in():
+        kept["PATH"] = os.defpath
+        kept["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
+    return {**kept, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
+    """Take a line; one without the number is what somebody else wrote, and none.
+
+    Raises:
+        ValueError, KeyError, TypeError, RecursionError: It is not a line of a record.
+    """
+    if nonce.encode() not in line[:100]:
+        return
+    facts = json.loads(line)
+    if not isinstance(facts, dict) or facts.get("nonce") != nonce:
+        return
+    match facts["stage"]:
+        case "refused" if not recording.began:
+            recording.refusal = _text(facts["kind"]), _text(facts["text"])
+        case "running" if not recording.began:
+            recording.began = True
+        case "forbidden" | "reads" as kind if recording.began:
+            getattr(recording, kind).append(_text(facts["text"]))
+        case "answer" if recording.began:
+            recording.answers.append(decode(facts["answer"]))
+        case "fault" if recording.began:
+            recording.answers.append(FaultError(_text(facts["text"]), facts["written"] is True))
+        case _:
+            raise ValueError("a line in the wrong place")
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError("no text")
+    return " ".join(value.split())[:_TEXT_MOST]
+
+
+def content(file: Path, most: int) -> bytes:
+    """Return the first bytes of a file; of what is not a plain file (a link, a pipe), none."""
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    try:
+        with open(os.open(file, flags | getattr(os, "O_BINARY", 0)), "rb") as opened:
+            plain = stat.S_ISREG(os.fstat(opened.fileno()).st_mode)
+            return opened.read(most) if plain else b""
+    except OSError:
+        return b""
+
+
+# The files of a student's submission: which are its own, which hold functions, which are alike.
+
+LARGEST = 1_000_000  # bytes of a student's file
+_MOST = 1000  # files of a student's folder
+_NAMES = "|".join(JUDGES).encode()
+_DEFINES = re.compile(rb"\bdef\s+(?:%s)\s*\(" % _NAMES)
+_COMPILED = re.compile(rb"\b(?:%s)\b" % _NAMES)
+_RUN = 4  # kinds of syntax in a row that are compared
+
+
+def has_functions(file: Path) -> bool:
+    """Return whether a file defines a function of the exercise, or is compiled from such a one."""
+    pattern = _COMPILED if file.suffix == ".pyc" else _DEFINES
+    return pattern.search(start_of(file)) is not None
+
+
+def has_solutions(file: Path) -> bool:
+    """Return whether any of the functions in a file may be written."""
+    return has_functions(file) and start_of(file).count(b"NotImplementedError(") < len(JUDGES)
+
+
+def start_of(file: Path) -> bytes:
+    """Return as much of a file as is looked at; a pipe would wait for somebody to write."""
+    return content(Path(os.path.realpath(file)), LARGEST + 1)
+
+
+def in_folder(folder: Path) -> dict[str, Path]:
+    """Return all that one student handed in, by name within the folder; not what tools left there.
+
+    A link that leads out of the folder is no part of it.
+    """
+    found = {}
+    for file in sorted(_walked(folder)):
+        outside = file.is_symlink() and leads_out(file, folder)
+        if not outside and file.is_file() and file.stat().st_size <= LARGEST:
+            found[file.relative_to(folder).as_posix()] = file
+            if len(found) == _MOST:
+                break
+    return found
+
+
+def refused_links(folder: Path) -> str:
+    """Return why a folder is refused for a link in it that leads out; "" where there is none."""
+    for link in sorted(links_out(folder, _walked(folder, folders_too=True))):
+        return refusal_of(link, link.relative_to(folder).as_posix())
+    return ""
+
+
+def _walked(folder: Path, folders_too: bool = False) -> Iterator[Path]:
+    """Give what is in a folder and its folders, less what tools leave; links are not followed."""
+    for place, folders, names in os.walk(folder):
+        if "pyvenv.cfg" in names:  # an environment
+            folders[:] = []
+            continue
+        folders[:] = [name for name in folders if not name.startswith((".", "__pycache__"))]
+        visible = [name for name in names if not name.startswith(".")]
+        if folders_too:
+            visible += folders
+        for name in visible:
+            yield Path(place, name)
+
+
+def named_by(file: Path, somebody_elses: Callable[[Path], bool] | None = None) -> dict[str, Path]:
+    """Return a file and what it names beside it, but for what is somebody else's.
+
+    Args:
+        file: The student's.
+        somebody_elses: Tells that; without, a file is that holds functions of the exercise.
+
+    Raises:
+        BadInputError: It names a link that leads out of the folder.
+    """
+    is_others = somebody_elses or has_solutions
+    own, waiting = {file.name: file}, [file]
+    beside = [entry for entry in file.parent.iterdir() if not entry.name.startswith(".")]
+    while waiting:
+        words = set(re.findall(r"\w+", start_of(waiting.pop()).decode("utf-8", "replace")))
+        for entry in (entry for entry in beside if entry.stem in words):
+            is_package = (entry / "__init__.py").is_file()
+            if entry != file and entry.is_symlink() and leads_out(entry, file.parent):
+                if is_package or entry.is_file():
+                    raise BadInputError(refusal_of(entry, entry.name))
+                continue
+            package = in_folder(entry) if is_package else {}
+            if package and (refusal := refused_links(entry)):
+                raise BadInputError(refusal)
+            files = {f"{entry.name}/{name}": inside for name, inside in package.items()}
+            for name, other in (files or {entry.name: entry}).items():
+                fits = other.is_file() and other.stat().st_size <= LARGEST
+                if name not in own and fits and not is_others(other):
+                    own[name] = other
+                    waiting.append(other)
+    return own
+
+
+def copied_to(folder: Path, file: Path, own: Mapping[str, Path]) -> Path:
+    """Copy a student's file and what belongs to it into a folder; return the copy of the file.
+
+    Args:
+        folder: A new one.
+        file: The student's.
+        own: All files that belong to it, by their names in the folder.
+    """
+    real = file.resolve()
+    names = [name for name, each in own.items() if each.resolve() == real]
+    if not names:  # a hidden file, or one of very many
+        names, own = [file.name], {file.name: file}
+    for name, each in own.items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(start_of(each))
+    return folder / min(names, key=lambda name: own[name].is_symlink())  # not a link to it
+
+
+def digest(files: Mapping[str, Path]) -> str:
+    """Return a digest of names and contents; "" for no file, or where one is too large."""
+    sha = hashlib.sha256()
+    for name, file in files.items():
+        text, start = os.fsencode(name), start_of(file)
+        if len(start) > LARGEST:
+            return ""
+        sha.update(b"%d %d " % (len(text), len(start)) + text + start)
+    return sha.hexdigest() if files else ""
+
+
+def code_of(path: Path | None) -> str:
+    """Return a digest of a file's code, without comments, docstrings and layout; or ""."""
+    tree = _tree(path)
+    return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest() if tree.body else ""
+
+
+def shape_of(path: Path | None) -> Counter[tuple[str, ...]]:
+    """Return the kinds of syntax in a file's functions, in short runs, whatever is named how.
+
+    Of those that are judged and are written, and of what they call in the file.
+    """
+    defined = {
+        node.name: node
+        for node in _tree(path).body
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+        and "'NotImplementedError'" not in ast.dump(node)
+    }
+    names = [name for name in JUDGES if name in defined]
+    for name in names:  # which grows meanwhile
+        for inner in ast.walk(defined[name]):
+            if isinstance(inner, ast.Name) and inner.id in defined and inner.id not in names:
+                names.append(inner.id)
+    text = "".join(ast.dump(defined[name]) for name in names)
+    kinds = re.findall(r"\b[A-Z]\w+(?=\()", text)
+    return Counter(zip(*(kinds[k:] for k in range(_RUN)), strict=False))
+
+
+def likeness(left: Counter[tuple[str, ...]], right: Counter[tuple[str, ...]]) -> float:
+    """Return the part of both that both have: 1 for the same, 0 where there is nothing."""
+    total = (left | right).total()
+    return (left & right).total() / total if total else 0.0
+
+
+def _tree(path: Path | None) -> ast.Module:
+    """Return a file's syntax without docstrings; empty for none, or where it is too large."""
+    text = start_of(path) if path is not None else b""
+    try:
+        tree = ast.parse(text if len(text) <= LARGEST else b"")
+        for node in ast.walk(tree):
+            if not isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)):
+                continue
+            if ast.get_docstring(node, clean=False) is not None:
+                node.body = node.body[1:] or [ast.Pass()]
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return ast.Module([], [])
+    return tree

@@ -1,0 +1,264 @@
+"""Stored, derived: what forward recomputes, and when the fingertip notices a write."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...interface import Array, Model
+from ...interface.checks import as_scalar
+from ...lab.runs.drive import Progress, steps_in
+from ...lab.runs.provenance import Provenance, provenance
+from ...lab.runs.readings import tips_of, usual_tip
+from ...measures import largest
+from ...measures.text import count, millimetres, short_time, vector
+from ...show.blocks import Block, Table
+from ...show.lesson_template import Blocks, Results, differences, emulated
+from ._robot import coordinate, with_joint
+from ._stages import (
+    ArrayChange,
+    Lag,
+    OwnAnswer,
+    change_tables,
+    changes_by_call,
+    lag_of_steps,
+    lag_tables,
+    own_answers,
+    own_tables,
+)
+from .session import CodeRun, Options
+
+_SECONDS = 2.0  # under a command, long enough to touch something
+_INSIDE = 1e-3  # metres; less is how engines press things together
+_Pairs = tuple[tuple[int, int], ...]
+_CHOICES: dict[_Pairs, int] = {((0, 1),): 0, ((1, 2),): 1, ((2, 3),): 2, ((1, 3),): 3}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The fingertip, read once.
+
+    Attributes:
+        after: What had been done before.
+        fingertip: (3,) its position [m].
+        time: Of the Data [s].
+    """
+
+    after: str
+    fingertip: Array
+    time: float
+
+
+@dataclass(frozen=True)
+class ForwardResult:
+    """Four readings of the fingertip around a write, and what else was asked for.
+
+    Attributes:
+        joint: The joint that was written.
+        site: What is read: the fingertip, or another site or body.
+        value: What was written [rad; of a slide or a height, m].
+        readings: Of the fingertip, at each print.
+        equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
+        moved: Distance that the write and the second `forward` moved it [m].
+        contacts: How many were found after the second `forward`.
+        deepest: How far the two surfaces of the worst of them are inside each other [m].
+        itself: What the engine does without us, where some of this is emulated.
+        changes: What each call changes, if that was asked for.
+        lag: Of which moment derived values are after a step, if that was asked for.
+        provenance: What it was computed with.
+    """
+
+    joint: str
+    site: str
+    value: float
+    readings: tuple[Reading, ...]
+    equal: _Pairs
+    moved: float
+    contacts: int
+    deepest: float
+    itself: tuple[OwnAnswer, ...]
+    changes: tuple[ArrayChange, ...]
+    lag: Lag | None
+    provenance: Provenance
+
+
+def fit(model: Model, options: Options) -> dict[str, Any]:
+    """Complete the options with a joint, a value in its range, and a place that it carries."""
+    values = with_joint(model, options)
+    if values["site"] is None:
+        values["site"] = usual_tip(model, values["joint"])
+    return values
+
+
+def code(model: Model, options: Options, load: str) -> str:
+    """Write the four readings."""
+    slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
+    tip = tips_of(model, options["site"])[0]
+    read = f"data.{tip.array}[tip]"
+    value = as_scalar(options["value"], "value")
+    return f"""\
+import statemachine as sm
+
+model = {load}
+tip = model.{tip.kind}_id({tip.name!r})
+slot = {slot}
+data = sm.make_data(model)
+print(1, {read}.round(4))
+sm.forward(model, data)
+print(2, {read}.round(4))
+data.qpos[slot] = {value}
+print(3, {read}.round(4))
+sm.forward(model, data)
+print(4, {read}.round(4))
+"""
+
+
+def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
+    """Read the fingertip at each print; then what else was asked for."""
+    model, joint, site, value = play.model, options["joint"], options["site"], options["value"]
+    place, tip = coordinate(model, joint).place, tips_of(model, site)[0]
+    steps = _steps(model, options)
+    actions = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
+    readings: list[Reading] = []
+    for source in play.lines():
+        if source.startswith("print("):
+            data = play.names["data"]
+            readings.append(Reading(actions[len(readings)], tip.read(data), data.time))
+    contacts = play.names["data"].contacts
+    deepest = max(0.0, -float(contacts.dist.min(initial=0.0)))
+    moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
+    itself: list[OwnAnswer] = []
+    changes: list[ArrayChange] = []
+    if options["arrays"]:
+        itself += own_answers(model, "write")
+        changes += changes_by_call(model, place, value)
+    if steps:
+        itself += own_answers(model, "step")
+    lag = lag_of_steps(model, tip, steps, progress) if steps else None
+    return ForwardResult(
+        joint=joint,
+        site=site,
+        value=value,
+        readings=tuple(readings),
+        equal=_equal_pairs(readings),
+        moved=moved,
+        contacts=len(contacts),
+        deepest=deepest,
+        itself=tuple(itself),
+        changes=tuple(changes),
+        lag=lag,
+        provenance=provenance(model),
+    )
+
+
+def _equal_pairs(readings: Sequence[Reading]) -> _Pairs:
+    """Return the pairs of readings that are equal bit by bit."""
+    pairs: list[tuple[int, int]] = []
+    for (i, one), (j, other) in itertools.combinations(enumerate(readings), 2):
+        if np.array_equal(one.fingertip, other.fingertip):
+            pairs.append((i, j))
+    return tuple(pairs)
+
+
+def _steps(model: Model, options: Options) -> int:
+    """Return over how many steps to look at the lag; 0 if it is not asked for."""
+    seconds = options["seconds"]
+    if seconds is None and options["lag"]:
+        seconds = _SECONDS
+    return 0 if seconds is None else steps_in(model, seconds)
+
+
+def slots(result: ForwardResult) -> dict[str, Any]:
+    """Fill the slots of the page."""
+    slots: dict[str, Any] = {}
+    slots["right"] = _CHOICES.get(result.equal)
+    slots["zero_at_first"] = not result.readings[0].fingertip.any()
+    slots["unchanged"] = (1, 2) in result.equal
+    slots["moved"] = millimetres(result.moved, 1)
+    slots["moves"] = result.moved > 0
+    slots["no_time_passed"] = len({reading.time for reading in result.readings}) == 1
+    slots["inside"] = result.deepest > _INSIDE
+    slots["contacts"] = count(result.contacts, "contact")
+    slots["deepest"] = millimetres(result.deepest, 1)
+    slots["emulated"] = emulated(
+        result, "zeros when fresh", "stale after a write", "stale after a step"
+    )
+    return slots | _slots_of_changes(result.changes) | _slots_of_lag(result.lag)
+
+
+def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
+    """Fill the slots about the arrays that each call changes."""
+    derived = [change for change in changes if not change.stored]
+    same = {change.name for change in derived if change.same}
+    return {
+        "arrays": len(changes) > 0,
+        "derived": len(derived),
+        "same": len(same),
+        "places_are_same": {"xpos", "xquat", "site_xpos", "site_xmat"} <= same,
+    }
+
+
+def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
+    """Fill the slots about what a step leaves behind."""
+    if lag is None:
+        return {"lag": False}
+    steps = len(lag.time)
+    worst, step = largest(lag.distance)
+    slots: dict[str, Any] = {"lag": True}
+    slots["lags"] = worst > 0 and not lag.neither
+    slots["steps"] = count(steps, "step")
+    slots["of_before"] = lag.of_before[lag.array] == steps > lag.of_after[lag.array]
+    slots["array"] = lag.array
+    slots["behind"] = millimetres(worst)
+    slots["behind_at"] = short_time(lag.time[step])
+    return slots
+
+
+def tables(results: Results[ForwardResult], first: ForwardResult) -> Blocks:
+    """Show the four readings; then what was asked for."""
+    answers = {name: result.itself for name, result in results.items()}
+    changes = {name: result.changes for name, result in results.items()}
+    lags = {name: result.lag for name, result in results.items() if result.lag is not None}
+    rows: dict[str, Callable[[ForwardResult, ForwardResult], str]] = {}
+    for k in range(len(first.readings)):
+        rows[f"{first.site}, reading {k + 1}"] = partial(_apart, k)
+    blocks: dict[str, Table | Sequence[Block]] = {}
+    blocks["readings"] = _readings(results, first)
+    blocks["differences"] = differences(results, rows)
+    blocks["changes"] = change_tables(changes) if first.changes else []
+    blocks["own_write"] = own_tables(answers, "write")
+    blocks["lag_tables"] = lag_tables(lags) if lags else []
+    blocks["own_step"] = own_tables(answers, "step")
+    return blocks
+
+
+def _readings(results: Results[ForwardResult], first: ForwardResult) -> Table:
+    """Show the four readings; those that are equal to another are set off."""
+    decimals = 3 if len(results) > 1 else 4  # so that two columns fit
+    rows: list[tuple[str, ...]] = []
+    for k, reading in enumerate(first.readings):
+        cells = [vector(each.readings[k].fingertip, decimals) for each in results.values()]
+        rows.append((str(k + 1), reading.after, *cells, f"{reading.time:g} s"))
+    equal: set[int] = set()
+    for result in results.values():
+        equal.update(*result.equal)
+    columns = [f"{name} [m]" for name in results]
+    return Table(
+        ("", "after", *columns, "data.time"),
+        rows,
+        title=f"{first.site}, read four times",
+        words=frozenset({0, 1}),
+        emphasis=frozenset(equal),
+    )
+
+
+def _apart(reading: int, left: ForwardResult, right: ForwardResult) -> str:
+    """Return how far a reading on one engine is from that on another."""
+    gap = math.dist(left.readings[reading].fingertip, right.readings[reading].fingertip)
+    return f"{gap:.1e} m"

@@ -1,0 +1,388 @@
+"""An untouched ctrl commands too; and who holds the arm up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...engines import room
+from ...errors import DivergedError, UnsupportedError
+from ...interface import Model, make_data, reset
+from ...lab.runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
+from ...lab.runs.provenance import Provenance, provenance
+from ...lab.runs.robot import carried_by_joint, is_the_arm, start_keyframe, touching
+from ...lab.runs.scenarios import SCENARIOS
+from ...measures.text import NONE, apart, position, signed
+from ...show.blocks import Block, Table, Traces
+from ...show.lesson_template import Blocks, Results, differences, emulated, largest_gap, where
+from ._falling import BALANCE, EQUALITY, SERVO, Droop, Forces, droop, milestones
+from ._robot import check_servos, coordinate, start_line, with_joint
+from .session import CodeRun, Options, stepping_loop
+
+if TYPE_CHECKING:
+    from ...engines.records import UncommandedJoint
+
+_OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
+# The first that is paid is taken; each is a row of the longer ones.
+_OPEN = {"seconds": (4.0, 2.0, 1.0), "longer": (100.0, 50.0, 20.0, 10.0, 4.0)}
+_PATIENCE = 15.0  # s by the clock
+_CREEP = 0.05  # of the way; a joint that goes on by more has not settled
+_FURTHER = 0.02  # rad or m; less is not worth a cause
+
+
+@dataclass(frozen=True)
+class GravityResult:
+    """A joint under gravity while nobody writes ctrl, with the servos on and off.
+
+    Attributes:
+        joint: The joint that was watched.
+        slide: Whether it is a slide, and no hinge.
+        unit: Of the forces on it: "N·m", or "N" of a slide.
+        servos_on: The run with the servos.
+        servos_off: The same run without them.
+        longer: The servos off for longer, with "contacts" and with "no contacts".
+        alone: The joint on the engine as it comes, where that differs from the contract.
+        provenance: What it was computed with.
+    """
+
+    joint: str
+    slide: bool
+    unit: str
+    servos_on: Droop
+    servos_off: Droop
+    longer: dict[str, Droop]
+    alone: tuple[UncommandedJoint, ...]
+    provenance: Provenance
+
+
+def fit(model: Model, options: Options) -> dict[str, Any]:
+    """Complete the options with a joint, and with times that a slow model can be run for."""
+    check_servos(model, "gravity", options["joint"])
+    values = with_joint(model, options, servos=True)
+    slow = 0.0
+    if None in (values["seconds"], values["longer"]) and not is_the_arm(model):
+        slow = cost_of_a_second(model)
+    for name, times in _OPEN.items():
+        if values[name] is None:
+            values[name] = _longest_paid(times, slow)
+    return values
+
+
+def _longest_paid(times: tuple[float, ...], slow: float) -> float:
+    """Return the first of some times [s] for which two runs are worth the wait, or the last.
+
+    Args:
+        times: Simulated times, the longest first.
+        slow: How long a second of simulated time takes by the clock [s].
+    """
+    for time in times:
+        if 2 * time * slow <= _PATIENCE:
+            return time
+    return times[-1]
+
+
+def code(model: Model, options: Options, load: str) -> str:
+    """Write the same seconds with the servos on and off; ctrl is never written."""
+    at = coordinate(model, options["joint"])
+    seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is not a time
+    loop, nstep = stepping_loop(model, milestones(seconds), options["seconds"])
+    if at.slide:
+        imports, shown = "", "(1000 * data.qpos[slot]).round(2)"
+    else:
+        imports, shown = "import numpy as np\n", "np.degrees(data.qpos[slot]).round(3)"
+    off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
+    start = start_line(model, "variant")
+    if start:
+        start += "    "
+    return f"""\
+{imports}import statemachine as sm
+
+model = {load}
+limp = model.replace({off})  # another Model: servos off
+slot = {at.slot}
+for variant in (model, limp):
+    data = sm.make_data(variant)
+    {start}{loop}
+        sm.step(variant, data, {nstep})
+        print({shown}, end="  ")
+    print()
+"""
+
+
+def run(play: CodeRun, options: Options, progress: Progress) -> GravityResult:
+    """Watch both runs; then the servos off for longer, with and without anything to touch."""
+    model, joint, seconds = play.model, options["joint"], options["seconds"]
+    variants = _longer_variants(model, options["longer"])
+    total = 2 * seconds + len(variants) * options["longer"]
+    at, bodies = coordinate(model, joint), carried_by_joint(model, joint)
+    courses = play.follow(
+        lambda model, data: touching(model, data.contacts, bodies),
+        2 * steps_in(model, seconds),
+        part_of(progress, 0, 2 * seconds / total),
+    )
+    droops: list[Droop] = []
+    for (_, data), course in zip(play.worlds, courses, strict=True):
+        path = np.array(course.qpos)[:, at.place]
+        touches = zip(course.time, course.looks, strict=False)
+        droops.append(droop(data, joint, seconds, course.ctrl, path, touches))
+    servos_on, servos_off = droops
+    longer: dict[str, Droop] = {}
+    for number, (name, variant) in enumerate(variants.items()):
+        start = 2 * seconds + number * options["longer"]
+        share = part_of(progress, start / total, options["longer"] / total)
+        longer[name] = _left_alone(variant, joint, options["longer"], share)
+    return GravityResult(
+        joint=joint,
+        slide=at.slide,
+        unit="N" if at.slide else "N·m",
+        servos_on=servos_on,
+        servos_off=servos_off,
+        longer=longer,
+        alone=room(model.backend).left_alone(model, seconds, model.joint_id(joint)),
+        provenance=provenance(model),
+    )
+
+
+def _longer_variants(model: Model, seconds: float) -> dict[str, Model]:
+    """Return the Models of the longer runs, by what can touch in them; none for no time."""
+    if not seconds:
+        return {}
+    steps_in(model, seconds)  # says what is wrong with it
+    variants = {"contacts": model.replace(**SCENARIOS["gravity"].options)}
+    with suppress(UnsupportedError):
+        variants["no contacts"] = model.replace(**SCENARIOS["fall"].options)
+    return variants
+
+
+def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
+    """Run a Model from its start without writing ctrl, and watch a joint."""
+    place, steps = coordinate(model, joint).place, steps_in(model, seconds)
+    with make_data(model) as data:
+        reset(model, data, start_keyframe(model))
+        ctrl, path, diverged = data.ctrl.copy(), list[float](), None
+        try:
+            for _ in drive(model, data, None, steps):
+                path.append(float(data.qpos[place]))
+                if len(path) % 1000 == 0:
+                    progress(len(path) / steps)
+        except DivergedError as error:
+            diverged = error.time
+        return droop(data, joint, seconds, ctrl, np.array(path), diverged=diverged)
+
+
+def slots(result: GravityResult) -> dict[str, Any]:
+    """Fill the slots of the page."""
+    on, off = result.servos_on, result.servos_off
+    slots: dict[str, Any] = {}
+    slots["right"] = _right_choice(on)
+    slots["seconds"] = f"{on.time[-1]:g} s"
+    slots["ctrl_untouched"] = on.ctrl_untouched and off.ctrl_untouched
+    slots["balanced"] = on.balanced and off.balanced
+    slots["servo_holds"] = on.held_by == SERVO
+    slots["servo_force"] = _size(on.forces.actuator, result.unit)
+    slots["load_on"] = _size(on.forces.bias, result.unit)
+    touches = [f"{pair} since {off.touches[pair]:.3f} s" for pair in off.touching]
+    slots["touching"] = ", ".join(touches) if touches else "nothing"
+    slots["emulated"] = emulated(result, *_OURS)
+    return slots | _slots_of_the_catch(result) | _slots_of_own_motors(result)
+
+
+def _right_choice(servos_on: Droop) -> int:
+    """Return the number of the right choice: fallen, exactly at zero, or sagged."""
+    sagged = abs(float(servos_on.position[-1]))
+    if sagged >= np.radians(1):
+        return 0
+    return 1 if sagged == 0 else 2
+
+
+def _size(force: float | None, unit: str) -> str:
+    """Return the size of a force with its unit; of one that is not known, zero."""
+    return f"{abs(force or 0.0):.4f} {unit}"
+
+
+def _slots_of_the_catch(result: GravityResult) -> dict[str, Any]:
+    """Fill the slots about the contact that catches the joint, and whether it stays there."""
+    slots: dict[str, Any] = {"caught": False}
+    runs = list(result.longer.values())
+    both = len(runs) == 2 and all(run.diverged is None for run in runs)
+    if not (both and result.servos_off.touching):
+        return slots
+    then = float(result.servos_off.position[-1])
+    end, free = (float(run.position[-1]) for run in runs)
+    further = free * np.sign(then) - abs(then)
+    slots["caught"] = further >= max(_FURTHER, abs(then) * _CREEP)
+    slots["free_end"] = position(free, result.slide)
+    slots["at_limit"] = abs(runs[1].forces.limit or 0.0) > BALANCE
+    slots["limit_force"] = _size(runs[1].forces.limit, result.unit)
+    slots["creeps"] = abs(end - then) > abs(then) * _CREEP
+    slots["caught_at"] = position(then, result.slide)
+    slots["long_end"] = position(end, result.slide)
+    slots["long_time"] = f"{runs[0].time[-1]:g} s"
+    return slots
+
+
+def _slots_of_own_motors(result: GravityResult) -> dict[str, Any]:
+    """Fill the slots about the engine without our adapter, at its own defaults."""
+    slots: dict[str, Any] = {"own_motors": False, "flails": False}
+    if not result.alone:
+        return slots
+    _, held, limp, undamped = result.alone
+    falls = min(abs(limp.position), abs(undamped.position))
+    slots["own_motors"] = held.motor != 0 and abs(held.position) < falls / 10
+    slots["own_gravity"] = f"{held.gravity:g} m/s²"
+    slots["widest"] = position(held.widest, result.slide)
+    slots["own_force"] = _size(held.motor, result.unit)
+    slots["held"] = position(held.position, result.slide)
+    slots["undamped"] = position(undamped.position, result.slide)
+    slots["flails"] = limp.explicit > 2 and limp.turns > limp.steps / 4
+    slots["turns"] = f"{limp.turns} of {limp.steps} steps"
+    slots["explicit"] = f"{limp.explicit:.0f}"
+    return slots
+
+
+def tables(results: Results[GravityResult], first: GravityResult) -> Blocks:
+    """Show the course of the joint, the balance of forces at its end, and the longer runs."""
+    runs: dict[str, Droop] = {}
+    long_runs: dict[str, Droop] = {}
+    for name, result in results.items():
+        prefix = where(results, name)
+        runs[f"{prefix}servos on"] = result.servos_on
+        runs[f"{prefix}servos off"] = result.servos_off
+        for label, long_run in result.longer.items():
+            long_runs[f"{prefix}{label}"] = long_run
+    alone = [_alone(name, result) for name, result in results.items() if result.alone]
+    return {
+        "course": _course(runs, f"{first.joint} under gravity", first.slide),
+        "forces": _forces(runs, first),
+        "long_course": _long_course(long_runs, first),
+        "alone": alone,
+        "differences": _differences(results, first),
+    }
+
+
+def _course(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
+    """Show where the joint is at some moments of each run."""
+    times = max((run.time for run in runs.values()), key=len)
+    rows: list[tuple[str, ...]] = []
+    for k, time in enumerate(times):
+        cells = [
+            run.at(k, slide, decimals=3 if name.endswith("on") else 2) for name, run in runs.items()
+        ]
+        rows.append((f"{time:.2f} s", *cells))
+    headers = [name.replace(": ", "\n") for name in runs]
+    return Table(("time", *headers), rows, title=title)
+
+
+def _forces(runs: Mapping[str, Droop], first: GravityResult) -> Table:
+    """Show each part of the forces at the end, their sum, and who carries the load."""
+    forces = [run.forces for run in runs.values()]
+    rows = [_force_row("gravity (−bias)", [_gravity(each) for each in forces])]
+    for part in forces[0].parts():
+        values = [each.parts()[part] for each in forces]
+        if part != EQUALITY or any(values):
+            rows.append(_force_row(part, values))
+    sums = len(rows)
+    rows.append(_force_row("sum", [each.total for each in forces]))
+    rows.append(["held by", *(run.held_by for run in runs.values())])
+    headers = [name.replace(": ", "\n") for name in runs]
+    title = f"Who holds {first.joint}, at {first.servos_on.time[-1]:g} s [{first.unit}]"
+    return Table(("who", *headers), rows, title, emphasis=frozenset({sums}))
+
+
+def _force_row(label: str, values: Iterable[float | None]) -> list[str]:
+    """Return a row of forces, one for each run."""
+    return [label, *(signed(value) for value in values)]
+
+
+def _gravity(forces: Forces) -> float | None:
+    """Return the force of gravity, which has the opposite sign of the bias."""
+    return None if forces.bias is None else -forces.bias
+
+
+def _long_course(runs: Mapping[str, Droop], first: GravityResult) -> list[Block]:
+    """Show the longer runs in a table, and every 20th step of them as curves."""
+    if not runs:
+        return []
+    scale, unit = (1.0, "m") if first.slide else (np.degrees(1.0), "angle [°]")
+    timestep = first.provenance.timestep
+    curves: dict[str, tuple[list[float], list[float]]] = {}
+    for name, run in runs.items():
+        time = np.arange(len(run.path)) * timestep
+        curves[name] = (time[::20].tolist(), (scale * run.path)[::20].tolist())
+    return [
+        _course(runs, f"{first.joint} for longer, servos off", first.slide),
+        Traces(f"{first.joint} with the servos off", "time [s]", unit, curves),
+    ]
+
+
+def _alone(name: str, result: GravityResult) -> Table:
+    """Show the joint on an engine as it comes."""
+    rows: list[tuple[str, ...]] = []
+    for alone in result.alone:
+        motor = f"{signed(alone.motor)} {result.unit}"
+        rows.append((alone.label, position(alone.position, result.slide), motor))
+    time = result.alone[0].time
+    return Table(
+        (f"{name} itself", result.joint, "its own motor"),
+        rows,
+        title=f"The same model as {name}'s own users load it, left alone, at {time:.3g} s",
+    )
+
+
+def _differences(results: Results[GravityResult], first: GravityResult) -> list[Table]:
+    """Compare the runs of each engine with those of the first."""
+    rows: dict[str, Callable[[GravityResult, GravityResult], str]] = {
+        "servos on, worst": _apart_with_servos,
+        "servos off, until one touches": _apart_before_touch,
+        "servos off, after that": _apart_after_touch,
+    }
+    for label, run in first.longer.items():
+        rows[f"servos off, {label}, at {run.time[-1]:g} s"] = partial(_ends_apart, label)
+    return differences(results, rows)
+
+
+def _apart_with_servos(left: GravityResult, right: GravityResult) -> str:
+    """Return the largest distance between two runs with the servos on."""
+    return _apart(left, left.servos_on, right.servos_on, slice(None))
+
+
+def _apart_before_touch(left: GravityResult, right: GravityResult) -> str:
+    """Return that of the servos off, up to the first touch of either."""
+    touch = _first_touch(left, right)
+    return _apart(left, left.servos_off, right.servos_off, slice(touch + 1))
+
+
+def _apart_after_touch(left: GravityResult, right: GravityResult) -> str:
+    """Return that of the servos off, from the first touch of either."""
+    touch = _first_touch(left, right)
+    return _apart(left, left.servos_off, right.servos_off, slice(touch, None))
+
+
+def _first_touch(left: GravityResult, right: GravityResult) -> int:
+    """Return the step in which one of two runs first touches; without a touch, their end."""
+    touches = [*left.servos_off.touches.values(), *right.servos_off.touches.values()]
+    if not touches:
+        return len(left.servos_off.path)
+    return round(min(touches) / left.provenance.timestep)
+
+
+def _apart(of: GravityResult, left: Droop, right: Droop, rows: slice) -> str:
+    """Return the largest distance between two runs in some rows, and when it is reached."""
+    time = np.arange(len(left.path), dtype=np.float64) * of.provenance.timestep
+    paths = left.path[rows, None], right.path[rows, None]
+    return largest_gap(*paths, slides=[of.slide], names=[""], time=time[rows])
+
+
+def _ends_apart(label: str, left: GravityResult, right: GravityResult) -> str:
+    """Return how far the ends of two longer runs are apart, as far as both go."""
+    if label not in left.longer or label not in right.longer:
+        return NONE
+    runs = left.longer[label], right.longer[label]
+    row = min(len(run.position) for run in runs) - 1
+    gap = abs(float(runs[0].position[row] - runs[1].position[row]))
+    return apart(gap, left.slide) if np.isfinite(gap) else "one diverged"

@@ -1,0 +1,244 @@
+"""The state is two arrays; slot k of one need not be slot k of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...engines import room
+from ...interface import JointType, Model, make_data, reset
+from ...lab.runs.drive import Progress
+from ...lab.runs.provenance import Provenance, provenance
+from ...measures.text import grouped, listed
+from ...show.blocks import Block, Slots, Table
+from ...show.lesson_template import differences
+from .session import CodeRun, Options
+
+NO_NAME = "(no name)"
+_SIZES = ("nq", "nv", "nu", "nbody")
+
+
+def code(model: Model, options: Options, load: str) -> str:
+    """Write code that prints sizes, and the slots of each joint."""
+    return f"""\
+import statemachine as sm
+
+model = {load}
+print(model.nq, model.nv, model.nu)
+for j, name in enumerate(model.joint_names):
+    print(model.jnt_qposadr[j], model.jnt_dofadr[j], name)
+"""
+
+
+@dataclass(frozen=True)
+class JointSlots:
+    """Slots of a joint: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop].
+
+    Attributes:
+        name: Of the joint; "" where it has none.
+        type: "free", "ball", "slide" or "hinge".
+        qpos_start: Its first slot in qpos.
+        qpos_stop: The slot after its last one in qpos.
+        qvel_start: Its first slot in qvel.
+        qvel_stop: The slot after its last one in qvel.
+    """
+
+    name: str
+    type: str
+    qpos_start: int
+    qpos_stop: int
+    qvel_start: int
+    qvel_stop: int
+
+
+@dataclass(frozen=True)
+class Term:
+    """Name that the engine itself has for a thing, and ours.
+
+    Attributes:
+        thing: What is meant.
+        ours: What the interface has for it.
+        engine: What the engine has for it.
+    """
+
+    thing: str
+    ours: str
+    engine: str
+
+
+@dataclass(frozen=True)
+class StateResult:
+    """Layout of the state of a Model, and its time.
+
+    Attributes:
+        nq: Length of qpos.
+        nv: Length of qvel.
+        nu: Length of ctrl.
+        nbody: Number of bodies, the world included.
+        joints: The slots of each joint.
+        fresh_time: `data.time` of a fresh Data [s].
+        keyframe: Name of keyframe 0; None without one.
+        keyframe_time: `data.time` after a reset to it [s]; None without one.
+        terms: What the engine itself calls all this, where that differs.
+        provenance: What it was computed with.
+    """
+
+    nq: int
+    nv: int
+    nu: int
+    nbody: int
+    joints: tuple[JointSlots, ...]
+    fresh_time: float
+    keyframe: str | None
+    keyframe_time: float | None
+    terms: tuple[Term, ...]
+    provenance: Provenance
+
+
+def run(play: CodeRun, options: Options, progress: Progress) -> StateResult:
+    """Read the layout off the Model, and the time off a Data at keyframe 0."""
+    play()
+    model = play.model
+    joints = tuple(_slots_of(model, joint) for joint in range(model.njnt))
+    keyframe = keyframe_time = None
+    with make_data(model) as data:
+        fresh_time = data.time
+        if model.keyframes:
+            reset(model, data, keyframe=0)
+            keyframe, keyframe_time = model.keyframes[0].name, data.time
+    return StateResult(
+        nq=model.nq,
+        nv=model.nv,
+        nu=model.nu,
+        nbody=model.nbody,
+        joints=joints,
+        fresh_time=fresh_time,
+        keyframe=keyframe,
+        keyframe_time=keyframe_time,
+        terms=_terms_of(model),
+        provenance=provenance(model),
+    )
+
+
+def _terms_of(model: Model) -> tuple[Term, ...]:
+    """Return what the engine itself calls what the interface has a name for."""
+    terms = room(model.backend).terms(model)
+    return tuple(Term(term.thing, term.ours, term.engine) for term in terms)
+
+
+def _slots_of(model: Model, joint: int) -> JointSlots:
+    """Return the slots of a joint."""
+    kind = JointType(int(model.jnt_type[joint]))
+    place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    return JointSlots(
+        name=model.joint_names[joint],
+        type=kind.name.lower(),
+        qpos_start=place,
+        qpos_stop=place + kind.nq,
+        qvel_start=dof,
+        qvel_stop=dof + kind.nv,
+    )
+
+
+def slots(result: StateResult) -> dict[str, Any]:
+    """Return what the page's slots take beside the fields of the result."""
+    shifted = [_name(joint) for joint in result.joints if is_shifted(joint)]
+    return {
+        "shifted": ", ".join(shifted),
+        "right": 0 if result.nv == result.nq else 2,
+    }
+
+
+def _name(joint: JointSlots) -> str:
+    """Return the name of a joint as tables show it."""
+    return joint.name if joint.name else NO_NAME
+
+
+def is_shifted(joint: JointSlots) -> bool:
+    """Tell whether a joint has other slots in qvel than in qpos."""
+    return (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
+
+
+def tables(
+    results: Mapping[str, StateResult], first: StateResult
+) -> dict[str, Block | Sequence[Block]]:
+    """Return sizes, and who owns which slots; engines that say the same share a table."""
+    return {
+        "sizes": _sizes(results),
+        "owners": _owners(results),
+        "picture": _picture(first),
+        "terms": [_terms_table(name, result) for name, result in results.items() if result.terms],
+        "differences": differences(results, {"names, sizes and slots": _compared}),
+    }
+
+
+def _sizes(results: Mapping[str, StateResult]) -> Table:
+    """Return the sizes of the Model by engine."""
+    rows = [
+        (name, str(result.nq), str(result.nv), str(result.nu), str(result.nbody))
+        for name, result in results.items()
+    ]
+    title = "Lengths of qpos, qvel and ctrl; number of bodies, the world included"
+    return Table(("", *_SIZES), rows, title)
+
+
+def _owners(results: Mapping[str, StateResult]) -> list[Table]:
+    """Return the slots of each joint; engines that say the same share a table."""
+    names_by_joints = grouped((result.joints, name) for name, result in results.items())
+    return [_slots_table(joints, names) for joints, names in names_by_joints.items()]
+
+
+def _slots_table(joints: Sequence[JointSlots], engines: Sequence[str]) -> Table:
+    """Return the slots of each joint on some engines."""
+    title = f"Which slots are whose, on {listed(engines)}"
+    return Table.of(
+        joints,
+        {
+            "joint": _name,
+            "type": lambda joint: joint.type,
+            "qpos": lambda joint: _interval(joint.qpos_start, joint.qpos_stop),
+            "qvel": lambda joint: _interval(joint.qvel_start, joint.qvel_stop),
+        },
+        title=title,
+        words=("type",),
+    )
+
+
+def _picture(result: StateResult) -> Slots:
+    """Return the slots of each joint as a picture."""
+    return Slots(
+        "Which slots are whose",
+        {
+            "qpos": [(joint.name, joint.qpos_start, joint.qpos_stop) for joint in result.joints],
+            "qvel": [(joint.name, joint.qvel_start, joint.qvel_stop) for joint in result.joints],
+        },
+    )
+
+
+def _terms_table(engine: str, result: StateResult) -> Table:
+    """Return what an engine itself calls what we have a name for."""
+    theirs = f"in {engine} itself"
+    return Table.of(
+        result.terms,
+        {
+            "": lambda term: term.thing,
+            "here": lambda term: term.ours,
+            theirs: lambda term: term.engine,
+        },
+        title=f"What {engine} calls it",
+        words=("here", theirs),
+    )
+
+
+def _compared(left: StateResult, right: StateResult) -> str:
+    """Say whether two engines have the same layout."""
+    same_sizes = all(getattr(left, size) == getattr(right, size) for size in _SIZES)
+    if same_sizes and left.joints == right.joints:
+        return "none"
+    return "they differ: see above"
+
+
+def _interval(start: int, stop: int) -> str:
+    """Write some slots as an index, or as a slice where there are several."""
+    return f"[{start}]" if stop == start + 1 else f"[{start}:{stop}]"

@@ -1,0 +1,49 @@
+"""Where two runs part, and by how much: traces of any two engines, quantity by quantity.
+
+    run = run_sides("hold")
+    comparison = compare(run.left, run.right)
+    comparison.agrees, comparison.agreements
+
+A side is a file, an engine and options, typed or from Python:
+
+    run = run_sides(Request(("hold",), sides=(Side("a.xml"), Side("b.urdf", "pybullet"))))
+    compare(run.left, run.right)
+
+Two engines that agree prove nothing; neither side is the truth.
+"""
+
+from __future__ import annotations
+
+from ..recordings import Rerun, rerun_of
+from .agreement import Agreement, Comparison, SideRun, compare, witness
+from .labels import Labels, labels_of
+from .perturbed import Uncertainty, chaos_floor, perturbed_runs
+from .series import Series, default_tip, series, touches
+from .sides import Request, Side, parse_sides, split_words
+from .two_sides import SidesRun, prepare_sides, run_sides
+
+__all__ = [
+    "Agreement",
+    "Comparison",
+    "Labels",
+    "Request",
+    "Rerun",
+    "Series",
+    "Side",
+    "SideRun",
+    "SidesRun",
+    "Uncertainty",
+    "chaos_floor",
+    "compare",
+    "default_tip",
+    "labels_of",
+    "parse_sides",
+    "perturbed_runs",
+    "prepare_sides",
+    "rerun_of",
+    "run_sides",
+    "series",
+    "split_words",
+    "touches",
+    "witness",
+]

@@ -1,0 +1,192 @@
+"""Runs of two models in each other's terms: names of joints, order of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...backends import load
+from ...errors import StateMachineError, TraceError
+from ...interface import MOCAP, Array, Data, Model
+from ..recordings import Header, SideStart, Trace, model_file, start_of
+from ..recordings.recorder import layout_of
+from ..runs.scenarios import Controller
+from .matching import Matched, Pairs, match_models
+from .sides import Request, Side
+
+
+def called(trace: Trace, file: str) -> Trace:
+    """A run whose file goes by another name."""
+    made_by = replace(trace.header.provenance, model_file=file)
+    return Trace(replace(trace.header, provenance=made_by), trace.columns)
+
+
+def match_sides(
+    sides: Sequence[Side], left: Model, right: Model, names: Mapping[str, str]
+) -> Matched | None:
+    """Which is which; None for one file, of which every engine has the same ids."""
+    left_side, right_side = sides
+    if left_side.path == right_side.path and not names and left.joint_names == right.joint_names:
+        return None
+    matched = match_models(left, right, names)
+    if not matched.joints and left.njnt and right.njnt:
+        raise TraceError(
+            f"{left_side.label} and {right_side.label} have no joint in common, by name or by "
+            "place: name one with --map LEFT=RIGHT"
+        )
+    return matched
+
+
+def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, Trace]:
+    """Both runs with the names of the first; commands in its order where both have all of them.
+
+    What a joint, body or site of the first is called, its counterpart is called too. One
+    without a counterpart whose name is taken is "NAME (right)". Where a joint has none, the
+    energies, which are of all that can move, are left out.
+
+    Args:
+        left: A run of the first Model.
+        right: A run of the second.
+        matched: Which is which.
+    """
+    a, b = left.header, right.header
+    left_header = replace(a, joints=a.joint_labels, bodies=a.body_labels)
+    right_header = _named_as(left_header, b, matched)
+    left_columns, right_columns = dict(left.columns), dict(right.columns)
+    if any(only.get("joint") for only in matched.only):
+        left_columns.pop("energy", None)
+        right_columns.pop("energy", None)
+    order = [there for _, there in matched.actuators]
+    if len(order) == a.nu == b.nu:
+        right_columns["ctrl"] = right_columns["ctrl"][:, order]
+        right_header = _with_actuators_in(order, right_header)
+    return Trace(left_header, left_columns), Trace(right_header, right_columns)
+
+
+def _named_as(left: Header, right: Header, matched: Matched) -> Header:
+    """Return the header of the right with the names of the left for what both have."""
+    joints = _renamed(left.joints, right.joint_labels, matched.joints)
+    bodies = _renamed(left.bodies, right.body_labels, matched.bodies)
+    sites = _renamed(left.sites, right.sites, matched.sites)
+    actuators = _renamed(left.actuators, right.actuators, matched.actuators)
+    return replace(right, joints=joints, bodies=bodies, sites=sites, actuators=actuators)
+
+
+def _with_actuators_in(order: Sequence[int], header: Header) -> Header:
+    """Return a header with its actuators in another order, given by their numbers."""
+    actuators = tuple(header.actuators[number] for number in order)
+    joints = tuple(header.actuator_jntid[number] for number in order)
+    ranges = tuple(header.ctrlrange[number] for number in order)
+    return replace(header, actuators=actuators, actuator_jntid=joints, ctrlrange=ranges)
+
+
+def translated(trace: Trace, matched: Matched, start: SideStart) -> Trace:
+    """Return the start and the commands of a run of the first Model, as the second takes them.
+
+    Args:
+        trace: The run.
+        matched: Which is which.
+        start: Qpos (nq,), qvel (nv,) and ctrl (nu,) of the second, for what the first has no
+            counterpart of.
+    """
+    recorded = SideStart(trace.qpos, trace.qvel, trace.ctrl)
+    poses = {"mocap_pos": matched.right.mocap_pos0, "mocap_quat": matched.right.mocap_quat0}
+    led = {
+        name: matched.moved(name, trace[name].reshape(len(trace), -1), pose.ravel())
+        for name, pose in poses.items()
+        if name in trace
+    }
+    return replace_layout(trace, matched.right, *matched.start(recorded, start), led)
+
+
+def for_left(trace: Trace, model: Model, request: Request) -> Trace:
+    """A trace as one of the left's Model; matched by the model that it was recorded with."""
+    header = trace.header
+    own = layout_of(model)
+    compared = ("joints", "actuators", "jnt_type", "nmocap")
+    if all(getattr(header, name) == own[name] for name in compared):
+        led = {name: trace[name] for name in MOCAP if name in trace}
+        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, led)
+    try:
+        file, _ = model_file(header, request.menagerie, request.what[0])
+        matched = match_models(load(file), model, request.names)
+    except StateMachineError as error:
+        raise TraceError(
+            f"the trace has other joints or actuators than {model.path.name}, and what it was "
+            f"recorded with cannot be matched: {error}"
+        ) from None
+    return translated(trace, matched, start_of(model, None))
+
+
+def in_terms_of_right(left: Trace, right: Trace, matched: Matched | None) -> Trace:
+    """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
+    if matched is None:
+        return left
+    start = SideStart(right.qpos[0], right.qvel[0], right.ctrl[0])
+    return translated(left, matched, start)
+
+
+def same_commands(theirs: Trace, right: Trace) -> bool:
+    """Whether the right was told what the left was, from the same start."""
+    return (
+        np.array_equal(theirs.qpos[0], right.qpos[0])
+        and np.array_equal(theirs.qvel[0], right.qvel[0])
+        and commands_alike(theirs, right)
+    )
+
+
+def commands_alike(theirs: Trace, right: Trace) -> bool:
+    """Whether the right was told at each of its moments what the left was."""
+    since, times = right.time - right.time[0], theirs.time - theirs.time[0]
+    early = 1e-6 * theirs.timestep  # as `play` has it
+    rows = np.searchsorted(times - early, since, side="right") - 1
+    used = since < times[-1] - early  # the command of a last row is never carried out
+    return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
+
+
+def replace_layout(
+    trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array, led: Mapping[str, Array]
+) -> Trace:
+    """A run as if it were one of another Model: states and commands, and nothing derived."""
+    columns = {"time": trace.time, "qpos": qpos, "qvel": qvel, "ctrl": ctrl}
+    header = replace(trace.header, **layout_of(model))
+    poses = {name: led[name].reshape(len(trace), *header.shape(name)) for name in led}
+    return Trace(header, columns | poses)
+
+
+def with_bodies_of(trace: Trace, model: Model) -> Trace:
+    """A run whose bodies go by the names that its own Model has, for what is drawn with that."""
+    return Trace(replace(trace.header, bodies=model.body_names), trace.columns)
+
+
+def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[str, ...]:
+    """The names of the second, those of the first for what both have."""
+    names = list(theirs)
+    for k, name in enumerate(names):
+        if name and name in ours:
+            names[k] = f"{name} (right)"
+    for left, right in pairs:
+        names[right] = ours[left]
+    return tuple(names)
+
+
+def controller_for_right(controller: Controller, matched: Matched, start: Array) -> Controller:
+    """A controller that gives the right what another one gives the left.
+
+    Where it gives no command ctrl stays as it is, as it does on the left.
+
+    Args:
+        controller: Of the left, or one that writes in the order of the left.
+        matched: What of the left is what of the right.
+        start: (nu,) ctrl of the right, for the actuators that have no counterpart.
+    """
+
+    def translate(time: float, data: Data) -> Array | None:
+        ctrl = controller(time, data)
+        if ctrl is None:
+            return None
+        return matched.moved("ctrl", np.asarray(ctrl, np.float64), start)
+
+    return translate

@@ -1,0 +1,354 @@
+"""One step on each side from the same state, moment by moment: which stage parts first.
+
+Runs drift, so that the cause of a gap is long past when it is large. Here the right side is put
+to a recorded state of the left one, both take one step, and the numbers of each stage of it are
+held side by side. A difference is then of that step, of that stage and of that joint or pair.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...errors import BadInputError, DivergedError, UnsupportedError
+from ...interface import (
+    INPUTS,
+    MOCAP,
+    Array,
+    Data,
+    Model,
+    State,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
+from ..recordings import Rerun
+from ..recordings.recorder import put_row
+from ..runs.drive import Progress, silent
+from .matching import Matched, match_models
+from .stages import AFTER, FORCE, FOUND, STAGES, StageMeasure, StageReader, StepReading, measures
+
+MOMENTS = 200
+RELATIVE = 1e-6  # of the scale of a stage: what is less is rounding
+_BEFORE = ("qacc", "qfrc_contact", "qfrc_friction")
+_STANDS_OUT = 10.0  # times the median
+_MOST_SPIKES = 5
+
+
+@dataclass(frozen=True)
+class StageGap:
+    """How far apart two sides are in one stage of a step, over all moments.
+
+    Attributes:
+        stage: Its name.
+        told: Whether both engines tell it.
+        reason: Why it cannot be compared; "" where it can.
+        unit: Of the figures; "" where there are none.
+        scale: Its usual size on the two sides [unit]: the median of its largest entry over the
+            moments at which that is at least a thousandth of what it ever is.
+        tolerance: What does not count [unit].
+        null: How far the left side, put back to its own states, gets from its own run [unit].
+        worst: The largest difference [unit].
+        at: When that is [s from the start]; None where there is no difference.
+        where: The joint, body or pair to look at then.
+        beyond: At how many moments it is beyond the tolerance and beyond the null.
+        first: The first of them [s]; None if there is none.
+        leads: At how many of them no earlier stage is, so that it has a cause of its own.
+    """
+
+    stage: str
+    told: bool
+    reason: str = ""
+    unit: str = ""
+    scale: float = 0.0
+    tolerance: float = 0.0
+    null: float = 0.0
+    worst: float = 0.0
+    at: float | None = None
+    where: str = ""
+    beyond: int = 0
+    first: float | None = None
+    leads: int = 0
+
+
+@dataclass(frozen=True)
+class Spike:
+    """A moment at which the accelerations of a step differ far more than they usually do.
+
+    Attributes:
+        at: When [s from the start]; each moment once.
+        size: The difference of the accelerations [unit].
+        unit: "rad/s²" or "m/s²".
+        joint: Whose acceleration differs.
+        stage: The first stage beyond its tolerance there.
+        where: Its joint, body or pair.
+        weight: The difference, relative to the usual acceleration.
+    """
+
+    at: float
+    size: float
+    unit: str
+    joint: str
+    stage: str
+    where: str
+    weight: float = field(metadata={"json": False})
+
+
+@dataclass(frozen=True)
+class OneStep:
+    """One step of two sides, from each recorded state of the left one.
+
+    Attributes:
+        moments: From how many states.
+        every: Each so many-th row of the run.
+        until: The time of the last of them [s].
+        relative: The tolerance, relative to the scale of a stage.
+        stages: In the order in which a step computes them.
+        first: The first of them that differs at any moment; None if none does.
+        spikes: The moments that stand out, the largest first.
+        primed: What of the step before the right side was given; "" for nothing.
+        notes: What a reader must know.
+    """
+
+    moments: int
+    every: int
+    until: float
+    relative: float
+    stages: tuple[StageGap, ...]
+    first: StageGap | None
+    spikes: tuple[Spike, ...]
+    primed: str
+    notes: tuple[str, ...]
+
+
+def one_step(
+    rerun: Rerun,
+    right: Model,
+    *,
+    names: Mapping[str, str] | None = None,
+    moments: int = MOMENTS,
+    relative: float = RELATIVE,
+    progress: Progress = silent,
+) -> OneStep:
+    """Compare one step of two sides from each recorded state of the left one.
+
+    Args:
+        rerun: How the left side is run.
+        right: The other Model, with its options.
+        names: What goes by another name there; see `match_models`.
+        moments: From how many states at most; every n-th row is taken.
+        relative: What does not count, of the scale of a stage.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: `moments` is less than 1, or the two have no joint in common.
+    """
+    if moments < 1:
+        raise BadInputError(f"one step wants at least one moment; got {moments}")
+    matched = match_models(rerun.model, right, names)
+    if not matched.joints:
+        raise BadInputError("the two sides have no joint in common: no state can be given on")
+    reader = StageReader(matched)
+    trace = rerun.record(derive=False)
+    rows = len(trace) - 1
+    every = max(1, -(-rows // moments))
+    inputs = {name: trace[name] for name in ("time", *INPUTS, *MOCAP) if name in trace}
+    primed, failed = "", False
+    times: list[float] = []
+    readings: list[tuple[StepReading, StepReading, StepReading]] = []
+    with (
+        make_data(matched.left) as running,
+        make_data(matched.left) as left,
+        make_data(right) as other,
+    ):
+        for k, state, before in _states(rerun, running, inputs, every):
+            start = inputs["qpos"][k], inputs["qvel"][k]
+            set_state(matched.left, left, state)
+            primed_now = _put(matched, reader, other, state, before)
+            if primed_now:
+                primed = primed_now
+            try:
+                as_it_runs = reader.step(0, running, *start)
+                put_back = reader.step(0, left, *start)
+                on_the_right = reader.step(1, other, other.qpos.copy(), other.qvel.copy())
+            except DivergedError:
+                failed = True
+                break
+            readings.append((as_it_runs, put_back, on_the_right))
+            times.append(float(inputs["time"][k] - inputs["time"][0]))
+            progress(k / rows)
+    progress(1.0)
+    measured = measures(reader, readings, relative)
+    leading = _leading(measured, len(times))
+    stages = _gaps(measured, times, Counter(stage for stage, _ in leading))
+    first = next((gap for gap in stages if gap.beyond), None)
+    return OneStep(
+        moments=len(times),
+        every=every,
+        until=times[-1] if times else 0.0,
+        relative=relative,
+        stages=stages,
+        first=first,
+        spikes=_spikes(measured, times, leading),
+        primed=primed,
+        notes=_notes(matched, failed),
+    )
+
+
+def _states(
+    rerun: Rerun, data: Data, inputs: Mapping[str, Array], every: int
+) -> Iterator[tuple[int, State, dict[str, Array]]]:
+    """The run again: every so many-th row, its State, and what the step before it found.
+
+    Whoever asks takes the step from there on `data`.
+    """
+    model = rerun.model
+    reset(model, data, rerun.keyframe)
+    for k in range(len(inputs["time"]) - 1):
+        put_row(data, inputs, k)
+        if k % every:
+            step(model, data)
+            continue
+        before = {}
+        for name in _BEFORE if k else ():
+            with suppress(UnsupportedError):
+                before[name] = np.array(getattr(data, name))
+        yield k, get_state(model, data), before
+
+
+def _put(
+    matched: Matched, reader: StageReader, data: Data, state: State, before: dict[str, Array]
+) -> str:
+    """Put the right side to a state of the left one; what of the step before it was given."""
+    reset(matched.right, data)
+    own = get_state(matched.right, data)
+    if (own.backend, own.fingerprint) == (state.backend, state.fingerprint):
+        set_state(matched.right, data, state)
+        return "all that a State of the left side holds"
+    set_state(matched.right, data, matched.state(state, own))
+    return reader.prime(1, data, before)
+
+
+def _leading(measured: Sequence[StageMeasure], moments: int) -> list[tuple[str, str]]:
+    """For each moment the first stage beyond its tolerance, and its worst element."""
+    leading = [("", "")] * moments
+    for measure in sorted(measured, key=lambda m: -STAGES.index(m.stage)):
+        for row in np.flatnonzero(measure.beyond.any(axis=1)).tolist():
+            leading[row] = measure.stage, measure.culprit(row)
+    return leading
+
+
+def _gaps(
+    measured: Sequence[StageMeasure], times: Sequence[float], leads: Mapping[str, int]
+) -> tuple[StageGap, ...]:
+    """Return the gap of each stage, by that of its units that is farthest beyond its tolerance."""
+    gaps = []
+    for stage in STAGES:
+        by_unit = [_gap(measure, times) for measure in measured if measure.stage == stage]
+        if not by_unit:
+            by_unit = [_not_compared(stage)]
+        # Of the measures of one stage that of pairs comes last, and says more than joints do.
+        gap = max(reversed(by_unit), key=_weight)
+        gaps.append(replace(gap, leads=leads[stage]))
+    return tuple(gaps)
+
+
+def _not_compared(stage: str) -> StageGap:
+    """Return the gap of a stage of which there are no figures."""
+    if stage == FOUND:
+        return StageGap(stage, told=True, reason="nothing touches")
+    return StageGap(stage, told=False, reason="an engine does not tell it")
+
+
+def _weight(gap: StageGap) -> tuple[bool, float]:
+    """Return what the units of one stage are ranked by."""
+    if not gap.worst or gap.stage == FORCE:
+        return gap.beyond > 0, float(gap.worst > 0)
+    return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
+
+
+def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
+    """Return how far apart the sides are in one unit of a stage; no leads are counted yet."""
+    place = np.unravel_index(int(np.argmax(measure.apart)), measure.apart.shape)
+    row, worst = int(place[0]), float(measure.apart[place])
+    at, where = None, ""
+    if worst:
+        at, where = times[row], measure.culprit(row)
+    null = float(measure.null.max())
+    hits = np.flatnonzero(measure.beyond.any(axis=1)).tolist()
+    return StageGap(
+        stage=measure.stage,
+        told=True,
+        unit=measure.unit,
+        scale=measure.scale,
+        tolerance=measure.tolerance,
+        null=null,
+        worst=worst,
+        at=at,
+        where=where,
+        beyond=len(hits),
+        first=times[hits[0]] if hits else None,
+    )
+
+
+def _spikes(
+    measured: Sequence[StageMeasure], times: Sequence[float], leading: Sequence[tuple[str, str]]
+) -> tuple[Spike, ...]:
+    """Return the moments at which accelerations differ far more than they usually do."""
+    spikes: list[Spike] = []
+    for measure in measured:
+        if measure.stage != AFTER:
+            continue
+        most = measure.apart.max(axis=1)
+        stands = measure.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
+        padded = np.concatenate([[-np.inf], most, [-np.inf]])
+        stands &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
+        for row in np.flatnonzero(stands).tolist():
+            stage, where = leading[row]
+            size, joint = float(most[row]), int(np.argmax(measure.apart[row]))
+            spike = Spike(
+                at=times[row],
+                size=size,
+                unit=measure.unit,
+                joint=measure.names[joint],
+                stage=stage,
+                where=where,
+                weight=size / measure.scale,
+            )
+            spikes.append(spike)
+    # Of a moment the one that is largest beside its usual size: rad/s² and m/s² are not compared.
+    largest = {spike.at: spike for spike in sorted(spikes, key=lambda spike: spike.weight)}
+    ranked = sorted(largest.values(), key=lambda spike: -spike.weight)
+    return tuple(ranked[:_MOST_SPIKES])
+
+
+_JOINT_FORCES = ("position servo", "joint damping", "dry friction", "joint limits")
+
+
+def _notes(matched: Matched, failed: bool) -> tuple[str, ...]:
+    """Return what a reader must know; `failed` says whether a side diverged in a step."""
+    left, right = matched.left, matched.right
+    notes = []
+    if (left.timestep, left.substeps) != (right.timestep, right.substeps):
+        notes.append(
+            "the sides' steps are not equally long: accelerations are means over each side's own"
+        )
+    for model in (left, right):
+        behaviours = model.capabilities.behaviours
+        emulated = [name for name in _JOINT_FORCES if behaviours[name].support == "emulated"]
+        if emulated:
+            notes.append(
+                f"on {model.backend} this library computes {', '.join(emulated)}, where the model "
+                "has them: that these agree is by construction, as far as contact agrees"
+            )
+    if failed:
+        notes.append(
+            "a side does not stand a step from a state of the left one: the rest is left out"
+        )
+    return (*notes, *matched.notes)

@@ -1,0 +1,236 @@
+"""Two descriptions of a robot, side by side, as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ...measures.text import (
+    after,
+    capital,
+    command,
+    grouped,
+    reading,
+    rounded,
+    sentence,
+    versions_of,
+)
+from ...show import report_template as template
+from ...show.blocks import Block, Items, Page, Table, Text
+from ...show.report_template import if_true
+from . import ModelsComparison, ReadingSide
+from .ledger import SUBJECTS, ReadingAgreement
+from .subject_page import APART, MOMENT, Slots, subject_blocks
+
+_READ = ("file", "read", "links", "joints", "shapes", "mass")  # rows of the sides
+
+
+def page(result: ModelsComparison, sides: Sequence[str], everything: bool = False) -> Page:
+    """Say what differs, the weightiest first; then what is equal, and how well.
+
+    Args:
+        result: The comparison.
+        sides: Both as one types them for a run.
+        everything: Whether every figure has a row of its own.
+    """
+    by_subject = grouped((row.subject, row) for row in result.differences)
+    differences: list[Block] = []
+    for subject, rows in by_subject.items():
+        differences += subject_blocks(subject, rows, everything)
+    counts = {subject: len(rows) for subject, rows in by_subject.items()}
+    slots = (
+        _sides(result)
+        | _verdict(result)
+        | _engine_itself(result)
+        | _what_can_be_equalized(result, sides)
+        | _poses(result)
+    )
+    return template.page(
+        "lab/model_differences/model_diff",
+        differences=differences,
+        equal=_equal(result.agreements, counts),
+        notes=[Text(sentence(note)) for note in _notes(result)],
+        **slots,
+    )
+
+
+def _sides(result: ModelsComparison) -> Slots:
+    """Return how both sides were read, and what they have."""
+    rows = zip(_READ, _column(result.left), _column(result.right), strict=True)
+    return {
+        "left_name": _name(result.left),
+        "right_name": _name(result.right),
+        "origin": versions_of(result.versions),
+        "sides": Table(("", "left", "right"), list(rows)),
+    }
+
+
+def _read(side: ReadingSide) -> str:
+    """Say how a side was read."""
+    if side.format == "engine":
+        return f"loaded into {side.reader}"
+    return f"{side.format}, by {side.reader}"
+
+
+def _column(side: ReadingSide) -> list[str]:
+    """Return how a side was read, and what it has."""
+    return [
+        side.file,
+        _read(side),
+        str(side.links),
+        str(side.joints),
+        str(side.shapes),
+        rounded(side.mass, "kg", 4),
+    ]
+
+
+def _verdict(result: ModelsComparison) -> Slots:
+    """Return whether anything differs that matters."""
+    matter = [row for row in result.differences if row.matters]
+    # A verdict that is False does not hold; one that is None is left out.
+    slots: Slots = {"none_differ": None, "not_all_compared": None, "differ": None}
+    if matter:
+        slots["differ"] = False
+    elif result.skipped:
+        slots["not_all_compared"] = False
+    else:
+        slots["none_differ"] = True
+    subjects = ", ".join(dict.fromkeys(row.subject for row in matter))
+    return slots | {"digits": result.digits, "figures": len(matter), "subjects": subjects}
+
+
+def _engine_itself(result: ModelsComparison) -> Slots:
+    """Return what is said of an engine that read a file itself, and emulates the contract."""
+    slots: Slots = {"emulated": None, "written": None, "unlike": None}
+    for side in (result.right, result.left):  # of two the left is named
+        if side.is_emulated:
+            slots["emulated"] = _engine(side)
+        if side.is_emulated and side.is_mjcf:
+            slots["written"] = _engine(side)
+        if side.unlike_its_users:
+            slots["unlike"] = capital(side.unlike_its_users)
+    return slots
+
+
+def _engine(side: ReadingSide) -> str:
+    """Return the name of the engine that read a side, without its version."""
+    return side.reader.split()[0]
+
+
+def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Slots:
+    """Return in what the right can be given the left's values, and how.
+
+    Args:
+        result: The comparison.
+        sides: Both as one types them for a run.
+    """
+    able: dict[str, None] = {}
+    refused: dict[str, str] = {}
+    for row in result.differences:
+        if row.refused:
+            refused[row.causes[0]] = row.refused
+        else:
+            able |= dict.fromkeys(row.causes)
+    typed = None
+    if able:
+        experiment = "waves" if result.left.robot.actuators else "gravity"  # runs on any such robot
+        typed = command(["statemachine", "compare", experiment, *sides, "--why"])
+    lines = [f"{capital(name)}: {why}." for name, why in refused.items()]
+    some = len(able) if able and refused else None
+    return {
+        "all_able": if_true(able and not refused),
+        "able": some,
+        "command": typed,
+        "refused_too": if_true(refused),
+        "refused": Items(lines),
+    }
+
+
+def _poses(result: ModelsComparison) -> Slots:
+    """Return whether the same positions give the same poses."""
+    posed = result.posed
+    is_off = posed.joints and posed.distance > 1e-5
+    return {
+        "joints": posed.joints or None,
+        "distance": _tiny(posed.distance, "m"),
+        "angle": _tiny(posed.angle, "rad"),
+        "poses": posed.poses,
+        "seed": posed.seed,
+        "furthest": posed.link if is_off else None,
+    }
+
+
+def _notes(result: ModelsComparison) -> list[str]:
+    """Return what a reader should know, in sentences."""
+    notes = [f"left: {note}" for note in result.left.notes]
+    notes += [f"right: {note}" for note in result.right.notes]
+    return [*notes, *result.notes, *result.skipped]
+
+
+def _name(side: ReadingSide) -> str:
+    """Return a file, and of one that an engine has read the engine."""
+    return f"{side.file} on {_engine(side)}" if side.format == "engine" else side.file
+
+
+@dataclass(frozen=True)
+class _Agreement:
+    """How well both sides agree in a subject.
+
+    Attributes:
+        subject: A key of `SUBJECTS`.
+        agreements: In each unit.
+        differ: How many figures differ.
+    """
+
+    subject: str
+    agreements: Sequence[ReadingAgreement]
+    differ: int
+
+    def heading(self) -> str:
+        return SUBJECTS[self.subject].partition(":")[0]
+
+    def counts(self) -> str:
+        """Return how many figures are equal, of how many."""
+        count = sum(agreement.count for agreement in self.agreements)
+        return f"{count} of {count + self.differ}"
+
+    def apart(self) -> str:
+        """Return how far the figures are apart at the worst, in each unit."""
+        return ", ".join(_worst(agreement) for agreement in self.agreements).strip(", ") or "0"
+
+    def digits(self) -> str:
+        """Return to how many digits the figures agree."""
+        digits = min(agreement.digits for agreement in self.agreements)
+        return "all" if digits == 17 else str(digits)
+
+
+def _equal(agreements: Sequence[ReadingAgreement], differ: Mapping[str, int]) -> Table:
+    """Return a row for each subject: how well both sides agree in it, at the worst in each unit.
+
+    Args:
+        agreements: Of each subject and unit.
+        differ: How many figures of a subject differ.
+    """
+    by_subject = grouped((row.subject, row) for row in agreements)
+    rows = [
+        _Agreement(subject, group, differ.get(subject, 0)) for subject, group in by_subject.items()
+    ]
+    columns = {
+        "subject": _Agreement.heading,
+        "equal": _Agreement.counts,
+        "apart, at most": _Agreement.apart,
+        "to digits": _Agreement.digits,
+    }
+    return Table.of(rows, columns, "Figures that are equal")
+
+
+def _worst(agreement: ReadingAgreement) -> str:
+    unit = MOMENT if agreement.subject == "inertia" else agreement.unit
+    factor, shown = APART.get(unit, (1.0, after(unit)))
+    return f"{agreement.worst * factor:.1e}{shown}" if agreement.worst else ""
+
+
+def _tiny(value: float, unit: str) -> str:
+    """Return a size with one digit where it is rounding."""
+    is_large = value * reading(unit)[0] > 1e-2
+    return rounded(value, unit, 4 if is_large else 1)

@@ -1,0 +1,220 @@
+"""What a page shows of two runs over time, where it has a slider: the scene, and charts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...interface import Array
+from ...measures import distances, same_pairs
+from ...measures.text import figure, quantity, reading, short_time
+from ...show import report_template as template
+from ...show.blocks import Interactive, Traces
+from ...show.report_template import slots_of
+from ..compare import Agreement, Comparison, Series
+from ..compare.perturbed import ChaosFloor
+from ..compare.series import NORMAL, normal_forces, total_forces
+from .finding import Event, long_labels, name_of, traces_of
+
+CHARTS_SHOWN = 20  # of a page or a figure
+GAP = "how far apart"
+SAID = (
+    "{title}, difference over time: at most {far} at {at}, settled at {settled}; tolerance "
+    "{tolerance}, left: {since}."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityChart(Interactive):
+    """One quantity over time: how far apart it is, and both sides.
+
+    Attributes:
+        curve: Both sides at common moments.
+        agreement: The figures of the comparison.
+        labels: What the sides are called.
+        foot: A note under it; "" for none.
+        floor: (n,) the width of its chaos floor at the moments of the curve, if that is known.
+    """
+
+    curve: Series
+    agreement: Agreement
+    labels: tuple[str, str]
+    foot: str = ""
+    floor: Array | None = None
+
+    @property
+    def unit(self) -> str:
+        """What it is drawn in."""
+        return reading(self.curve.unit)[1].strip()
+
+    @property
+    def said(self) -> str:
+        """What it shows, for those who do not see it."""
+        gap = self.agreement
+        far, settled, tolerance = (
+            quantity(value, gap.unit) for value in (gap.max, gap.settled, gap.tolerance)
+        )
+        return SAID.format(
+            title=self.title,
+            far=far,
+            at=short_time(gap.at),
+            settled=settled,
+            tolerance=tolerance,
+            since="never" if gap.since is None else f"at {short_time(gap.since)}",
+        )
+
+    def values(self) -> Traces | None:
+        """Return both sides: a position as the way from where the first began; None without."""
+        curve, scale = self.curve, reading(self.curve.unit)[0]
+        if not curve.left.size:
+            return None
+        title, left, right = self.title, curve.left, curve.right
+        if left.ndim > 1:
+            title = f"{title}, from its start"
+            left, right = distances(left, curve.left[0]), distances(right, curve.left[0])
+        left_label, right_label = self.labels
+        curves = {
+            left_label: (curve.time, scale * left),
+            right_label: (curve.time, scale * right),
+        }
+        # What does not matter is not blown up to the height of the chart.
+        least = 20 * scale * self.agreement.tolerance
+        return Traces(f"{title} [{self.unit}]", "", "", curves, sides=True, least=least)
+
+    def gap(self) -> Traces:
+        """Return how far apart they are, with the tolerance and the chaos floor."""
+        time, scale = self.curve.time, reading(self.curve.unit)[0]
+        verdict = "DIFFERS" if self.agreement.verdict == "differs" else self.agreement.verdict
+        title = f"{verdict}, {quantity(self.agreement.max, self.agreement.unit)}"
+        if not self.curve.left.size:  # this is the only chart of the quantity
+            title = f"{self.title}: {title}"
+        curves = {GAP: (time, scale * self.curve.difference)}
+        return Traces(
+            title,
+            across="",
+            up="",
+            curves=curves,
+            log=True,
+            sides=True,
+            tolerance=scale * self.agreement.tolerance,
+            floor=None if self.floor is None else (time, scale * self.floor),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BothRuns(Interactive):
+    """Two runs in one picture, moment by moment.
+
+    Attributes:
+        comparison: Of the two: the left one is drawn solid, the right one as a ghost over it.
+        start: The moment to begin at [s].
+        events: First touches among them are marked.
+        charts: What is followed.
+        lead: Of these, the ones that are spoken, by number.
+    """
+
+    comparison: Comparison
+    start: float
+    events: tuple[Event, ...]
+    charts: tuple[QuantityChart, ...]
+    lead: tuple[int, ...]
+
+
+def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[QuantityChart, ...]:
+    """A chart for each quantity that is a number throughout; of many, those most beyond."""
+    agreements = {agreement.name: agreement for agreement in comparison.agreements}
+    bands: dict[str, Array] = {}
+    if floor is not None:
+        bands = {band.name: band.width for band in floor.bands}
+    finite = [curve for curve in comparison.curves if np.isfinite(curve.difference).all()]
+    ranked = sorted(
+        finite, key=lambda curve: (curve.kind != "tip", -agreements[curve.name].tolerances())
+    )
+    shown = ranked[:CHARTS_SHOWN]
+    charts = []
+    for curve in finite:
+        if curve in shown:
+            chart = QuantityChart(
+                title=name_of(curve.name),
+                curve=curve,
+                agreement=agreements[curve.name],
+                labels=long_labels(comparison),
+                foot=foot_of(curve, comparison),
+                floor=bands.get(curve.name),
+            )
+            charts.append(chart)
+    return tuple(charts)
+
+
+@dataclass(frozen=True)
+class _FootSlots:
+    """The slots of the template "over_time"; a line with a slot that is None is left out.
+
+    Attributes:
+        by: What computed the energies.
+        left: What the left side is called.
+        right: What the right side is called.
+        left_normal: Its largest normal force on the left.
+        right_normal: On the right.
+        left_whole: The largest of the whole force on the left.
+        right_whole: On the right.
+    """
+
+    by: str | None = None
+    left: str | None = None
+    right: str | None = None
+    left_normal: str | None = None
+    right_normal: str | None = None
+    left_whole: str | None = None
+    right_whole: str | None = None
+
+
+def foot_of(curve: Series, comparison: Comparison) -> str:
+    """Say under a chart of the energy what computed it; under one of a force its other figure."""
+    if curve.kind == "energy":
+        headers = [trace.header for trace in traces_of(comparison)]
+        by = dict.fromkeys(header.energy_by or header.backend for header in headers)
+        slots = _FootSlots(by=" and ".join(by))
+    elif curve.kind == "force":
+        pair = curve.name.removesuffix(NORMAL)
+        left, right = traces_of(comparison)
+        left_label, right_label = long_labels(comparison)
+        left_normal, right_normal = _strongest(pair, normal_forces(left), normal_forces(right))
+        left_whole, right_whole = _strongest(pair, total_forces(left), total_forces(right))
+        slots = _FootSlots(
+            left=left_label,
+            right=right_label,
+            left_normal=left_normal,
+            right_normal=right_normal,
+            left_whole=left_whole,
+            right_whole=right_whole,
+        )
+    else:
+        return ""
+    return " ".join(template.texts("lab/questions/over_time", **slots_of(slots)))
+
+
+def _strongest(pair: str, left: Mapping[str, Array], right: Mapping[str, Array]) -> tuple[str, str]:
+    """Return the largest force between two bodies on the left and on the right, as text."""
+    texts = []
+    for forces in (left, same_pairs(left, right)):
+        strongest = float(forces[pair].max()) if pair in forces else 0.0
+        texts.append(figure(strongest))
+    return texts[0], texts[1]
+
+
+def spans(mask: NDArray[np.bool_], time: Array, step: float, until: float) -> list[list[float]]:
+    """From when to when rows are marked [s]; a row counts until the next one.
+
+    Args:
+        mask: (n,) which rows.
+        time: (n,) of each [s].
+        step: How long the last of some rows lasts [s].
+        until: What is later is cut off [s].
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    pairs = ((float(time[a]), float(time[b - 1]) + step) for a, b in edges.reshape(-1, 2).tolist())
+    return [[start, min(end, until)] for start, end in pairs if start <= until]

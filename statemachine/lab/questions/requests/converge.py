@@ -1,0 +1,61 @@
+"""What of a gap vanishes with the timestep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ....errors import BadInputError, shown
+from ....interface.options import OptionValue
+from ...compare.convergence import Convergence, convergence
+from ...compare.sides import Request, Side
+from ...compare.two_sides import run_sides
+from ...recordings import Trace
+from ...runs.reporter import QUIET, Reporter
+from .one_step import check_runs
+
+
+@dataclass(frozen=True)
+class ConvergeRequest:
+    """Question what of a gap vanishes where the steps are halved and quartered.
+
+    Attributes:
+        run: What is run on two sides; not recorded traces alone.
+    """
+
+    run: Request
+
+    def __post_init__(self) -> None:
+        check_runs(self.run, "--converge")
+
+    def with_finer_steps(self, times: int) -> Request:
+        """Return what is run, with so many times as many steps of the engine on both sides."""
+        common = _substeps(self.run.options, 1)
+        sides: list[Side] = []
+        for side in self.run.sides:
+            substeps = times * _substeps(side.options, common)
+            sides.append(replace(side, options={**side.options, "substeps": substeps}))
+        options = {**self.run.options, "substeps": times * common}
+        return replace(self.run, options=options, sides=tuple(sides))
+
+
+def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> Convergence:
+    """Run both sides with ever finer steps, and compare.
+
+    Raises:
+        StateMachineError: As `run_sides` does.
+    """
+
+    def run(times: int) -> tuple[Trace, Trace]:
+        return run_sides(request.with_finer_steps(times)).traces
+
+    with reporter.stage("converge") as progress:
+        return convergence(run, progress=progress)
+
+
+def _substeps(options: Mapping[str, OptionValue], usual: int) -> int:
+    """Return the number of substeps that options name; `usual` where they name none."""
+    value = options.get("substeps", usual)
+    if not isinstance(value, int):
+        raise BadInputError(f"substeps must be a whole number; got {shown(value)}")
+    return value

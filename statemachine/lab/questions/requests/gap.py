@@ -1,0 +1,127 @@
+"""How far apart two runs are, and whether that could be chance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ....errors import BadInputError, check_name
+from ....measures import QUANTITIES
+from ...compare.agreement import Comparison, WitnessResult, compare, witness
+from ...compare.perturbed import EXACT, ChaosFloor, Uncertainty, chaos_floor
+from ...compare.sides import Request
+from ...compare.two_sides import SidesRun, run_sides
+from ...runs.controllers import is_function
+from ...runs.reporter import QUIET, Reporter
+
+
+@dataclass(frozen=True)
+class CompareRequest:
+    """Question how far apart two runs are.
+
+    Attributes:
+        run: What is run on two sides, or recorded traces.
+        tolerances: By kind of quantity, such as "joint" [rad] or "tip" [m], over the usual ones.
+        uncertainty: How uncertain the start of the robot is, for the chaos floor; None for no
+            floor, which is faster.
+    """
+
+    run: Request
+    tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
+    uncertainty: Uncertainty | None = EXACT
+
+    def __post_init__(self) -> None:
+        for kind, tolerance in self.tolerances.items():
+            check_name("kind of quantity", kind, QUANTITIES)
+            if not tolerance >= 0:
+                raise BadInputError(f"the tolerance of {kind} must not be {tolerance:g}")
+
+    @property
+    def names_sides(self) -> bool:
+        """Whether what is said of the sides belongs to the answer: they are given, or commanded."""
+        return bool(self.run.sides) or is_function(self.run.what[0])
+
+
+@dataclass(frozen=True, eq=False)
+class CompareResult:
+    """How far apart two runs are.
+
+    Attributes:
+        request: What was asked.
+        run: Both runs, and how they were made.
+        comparison: Each quantity, with its tolerance and a verdict.
+        played: The same of the open loop, in which both sides get the commands of the left; None
+            where it is that of the closed one.
+        witness: The fingertips of both sides, as an independent witness computes them; None where
+            it cannot.
+        floor: How far apart runs get that differ by rounding alone; None where it was not asked
+            for, or both runs are recorded.
+    """
+
+    request: CompareRequest
+    run: SidesRun
+    comparison: Comparison
+    played: Comparison | None
+    witness: WitnessResult | None
+    floor: ChaosFloor | None
+
+    def figures(self) -> dict[str, object]:
+        """Return what JSON shows of it."""
+        figures: dict[str, object] = {
+            "comparison": self.comparison,
+            "touches": self.comparison.touches,
+            "witness": self.witness,
+            "floor": self.floor,
+        }
+        if self.request.names_sides:
+            figures |= self._figures_of_sides()
+        return figures
+
+    def _figures_of_sides(self) -> dict[str, object]:
+        """Return what JSON shows of the sides that were named."""
+        matched = self.run.matched
+        return {
+            "sides": self.request.run.both_sides(""),
+            "commands": self.run.commands,
+            "open_loop": self.comparison if self.played is None else self.played,
+            "unmatched": self.run.unmatched,
+            "only": ({}, {}) if matched is None else matched.only,
+        }
+
+
+def answer(request: CompareRequest, reporter: Reporter = QUIET) -> CompareResult:
+    """Run both sides, or open the traces, and compare.
+
+    Raises:
+        BadInputError: An uncertainty is given, and neither side is run here.
+        StateMachineError: As `run_sides` does.
+    """
+    with reporter.stage("compare") as progress:
+        run = run_sides(request.run, progress)
+    comparison = compare(*run.traces, tolerances=request.tolerances)
+    played = None
+    if run.played is not run.right:
+        played = compare(run.left, run.played, tolerances=request.tolerances)
+    fingertips = witness(*run.traces, run.file)
+    floor = _floor(request, run, comparison, reporter)
+    return CompareResult(request, run, comparison, played, fingertips, floor)
+
+
+def _floor(
+    request: CompareRequest, run: SidesRun, comparison: Comparison, reporter: Reporter
+) -> ChaosFloor | None:
+    """Compute the chaos floor of a comparison; None where neither side was run here."""
+    if request.uncertainty is None:
+        return None
+    if run.reruns == (None, None):
+        if request.uncertainty != EXACT:
+            raise BadInputError("--uncertainty runs both sides again, and both are recorded runs")
+        return None
+    with reporter.stage("chaos floor") as progress:
+        return chaos_floor(
+            comparison,
+            run.reruns,
+            seed=request.run.seed,
+            uncertain=request.uncertainty,
+            progress=progress,
+        )

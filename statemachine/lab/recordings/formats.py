@@ -1,0 +1,207 @@
+"""A trace as npz, a zip archive of NumPy arrays and of the header as text; or as parquet.
+
+Parquet is a table that other programs read, with the header in its metadata.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import math
+import zipfile
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from ...errors import TraceError
+from ...installed import require_extra
+from ...interface import MOCAP
+from .header import COLUMNS, CONTACTS, INPUTS, Header
+from .trace import WHOLE, Trace, as_column, check_shapes, check_size
+
+_HEADER_MOST = 2**24  # bytes of a header
+# Of the header in the metadata: a digest of header and columns, then the header. Parquet
+# has no checksum of its own that every reader looks at.
+_KEY = b"statemachine.trace.sha256"
+_DIGITS = hashlib.sha256().digest_size * 2
+
+
+def write_npz(trace: Trace, out: BinaryIO) -> None:
+    """Write it; in single precision, but for the inputs, if its header says so."""
+    columns: dict[str, Any] = dict(trace.columns)
+    if trace.header.single:
+        columns = {
+            name: array if name in (*INPUTS, *MOCAP, *WHOLE) else array.astype(np.float32)
+            for name, array in columns.items()
+        }
+    header = np.frombuffer(trace.header.as_json().encode(), dtype=np.uint8)
+    np.savez_compressed(out, header=header, **columns)
+
+
+def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
+    """Header and columns. What the archive says of itself is checked before it is unfolded."""
+    with zipfile.ZipFile(path) as archive:
+        entries = _entries(archive)
+        if "header" not in entries:
+            raise TraceError("has no header: it is not a trace")
+        header = _read_header(archive, entries.pop("header"))
+        described = {name: _describe(archive, entry) for name, entry in entries.items()}
+        for name, (_, kind) in described.items():
+            if kind.kind not in ("iu" if name in WHOLE else "fiu"):
+                what = "whole numbers" if name in WHOLE else "numbers"
+                raise TraceError(f"column {name!r} holds {kind}, not {what}")
+        check_shapes(header, {name: shape for name, (shape, _) in described.items()})
+        check_size(sum(8 * int(np.prod(shape)) for shape, _ in described.values()), path)
+        return header, {
+            name: as_column(name, _array_of(archive, entry)) for name, entry in entries.items()
+        }
+
+
+def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """The arrays by name."""
+    entries: dict[str, zipfile.ZipInfo] = {}
+    for entry in archive.infolist():
+        name = entry.filename.removesuffix(".npy")
+        if name == entry.filename:
+            raise TraceError(f"holds {name[:40]!r}, which is not an array")
+        if entry.comment or entry.extra:  # where a damaged list of contents hides its next entries
+            raise TraceError("has a damaged list of contents")
+        if name in entries:
+            raise TraceError(f"holds two arrays {name[:40]!r}")
+        entries[name] = entry
+    return entries
+
+
+def _describe(
+    archive: zipfile.ZipFile, entry: zipfile.ZipInfo
+) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and kind of an array, from its first bytes."""
+    with archive.open(entry) as file:
+        version = npy.read_magic(file)
+        if version not in ((1, 0), (2, 0)):
+            raise TraceError(f"holds an array of npy version {version}")
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, _, kind = read(file)
+    return shape, kind
+
+
+def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
+    shape, kind = _describe(archive, entry)
+    if kind != np.uint8 or len(shape) != 1:
+        raise TraceError("has a header that is not text: it is not a trace")
+    size = math.prod(shape)
+    if size > _HEADER_MOST:
+        raise TraceError(f"has a header of {size:,} bytes; at most {_HEADER_MOST:,}")
+    return Header.from_json(_array_of(archive, entry).tobytes().decode())
+
+
+def _array_of(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Any:
+    with archive.open(entry) as file:
+        array = npy.read_array(file, allow_pickle=False)
+        if file.read(1):  # its checksum is looked at when its end is reached
+            raise TraceError(f"has more in {entry.filename!r} than its array")
+    return array
+
+
+def write_parquet(trace: Trace, out: BinaryIO) -> None:
+    """Write it, compressed with zstd.
+
+    Raises:
+        MissingEngineError: pyarrow is not installed.
+    """
+    arrow, parquet = _pyarrow()
+    parquet.write_table(_table(trace, arrow), out, compression="zstd")
+
+
+def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
+    """Header and columns; refused unless their digest is the one that was written.
+
+    Raises:
+        MissingEngineError: pyarrow is not installed.
+    """
+    _, parquet = _pyarrow()
+    with parquet.ParquetFile(path) as file:
+        known = (file.metadata.metadata or {}).get(_KEY)
+        if known is None:
+            raise TraceError("has no header: it is not a trace")
+        digest, text = known[:_DIGITS].decode(), known[_DIGITS:].decode()
+        header = Header.from_json(text)
+        check_size(_unfolded_size(file.metadata, header), path)
+        columns = _columns(file.read(), header)
+    if digest != _digest(text, columns):
+        raise TraceError("is damaged: its numbers are not those that were written")
+    return header, columns
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    """The package pyarrow, and its part for parquet.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    require_extra("pyarrow.parquet", "parquet", "pyarrow", "parquet", "npz needs nothing more")
+    return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+
+
+def _digest(text: str, columns: dict[str, Any]) -> str:
+    """SHA-256 of a header and of the numbers that a file keeps, in hexadecimal digits."""
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(columns):
+        array = columns[name]
+        if 0 in array.shape[1:]:  # of no width, and not in the file
+            continue
+        if array.dtype.kind == "f":  # files do not tell one NaN from another
+            array = np.where(np.isnan(array), np.nan, array)
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _unfolded_size(metadata: Any, header: Header) -> int:
+    """Bytes of all numbers of a file, as far as it tells the truth.
+
+    Contacts, whose number no header says, count as they are packed. What the file says of a
+    single column is not asked for: where it is damaged, pyarrow ends the process.
+    """
+    width = sum(int(np.prod(header.shape(name), dtype=int)) for name in COLUMNS)
+    groups = (metadata.row_group(k) for k in range(metadata.num_row_groups))
+    return 8 * width * metadata.num_rows + sum(group.total_byte_size for group in groups)
+
+
+def _table(trace: Trace, arrow: Any) -> Any:
+    """Columns of one number, or of a list of as many as a row has; contacts as lists of rows."""
+    columns, offsets = {}, None
+    if "contact_row" in trace:
+        counts = np.bincount(trace["contact_row"], minlength=len(trace))
+        offsets = arrow.array(np.concatenate([[0], np.cumsum(counts)]).astype(np.int32))
+    for name in (*COLUMNS, *CONTACTS):
+        shape = trace.header.shape(name)
+        width = int(np.prod(shape, dtype=int))  # a column of empty lists cannot be written
+        if name in trace and width and name != "contact_row":
+            values = arrow.array(np.ascontiguousarray(trace[name]).reshape(-1))
+            values = arrow.FixedSizeListArray.from_arrays(values, width) if shape else values
+            is_contact = name in CONTACTS
+            columns[name] = arrow.ListArray.from_arrays(offsets, values) if is_contact else values
+    text = trace.header.as_json()
+    numbers = {name: as_column(name, array) for name, array in trace.columns.items()}
+    value = (_digest(text, numbers) + text).encode()
+    return arrow.table(columns).replace_schema_metadata({_KEY: value})
+
+
+def _columns(table: Any, header: Header) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
+    for name in (name for name in table.column_names if name in COLUMNS or name in CONTACTS):
+        values, shape = table[name].combine_chunks(), header.shape(name)
+        if name in CONTACTS:
+            counts = np.diff(values.offsets.to_numpy())
+            columns["contact_row"] = np.repeat(np.arange(len(values)), counts)
+            values = values.flatten()
+        flat = values.flatten() if shape else values
+        numbers = as_column(name, flat.to_numpy(zero_copy_only=False))
+        columns[name] = numbers.reshape(-1, *shape)
+    for name in ("qpos", "qvel", "ctrl", "xpos", "xquat", "site_xpos", "site_xmat"):
+        if name not in columns and 0 in header.shape(name):
+            columns[name] = np.empty((table.num_rows, *header.shape(name)))
+    return columns

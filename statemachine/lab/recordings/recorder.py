@@ -1,0 +1,459 @@
+"""Record a run, on any backend.
+
+The run itself is watched as little as possible: each step keeps the bytes of its inputs, and
+nothing else. What the engine derives from them is read while the run is *repeated* from its
+beginning with the recorded commands. The repetition must end in the same bits, row by row,
+which is checked: a trace is a proof that the run can be replayed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...backends import on_default
+from ...engines import room
+from ...errors import BadInputError, DivergedError, EngineError, StateMachineError, UnsupportedError
+from ...installed import DEFAULT
+from ...interface import (
+    DERIVED,
+    INPUTS,
+    MOCAP,
+    Array,
+    Data,
+    Model,
+    State,
+    forward,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
+from ...interface.checks import HUGE
+from ...interface.options import OptionValue
+from ...interface.records import Arrays, Defaults
+from ..runs.drive import Controller, Progress, drive, part_of, silent, steps_in
+from ..runs.provenance import provenance
+from ..runs.robot import warn_of_start
+from .header import Header
+from .trace import COLUMNS, CONTACTS, Trace
+
+
+@dataclass(frozen=True, eq=False)
+class RunStart:
+    """The state that a run starts in.
+
+    Attributes:
+        keyframe: A keyframe, by number or name; None for the default state.
+        state: A State to start from instead.
+        qpos: (nq,) positions [rad or m] that are written over that start; None for its own.
+        qvel: (nv,) velocities [rad/s or m/s] that are written over it; None for its own.
+
+    Raises:
+        BadInputError: It is a keyframe and a State.
+    """
+
+    keyframe: int | str | None = None
+    state: State | None = None
+    qpos: ArrayLike | None = None
+    qvel: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.state is not None and self.keyframe is not None:
+            raise BadInputError("a run starts from a keyframe or from a State, not from both")
+
+    def put(self, model: Model, data: Data) -> None:
+        """Put a Data of a Model to this start."""
+        if self.state is not None:
+            set_state(model, data, self.state)
+        else:
+            reset(model, data, self.keyframe)
+        if self.qpos is not None:
+            data.qpos = self.qpos
+        if self.qvel is not None:
+            data.qvel = self.qvel
+
+
+@dataclass(frozen=True, eq=False)
+class RunMetadata:
+    """The facts of a run that its trace carries in the header.
+
+    Attributes:
+        experiment: Its name; "" for that of the controller.
+        says: What happens, in a sentence.
+        command: What makes it again.
+        defaults: What `load` was given.
+        options: What `Model.replace` was given.
+        seed: What the controller was drawn from; None for nothing.
+    """
+
+    experiment: str = ""
+    says: str = ""
+    command: str = ""
+    defaults: Defaults = "model"
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
+    seed: int | None = None
+
+
+def record(
+    model: Model,
+    controller: Controller | None = None,
+    seconds: float = 2.0,
+    *,
+    start: RunStart = RunStart(),
+    metadata: RunMetadata = RunMetadata(),
+    derive: bool = True,
+    writes_state: bool = True,
+    progress: Progress = silent,
+) -> Trace:
+    """Run a controller from a start, and keep everything.
+
+    Args:
+        model: On any backend.
+        controller: Called before each step as f(time, data); what it returns is the ctrl
+            (nu,) of that step, None leaves ctrl alone. Without one nobody writes ctrl.
+        seconds: Simulated time.
+        start: Where to start; the default state where nothing is said.
+        metadata: What the header of the trace says of the run.
+        derive: Whether to repeat the run and record what the engine derives, too.
+        writes_state: Whether the controller may write more than ctrl.
+        progress: Told the fraction that is done.
+
+    Returns:
+        A trace with a row for each step and one for the end. If the engine diverges it has
+        the rows until then, and `header.ended` says why.
+
+    Raises:
+        BadInputError: The controller gave something that is not ctrl, or `seconds` is not a time.
+        EngineError: The repetition did not end in the same bits.
+    """
+    total = steps_in(model, seconds)
+    share = 0.3 if derive else 1.0
+    with make_data(model) as data:
+        start.put(model, data)
+        warn_of_start(model, data)
+        inputs, ended = _run(model, data, controller, total, part_of(progress, 0.0, share))
+    columns: dict[str, Any] = dict(inputs)
+    rewritten, energy_by = 0, ""
+    if derive:
+        more, rewritten = derived(model, start.put, inputs, part_of(progress, share, 1.0 - share))
+        if rewritten and (controller is None or not writes_state):
+            raise EngineError(
+                f"the run could not be repeated: {rewritten} rows began in another state; the "
+                "engine does not give the same bits twice"
+            )
+        columns |= more
+        gravity = metadata.options.get("gravity")
+        columns["energy"], energy_by = energies(
+            model, metadata.defaults, inputs["qpos"], inputs["qvel"], gravity
+        )
+    header = replace(
+        _header(model, controller, start, metadata),
+        energy_by=energy_by,
+        rewritten=rewritten,
+        ended=ended,
+    )
+    return Trace(header, columns)
+
+
+def _header(
+    model: Model, controller: Controller | None, start: RunStart, metadata: RunMetadata
+) -> Header:
+    """Return what is known of a run before it begins."""
+    return Header(
+        experiment=_experiment(metadata, controller),
+        says=metadata.says,
+        command=metadata.command,
+        provenance=provenance(model, metadata.seed),
+        defaults=metadata.defaults,
+        options={name: _plain(value) for name, value in metadata.options.items()},
+        keyframe=_keyframe_name(model, start.keyframe),
+        timestep=model.timestep,
+        substeps=model.substeps,
+        gravity=tuple(model.gravity.tolist()),
+        **layout_of(model),
+    )
+
+
+def _experiment(metadata: RunMetadata, controller: Controller | None) -> str:
+    """Return the name of an experiment: as it is said, else that of its controller."""
+    if metadata.experiment:
+        return metadata.experiment
+    return getattr(controller, "__name__", "") or "run"
+
+
+def _plain(option: Any) -> Any:
+    """Return the value of an option, an array as a list."""
+    return option.tolist() if isinstance(option, np.ndarray | np.generic) else option
+
+
+def _keyframe_name(model: Model, keyframe: int | str | None) -> str | None:
+    """Return the name of a keyframe that is given by number or name."""
+    return None if keyframe is None else model.keyframes[model.key_id(keyframe)].name
+
+
+class ModelLayout(TypedDict):
+    """The fields of a `Header` that are a model's: lengths, names, and where everything is."""
+
+    nq: int
+    nv: int
+    nu: int
+    nmocap: int
+    joints: tuple[str, ...]
+    sites: tuple[str, ...]
+    bodies: tuple[str, ...]
+    geoms: tuple[str, ...]
+    actuators: tuple[str, ...]
+    jnt_type: tuple[int, ...]
+    jnt_qposadr: tuple[int, ...]
+    jnt_dofadr: tuple[int, ...]
+    jnt_bodyid: tuple[int, ...]
+    geom_bodyid: tuple[int, ...]
+    body_parentid: tuple[int, ...]
+    actuator_jntid: tuple[int, ...]
+    ctrlrange: tuple[tuple[float, ...], ...]
+
+
+def layout_of(model: Model) -> ModelLayout:
+    """Return what a header says of a model: lengths, names, and where everything is."""
+    ctrlrange = tuple(tuple(row) for row in model.actuator_ctrlrange.tolist())
+    layout: ModelLayout = {
+        "nq": model.nq,
+        "nv": model.nv,
+        "nu": model.nu,
+        "nmocap": model.nmocap,
+        "joints": model.joint_names,
+        "sites": model.site_names,
+        "bodies": model.body_names,
+        "geoms": model.geom_names,
+        "actuators": model.actuator_names,
+        "jnt_type": tuple(model.jnt_type.tolist()),
+        "jnt_qposadr": tuple(model.jnt_qposadr.tolist()),
+        "jnt_dofadr": tuple(model.jnt_dofadr.tolist()),
+        "jnt_bodyid": tuple(model.jnt_bodyid.tolist()),
+        "geom_bodyid": tuple(model.geom_bodyid.tolist()),
+        "body_parentid": tuple(model.body_parentid.tolist()),
+        "actuator_jntid": tuple(model.actuator_jntid.tolist()),
+        "ctrlrange": ctrlrange,
+    }
+    return layout
+
+
+def _run(
+    model: Model, data: Data, controller: Controller | None, total: int, progress: Progress
+) -> tuple[Arrays, str]:
+    """Run, and return the inputs of each row as the step begins, and why the run ended early."""
+    times: list[float] = []
+    rows: tuple[list[bytes], ...] = ([], [], [])
+    led: dict[str, list[Array]] = {name: [] for name in MOCAP if model.nmocap}
+    # Bound methods: this loop is all that a recording costs while the run goes on.
+    keep_time, (keep_qpos, keep_qvel, keep_ctrl) = times.append, (row.append for row in rows)
+    qpos, qvel, ctrl = data.qpos.tobytes, data.qvel.tobytes, data.ctrl.tobytes
+    ended = ""
+    try:
+        for now in drive(model, data, controller, total, once_more=True):
+            keep_time(now)
+            keep_qpos(qpos())
+            keep_qvel(qvel())
+            keep_ctrl(ctrl())
+            for name, poses in led.items():
+                poses.append(getattr(data, name).copy())
+            if not len(times) & 255:
+                progress(len(times) / total)
+    except DivergedError as error:
+        if not data._trouble:  # a controller's own, of another Data
+            raise
+        # Without its advice, which is of no use here.
+        ended = str(error).partition(". This Data")[0]
+    kept = zip(INPUTS, rows, (model.nq, model.nv, model.nu), strict=True)
+    inputs: Arrays = {"time": np.array(times)}
+    for name, parts, width in kept:
+        inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
+    inputs |= {name: np.array(poses) for name, poses in led.items()}
+    rows_left = _rows_within_bounds(inputs)
+    if rows_left < len(times):
+        if not ended:
+            ended = f"a coordinate left every bound at {times[-1]:g} s"
+        inputs = {name: array[:rows_left] for name, array in inputs.items()}
+    _check_last_row(inputs)
+    progress(1.0)
+    return inputs, ended
+
+
+def _check_last_row(inputs: Arrays) -> None:
+    """Check that the controller left numbers: a step finds what is none, the last row has no step.
+
+    Raises:
+        BadInputError: An entry is not a finite number.
+    """
+    for name, array in inputs.items():
+        if not np.isfinite(array[-1]).all():
+            raise BadInputError(f"the controller left {name} with an entry that is not a number")
+
+
+def _rows_within_bounds(inputs: Arrays) -> int:
+    """Return how many rows a trace can hold: the last ones may have finite numbers beyond it."""
+    state = np.hstack([inputs["qpos"], inputs["qvel"]])
+    stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
+    return int(np.append(0, stands)[-1]) + 1  # the first is what it started from
+
+
+# What follows from the states of a run: what its engine derives, and energies by one yardstick.
+
+_TOLD = tuple(name for name in DERIVED if name in COLUMNS)
+Start = Callable[[Model, Data], None]
+
+
+def derived(
+    model: Model, begin: Start, inputs: Arrays, progress: Progress
+) -> tuple[dict[str, Any], int]:
+    """Repeat a run and read what is derived.
+
+    Args:
+        model: What was run.
+        begin: Puts a Data to the start.
+        inputs: Columns time (n,), qpos (n, nq), qvel (n, nv) and ctrl (n, nu) of the run, and
+            those of mocap poses, if there are any.
+        progress: Told the fraction that is done.
+
+    Returns:
+        The columns by name, those of contacts too; and how many rows began in another state
+        than the step before them left.
+    """
+    rows = len(inputs["time"])
+    arrays: dict[str, list[Array]] = {name: [] for name in _TOLD}
+    contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
+    after = is_stale(model)
+    rewritten = 0
+    with make_data(model) as data:
+        begin(model, data)
+        for k in range(rows):
+            rewritten += put_row(data, inputs, k)
+            if data.time != inputs["time"][k]:
+                data.time = float(inputs["time"][k])
+            if not after:
+                forward(model, data)
+                _read(data, k, arrays, contacts)
+            if k < rows - 1:
+                step(model, data)
+            elif after:
+                _one_more(model, data)
+            if after:
+                _read(data, k, arrays, contacts)
+            if k % 32 == 0:
+                progress(k / rows)
+    progress(1.0)
+    columns: dict[str, Any] = {name: np.array(values) for name, values in arrays.items()}
+    for name, width in CONTACTS.items():
+        kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
+        rows_of = [np.reshape(part, (-1, *width)) for part in contacts[name]]
+        columns[name] = np.concatenate([np.empty((0, *width), kind), *rows_of], dtype=kind)
+    return columns, rewritten
+
+
+def is_stale(model: Model) -> bool:
+    """Tell whether derived values are, after a step, of the state that the step began in.
+
+    They are of the state before its last engine step, or of none (RK4): of a Model with several
+    engine steps in one, or with that integrator, they must be asked for before the step.
+    """
+    behaviour = model.capabilities.behaviours["stale after a step"]
+    return model.substeps == 1 and behaviour.support != "unsupported"
+
+
+def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
+    """Write row `k` of the inputs into a Data, and tell whether it was in another state."""
+    others = [n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()]
+    for name in others:
+        getattr(data, name)[:] = inputs[name][k]
+    for name in ("ctrl", *MOCAP):
+        if name in inputs:
+            getattr(data, name)[:] = inputs[name][k]
+    return bool(others)
+
+
+def _one_more(model: Model, data: Data) -> None:
+    """Take the step that the last row would begin, so that it too is of the run itself.
+
+    `forward` may start afresh: PyBullet's contacts then lack what the run has built up.
+    A state that no step stands, as the last of a run that diverged, has nothing better.
+    """
+    state = get_state(model, data)
+    try:
+        step(model, data)
+    except DivergedError:
+        set_state(model, data, state)
+        forward(model, data)
+
+
+def array_or_nan(data: Data, name: str) -> Array:
+    """Return a derived array of a Data, copied; one that the backend does not tell is (nv,) NaN."""
+    try:
+        return np.array(getattr(data, name))  # it may be the engine's memory
+    except UnsupportedError:
+        return np.full(np.shape(data.qvel), np.nan)
+
+
+def _read(
+    data: Data, row: int, arrays: dict[str, list[Array]], contacts: dict[str, list[Any]]
+) -> None:
+    for name, values in arrays.items():
+        values.append(array_or_nan(data, name))
+    touching = data.contacts
+    if len(touching):
+        contacts["contact_row"].append(np.full(len(touching), row))
+        for name in ("geom", "dist", "pos", "frame", "force"):
+            contacts[f"contact_{name}"].append(np.array(getattr(touching, name)))
+
+
+def energies(
+    model: Model,
+    defaults: Defaults,
+    qpos: Array,
+    qvel: Array,
+    gravity: Any = None,
+    load: Callable[[Model], Model] = on_default,
+    made: Callable[[Model], AbstractContextManager[Data]] = make_data,
+) -> tuple[Array, str]:
+    """Compute the kinetic and potential energy of states.
+
+    They are those of the model's masses, rotors (armature) and gravity, computed by MuJoCo
+    whatever engine the states come from: so two runs are measured by one yardstick. An
+    engine that leaves something out (PyBullet as it comes has no rotors, and no gravity
+    until it is set) is measured by the file's, or by the gravity that it was given.
+
+    Args:
+        model: What the states are of.
+        defaults: What `load` was given for it.
+        qpos: (n, nq) positions [rad or m]; qvel: (n, nv) velocities.
+        qvel: See qpos.
+        gravity: (3,) that `Model.replace` was given for it [m/s²]; None for none.
+        load: Gives the model's file on MuJoCo; made: a Data of a Model there, which is changed.
+        made: See load.
+
+    Returns:
+        (n, 2) kinetic and potential energy [J], and the engine and version that gave them;
+        NaN and "" where MuJoCo is missing or cannot read the model.
+    """
+    unknown = np.full((len(qpos), 2), np.nan), ""
+    try:
+        yardstick = load(model)
+        if yardstick is not model:
+            if (yardstick.nq, yardstick.nv) != (qpos.shape[1], qvel.shape[1]):
+                return unknown
+            if defaults == "model":
+                yardstick = yardstick.replace(
+                    gravity=model.gravity, armature=model.dof_armature, mass=model.body_mass
+                )
+            elif gravity is not None:
+                yardstick = yardstick.replace(gravity=gravity)
+        joules = room(DEFAULT).energies(yardstick, qpos, qvel, made)
+    except StateMachineError:
+        return unknown
+    return joules, f"{DEFAULT} {yardstick.engine_version}"

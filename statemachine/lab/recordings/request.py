@@ -1,0 +1,215 @@
+"""What is recorded, or played again, and the trace of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ...backends import BackendChoice
+from ...backends.chosen import one_backend
+from ...errors import check_name, printable
+from ...installed import DEFAULT
+from ...measures.text import command
+from ...models import AnyPath
+from ..runs.controllers import (
+    Function,
+    function_file,
+    function_place,
+    function_scenario,
+    is_function,
+)
+from ..runs.reporter import QUIET, Reporter
+from ..runs.scenarios import SCENARIOS, Scenario, scenario
+from . import Trace, model_file, play, read, record_scenario
+
+_MODEL = "so101/scene"  # of a function, which names none
+
+
+@dataclass(frozen=True)
+class RecordRequest:
+    """Run that is to be recorded.
+
+    Attributes:
+        what: Name of an experiment; "FILE.py:FUNCTION", or a function itself, which is called
+            with (model, data) and returns ctrl (nu,), or None to leave it.
+        model: A name or a file of a model; None for the experiment's own.
+        backend: As `parse_backend` reads it.
+        menagerie: A menagerie folder to look the model's name up in.
+        keyframe: Name of the keyframe where it starts; None for the experiment's own, and for a
+            function's default state.
+        seconds: Simulated time [s]; None for the experiment's own.
+        timestep: Length of a step [s]; None for the model's own.
+        seed: Of what an experiment draws.
+    """
+
+    what: str | Function
+    model: AnyPath | None = None
+    backend: str = DEFAULT
+    menagerie: AnyPath | None = None
+    keyframe: str | None = None
+    seconds: float | None = None
+    timestep: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not is_function(self.what):
+            check_name("experiment", self.what, SCENARIOS)
+        self.chosen_backend()
+
+    def scenario(self) -> Scenario:
+        """Return what is done.
+
+        Raises:
+            UnknownNameError: There is no such experiment.
+            BadInputError: There is no such function, or its file fails.
+        """
+        if not isinstance(self.what, str) or is_function(self.what):
+            return function_scenario(self.what, keyframe=self.keyframe)
+        known = scenario(self.what)
+        return replace(known, keyframe=self.keyframe or known.keyframe)
+
+    def chosen_backend(self) -> BackendChoice:
+        """Return the backend, and whose defaults it has.
+
+        Raises:
+            UnknownNameError: There is no such backend.
+            BadInputError: It stands for several.
+        """
+        return one_backend([self.backend], "trace record")
+
+    @property
+    def name(self) -> str:
+        """What is done, in a word: the experiment, the stem of the file, or the function."""
+        if isinstance(self.what, str):
+            return function_file(self.what).stem
+        return function_place(self.what)[1]
+
+    @property
+    def file_name(self) -> str:
+        """Name that its trace has where no other is given."""
+        return f"{self.name}.{_in_a_name(self.chosen_backend())}.npz"
+
+    @property
+    def typed(self) -> str:
+        """Command that records it, without paths of this machine; "" of a function itself."""
+        if not isinstance(self.what, str):
+            return ""
+        words = ["statemachine", "trace", "record", Path(self.what).name]
+        if self.model is not None:
+            words.append(without_folders(self.model))
+        typed = command(
+            words,
+            ("--backend", str(self.chosen_backend()), DEFAULT),
+            ("--keyframe", self.keyframe, None),
+            ("--seconds", self.seconds, None),
+            ("--timestep", self.timestep, None),
+            ("--seed", self.seed, 0),
+        )
+        return printable(typed)
+
+
+@dataclass(frozen=True)
+class PlayRequest:
+    """Trace whose ctrl is to be played again, from the state that it starts in.
+
+    Attributes:
+        file: Of the trace.
+        model: A name or a file of a model; None for the trace's own.
+        backend: As `parse_backend` reads it.
+        menagerie: A menagerie folder to look the model up in.
+    """
+
+    file: AnyPath
+    model: AnyPath | None = None
+    backend: str = DEFAULT
+    menagerie: AnyPath | None = None
+
+    def __post_init__(self) -> None:
+        self.chosen_backend()
+
+    def chosen_backend(self) -> BackendChoice:
+        """Return the backend, and whose defaults it has.
+
+        Raises:
+            UnknownNameError: There is no such backend.
+            BadInputError: It stands for several.
+        """
+        return one_backend([self.backend], "trace play")
+
+    @property
+    def file_name(self) -> str:
+        """Name that the new trace has where no other is given."""
+        return f"{Path(self.file).stem}.{_in_a_name(self.chosen_backend())}.npz"
+
+    @property
+    def typed(self) -> str:
+        """Command that plays it, without paths of this machine."""
+        words = ["statemachine", "trace", "play", Path(self.file).name]
+        if self.model is not None:
+            words.append(without_folders(self.model))
+        return printable(command(words, ("--backend", str(self.chosen_backend()), None)))
+
+
+def answer_record(request: RecordRequest, reporter: Reporter = QUIET) -> Trace:
+    """Run an experiment or a function, and return the trace.
+
+    Raises:
+        StateMachineError: The model cannot be loaded, or the run makes no sense on it.
+    """
+    asked, backend = request.scenario(), request.chosen_backend()
+    model = backend.load_to_run(request.model or asked.model or _MODEL, menagerie=request.menagerie)
+    options = {}
+    if request.timestep is not None:
+        options["timestep"] = request.timestep
+    with reporter.stage(f"record {request.name} on {backend}") as progress:
+        return record_scenario(
+            asked,
+            model,
+            seconds=request.seconds,
+            seed=request.seed,
+            command=request.typed,
+            defaults=backend.defaults,
+            options=options,
+            progress=progress,
+        )
+
+
+def answer_play(request: PlayRequest, reporter: Reporter = QUIET) -> Trace:
+    """Play the ctrl of a trace on a backend, and return the trace of that run.
+
+    Raises:
+        TraceError: The file is not a trace, or does not fit the model.
+        StateMachineError: The model cannot be loaded.
+    """
+    trace, backend = read(request.file), request.chosen_backend()
+    if request.model is None:
+        file, is_same = model_file(trace.header, request.menagerie, request.file)
+        model = backend.load_to_run(file)
+        if not is_same:
+            reporter.note(
+                f"{trace.header.provenance.model_file} as it is here is not the file that the "
+                "trace was recorded with: its digest is another"
+            )
+    else:
+        model = backend.load_to_run(request.model, menagerie=request.menagerie)
+    if trace.header.options:
+        model = model.replace(**trace.header.options)
+    with reporter.stage(f"play on {backend}") as progress:
+        return play(
+            trace,
+            model,
+            command=request.typed,
+            defaults=backend.defaults,
+            options=trace.header.options,
+            progress=progress,
+        )
+
+
+def without_folders(model: AnyPath) -> str:
+    """Return a model as one types it, without folders."""
+    return Path(model).name if Path(model).is_file() else str(model)
+
+
+def _in_a_name(backend: BackendChoice) -> str:
+    """Return a backend as it stands in the name of a file, which has no colon on Windows."""
+    return str(backend).replace(":", ".")

@@ -1,0 +1,285 @@
+"""Runs that can be made again: of a scenario, or of a trace's start and commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import TraceError
+from ...interface import MOCAP, Array, Data, Model, make_data, reset
+from ...interface.options import OptionValue
+from ...interface.records import Defaults
+from ..runs.drive import Controller, Progress, check_length, silent
+from ..runs.scenarios import Scenario
+from .header import Header
+from .recorder import RunMetadata, RunStart, record
+from .trace import Trace
+
+
+class SideStart(NamedTuple):
+    """The start of a run: qpos (nq,), qvel (nv,), ctrl (nu,)."""
+
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+
+
+def start_of(model: Model, keyframe: int | str | None) -> SideStart:
+    """Return where a Model starts: in a keyframe, or in its default state if that is None."""
+    with make_data(model) as data:
+        reset(model, data, keyframe)
+        return SideStart(data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
+
+
+@dataclass(frozen=True, eq=False)
+class Rerun:
+    """The run of a side, so that it can be run again.
+
+    Attributes:
+        model: With all its options.
+        controller: Makes a fresh controller of a Model; it may give None for none.
+        seconds: Simulated time.
+        keyframe: Where it starts; qpos, qvel: written over that.
+        defaults: What `load` was given, for the header of the trace.
+        options: What `Model.replace` was given, likewise.
+        experiment, says, seed: Name, sentence and seed of what is done, likewise.
+        writes_state: Whether the controller may write more than ctrl.
+    """
+
+    model: Model
+    controller: Callable[[Model], Controller | None]
+    seconds: float
+    keyframe: int | str | None = None
+    qpos: Array | None = None
+    qvel: Array | None = None
+    defaults: Defaults = "model"
+    options: dict[str, OptionValue] = field(default_factory=dict)
+    experiment: str = ""
+    says: str = ""
+    seed: int | None = None
+    writes_state: bool = True
+
+    def record(
+        self,
+        *,
+        controller: Controller | None = None,
+        qpos: Array | None = None,
+        qvel: Array | None = None,
+        command: str = "",
+        derive: bool = True,
+        progress: Progress = silent,
+    ) -> Trace:
+        """Record the run.
+
+        Args:
+            controller: Instead of a fresh one.
+            qpos: (nq,) where it starts, instead of its own [rad or m].
+            qvel: (nv,) its velocities there, instead of its own [rad/s or m/s].
+            command: What makes the trace again.
+            derive: Whether to record what the engine derives, too.
+            progress: Told the fraction that is done.
+        """
+        start = RunStart(
+            keyframe=self.keyframe,
+            qpos=self.qpos if qpos is None else qpos,
+            qvel=self.qvel if qvel is None else qvel,
+        )
+        metadata = RunMetadata(
+            experiment=self.experiment,
+            says=self.says,
+            command=command,
+            defaults=self.defaults,
+            options=self.options,
+            seed=self.seed,
+        )
+        return record(
+            self.model,
+            self.controller(self.model) if controller is None else controller,
+            self.seconds,
+            start=start,
+            metadata=metadata,
+            derive=derive,
+            writes_state=self.writes_state,
+            progress=progress,
+        )
+
+    def start(self) -> tuple[Array, Array]:
+        """Return the positions (nq,) and velocities (nv,) that it starts with."""
+        qpos, qvel, _ = start_of(self.model, self.keyframe)
+        if self.qpos is not None:
+            qpos = np.array(self.qpos)
+        if self.qvel is not None:
+            qvel = np.array(self.qvel)
+        return qpos, qvel
+
+
+def rerun_of(
+    scenario: Scenario,
+    model: Model,
+    *,
+    seconds: float | None = None,
+    seed: int = 0,
+    defaults: Defaults = "model",
+    options: dict[str, OptionValue] | None = None,
+) -> Rerun:
+    """Return how a scenario is run on a Model; arguments are those of `record_scenario`."""
+    scenario = scenario.on(model)
+    chosen = dict(scenario.options)
+    if options is not None:
+        chosen |= options
+    return Rerun(
+        model=model.replace(**chosen) if chosen else model,
+        controller=lambda replaced: scenario.controller(replaced, seed),
+        seconds=scenario.seconds if seconds is None else seconds,
+        keyframe=scenario.keyframe,
+        defaults=defaults,
+        options=chosen,
+        experiment=scenario.name,
+        says=scenario.says,
+        seed=seed if scenario.seeded else None,
+        writes_state=scenario.own,  # ours write nothing but ctrl
+    )
+
+
+def replayed(
+    trace: Trace,
+    model: Model,
+    defaults: Defaults = "model",
+    options: dict[str, OptionValue] | None = None,
+) -> Rerun:
+    """Return the start and the commands of a trace on a Model of its layout."""
+    header = trace.header
+    return Rerun(
+        model=model,
+        controller=lambda _model: commands_of(trace),
+        seconds=float(trace.time[-1] - trace.time[0]),
+        qpos=trace.qpos[0],
+        qvel=trace.qvel[0],
+        defaults=defaults,
+        options={} if options is None else options,
+        experiment=header.experiment,
+        says=header.says,
+        seed=header.provenance.seed,
+        writes_state=False,
+    )
+
+
+def record_scenario(
+    scenario: Scenario,
+    model: Model,
+    *,
+    seconds: float | None = None,
+    seed: int = 0,
+    command: str = "",
+    defaults: Defaults = "model",
+    options: dict[str, OptionValue] | None = None,
+    progress: Progress = silent,
+) -> Trace:
+    """Record a scenario on a model, which is given as loaded.
+
+    Args:
+        scenario: What to do, as it is on that model; its options are put into it.
+        model: Of any backend.
+        seconds: Simulated time; None for the scenario's own.
+        seed: Of what the scenario draws.
+        command: What makes this trace again.
+        defaults: What `load` was given.
+        options: Further options for `Model.replace`, which win over the scenario's.
+        progress: Told the fraction that is done.
+
+    Raises:
+        UnsupportedError: The backend lacks one of the options.
+        UnknownNameError: The model lacks the keyframe.
+        BadInputError: The scenario makes no sense on the model, or a timestep is longer than
+            the run.
+    """
+    rerun = rerun_of(
+        scenario, model, seconds=seconds, seed=seed, defaults=defaults, options=options
+    )
+    check_length(rerun.model, rerun.seconds)
+    return rerun.record(command=command, progress=progress)
+
+
+def play(
+    trace: Trace,
+    model: Model,
+    *,
+    command: str = "",
+    defaults: Defaults = "model",
+    options: dict[str, OptionValue] | None = None,
+    progress: Progress = silent,
+) -> Trace:
+    """Play the ctrl of a trace, from the state it starts in, on another model or engine.
+
+    Where the timesteps differ, a command holds until the time of the next one.
+
+    Raises:
+        TraceError: The model has other joints or actuators, in name or in order.
+    """
+    _check_layout(trace.header, model)
+    rerun = replayed(trace, model, defaults, options)
+    return rerun.record(command=command, progress=progress)
+
+
+def _check_layout(header: Header, model: Model) -> None:
+    """Check that a Model has the joints, actuators and mocap bodies of a trace.
+
+    Raises:
+        TraceError: It has others.
+    """
+    for what, ours, theirs in (
+        ("joints", model.joint_names, header.joints),
+        ("actuators", model.actuator_names, header.actuators),
+    ):
+        if tuple(ours) != tuple(theirs):
+            raise TraceError(
+                f"the trace has other {what} than {model.path.name}: "
+                f"{', '.join(theirs)} and {', '.join(ours)}"
+            )
+    if (header.nq, header.nv) != (model.nq, model.nv):
+        raise TraceError("the trace's joints are of other kinds than the model's")
+    if header.nmocap != model.nmocap:
+        raise TraceError(
+            f"the trace has {header.nmocap} mocap bodies, and the model {model.nmocap}"
+        )
+
+
+def commands_of(trace: Trace) -> Controller:
+    """Return a controller that gives the ctrl of a trace.
+
+    A command holds until the time of the next. The poses of mocap bodies are written likewise.
+    """
+    led = [name for name in MOCAP if name in trace]
+    commands, start = trace.ctrl, float(trace.time[0])
+    # A hair early, so that a sum of timesteps does not miss the row that it means.
+    times = trace.time - start - 1e-6 * trace.timestep
+    began: list[float] = []
+
+    def controller(time: float, data: Data) -> Array:
+        if not began:
+            began.append(time)
+        row = int(np.searchsorted(times, time - began[0], side="right")) - 1
+        row = max(0, min(row, len(commands) - 1))
+        for name in led:
+            getattr(data, name)[:] = trace[name][row]
+        return commands[row]
+
+    return controller
+
+
+def beginning_with(first: Callable[[Data], Array], controller: Controller) -> Controller:
+    """Return a controller that begins with some ctrl (nu,), where it gives none of its own."""
+    begun = False
+
+    def beginning(time: float, data: Data) -> Any:
+        nonlocal begun
+        ctrl = controller(time, data)
+        if ctrl is None and not begun:
+            ctrl = first(data)
+        begun = True
+        return ctrl
+
+    return beginning

@@ -1,0 +1,266 @@
+"""A controller of the user's own, from a Python file."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import itertools
+import linecache
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ...errors import BadInputError, did_you_mean
+from ...interface import Data, Model
+from ...interface.checks import as_vector
+from ...measures.text import count, few
+from ...models import what_is_there
+from .drive import Controller
+from .scenarios import Scenario
+
+# A Python file of a user's: load it, and say in one line what went wrong in it.
+
+_LONGEST = 200  # characters of an error's own text
+
+
+def load_module(name: str, path: Path) -> Any:
+    """A file as a module of a name.
+
+    Raises:
+        BaseException: Whatever the file raises.
+    """
+    spec: Any = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and pickle look it up there
+    spec.loader.exec_module(module)
+    return module
+
+
+def misfit(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
+    """The signature of a function that cannot be called like this, and why; else twice ""."""
+    try:
+        inspect.signature(function).bind(*arguments, **named)
+    except TypeError as error:
+        return str(inspect.signature(function)), str(error)
+    except ValueError:  # something of C's without a signature
+        pass
+    return "", ""
+
+
+def line_of(error: BaseException, file: Path) -> tuple[Path, int, str]:
+    """The last line of the user's that had a part in an error: file, number and text.
+
+    Of the file, or of another in its folder or below, but for packages that live there; 0 and ""
+    if there is none.
+    """
+    if isinstance(error, SyntaxError) and _is_users(Path(error.filename or ""), file):
+        return Path(error.filename or ""), error.lineno or 0, (error.text or "").strip()
+    for frame, number in reversed(list(traceback.walk_tb(error.__traceback__))):
+        place = Path(frame.f_code.co_filename)
+        if _is_users(place, file):
+            return place, number, linecache.getline(str(place), number).strip()
+    return file, 0, ""
+
+
+def _is_users(place: Path, file: Path) -> bool:
+    beside = file.parent in place.parents and not {"site-packages", "statemachine"} & set(
+        place.relative_to(file.parent).parts
+    )
+    return place == file or (beside and place.is_file())
+
+
+def said(error: BaseException) -> str:
+    """The kind and the text of an error, in one line."""
+    # A SyntaxError's text names file and line once more.
+    words = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
+    if len(words) > _LONGEST:
+        words = words[:_LONGEST] + " …"
+    known: dict[type[BaseException], str] = {
+        SystemExit: "it ends the program (sys.exit with "
+        f"{getattr(error, 'code', None)!r}) where it should return",
+        MemoryError: "it asks for more memory than there is for it",
+        RecursionError: "it calls itself without end",
+        EOFError: "EOFError: it asks for input, and nobody types here. A function gets what it "
+        'needs as arguments; the rest belongs below `if __name__ == "__main__":`',
+    }
+    for kind, text in known.items():
+        if isinstance(error, kind):
+            return text
+    name = type(error).__name__
+    return f"{name}: {words}" if words else name
+
+
+Function = Callable[..., Any]
+_TAKES = ("model", "data")  # by position
+
+
+def is_function(spec: str | Function) -> bool:
+    """Tell whether something is a function, or a word FILE.py or FILE.py:NAME."""
+    return callable(spec) or Path(_place(spec)[0]).suffix == ".py"
+
+
+def function_scenario(
+    spec: str | Function,
+    every: int = 1,
+    keyframe: str | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Scenario:
+    """Return what a function (model, data) of the user's does on any robot.
+
+    Each controller of "FILE.py:NAME" has the file's names to itself: it is run anew for each.
+
+    Args:
+        spec: The function; or a file and a function of it, without a name `controller`.
+        every: The function is called at the first of so many steps, and its ctrl holds.
+        keyframe: Where it starts; None for the default state.
+        parameters: Further keyword arguments of the function.
+
+    Raises:
+        BadInputError: There is no such file or function, or the file fails; the controller
+            raises it where the function fails, or returns what is not ctrl.
+    """
+    path, name = function_place(spec)
+    given = dict(parameters or {})
+
+    def imported() -> Function:
+        if isinstance(spec, str):
+            return _imported(path, name, given)
+        _check_takes(spec, name, path, given)
+        return spec
+
+    imported()  # that it fails is said before anything is loaded
+
+    def controller_of(model: Model, _seed: int) -> Controller:
+        function = imported()
+        numbers = itertools.count()
+
+        def controller(time: float, data: Data) -> Any:
+            if next(numbers) % every:
+                return None
+            with _errors_of(path, time):
+                ctrl = function(model, data, **given)
+                return None if ctrl is None else as_vector(ctrl, (model.nu,), "ctrl")
+
+        return controller
+
+    called = Path(spec).name if isinstance(spec, str) else name
+    steps = "every step" if every == 1 else f"every {count(every, 'step')}"
+    begins = "the default state" if keyframe is None else f"the keyframe {keyframe!r}"
+    says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
+    return Scenario(
+        name=called,
+        says=says,
+        model="",
+        seconds=2.0,
+        controller=controller_of,
+        elsewhere=says,
+        needs=lambda _model: None,
+        keyframe=keyframe,
+        own=True,
+    )
+
+
+def parameters_of(spec: str) -> tuple[str, ...]:
+    """What the function (model, data, …) that "FILE.py:NAME" says takes by keyword.
+
+    Raises:
+        BadInputError: There is no such function, or the file fails.
+    """
+    path, name = _place(spec)
+    try:
+        given = inspect.signature(_function(path, name)).parameters.values()
+    except ValueError:  # something of C's without a signature
+        return ()
+    kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    takes = [parameter.name for parameter in given if parameter.kind in kinds][: len(_TAKES)]
+    named = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
+    return tuple(
+        parameter.name
+        for parameter in given
+        if parameter.kind in named and parameter.name not in takes
+    )
+
+
+def function_file(spec: str) -> Path:
+    """Return the file that "FILE.py:NAME" names."""
+    return _place(spec)[0]
+
+
+def function_place(spec: str | Function) -> tuple[Path, str]:
+    """Return the file and the name of a function of the user's."""
+    if isinstance(spec, str):
+        return _place(spec)
+    code = getattr(inspect.unwrap(spec), "__code__", None)
+    path = Path(code.co_filename if code is not None else type(spec).__name__)
+    return path, getattr(spec, "__name__", type(spec).__name__)
+
+
+def _place(spec: str) -> tuple[Path, str]:
+    """The file and the name of a function."""
+    file, colon, name = spec.rpartition(":")
+    if not colon or name.endswith(".py") or "/" in name or "\\" in name:
+        file, name = spec, "controller"
+    return Path(file), name
+
+
+def _imported(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
+    """A function of a file, which is run for it, that can be called like this."""
+    function = _function(path, name)
+    _check_takes(function, name, path, parameters)
+    return function
+
+
+def _check_takes(function: Function, name: str, path: Path, parameters: Mapping[str, Any]) -> None:
+    """Check that a function can be called with a Model, a Data and these parameters."""
+    takes, _ = misfit(function, *_TAKES, **parameters)
+    if takes:
+        called_with = ", ".join((*_TAKES, *parameters))
+        raise BadInputError(
+            f"{name} of {path.name} takes {takes}, and is called with ({called_with})"
+        )
+
+
+def _function(path: Path, name: str) -> Function:
+    """A function of a file, which is run for it."""
+    if path.suffix != ".py" or not path.is_file():
+        raise _missing(path)
+    with _errors_of(path):
+        module = load_module(f"controller_{path.stem}", path)
+    function = getattr(module, name, None)
+    if not callable(function):
+        functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
+        hint = did_you_mean(name, functions)
+        if functions and not hint:
+            hint = f"; it has {few(functions)}"
+        raise BadInputError(f"{path.name} has no function {name}({', '.join(_TAKES)}){hint}")
+    return function
+
+
+def _missing(path: Path) -> BadInputError:
+    if path.suffix != ".py":
+        return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {str(path)!r}")
+    if (kind := what_is_there(path)) != "nothing":
+        return BadInputError(f"{path} is {kind}, not a controller file")
+    beside = [f.name for f in path.parent.glob("*.py")] if path.parent.is_dir() else []
+    hint = did_you_mean(path.name, beside, 0.6)
+    return BadInputError(f"there is no controller file {path}{hint}")
+
+
+@contextmanager
+def _errors_of(path: Path, time: float | None = None) -> Iterator[None]:
+    """Run what is in a file, its folder among those of Python; an error is one line about it."""
+    folder = str(path.parent.absolute())
+    sys.path.insert(0, folder)  # as when the file is run
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        place, line, _ = line_of(error, path.absolute())
+        where = place.name + (f", line {line}" if line else "")
+        when = "" if time is None else f", at {time:.3f} s"
+        raise BadInputError(f"{where}{when}: {said(error)}") from error
+    finally:
+        if folder in sys.path:
+            sys.path.remove(folder)

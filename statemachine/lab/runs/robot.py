@@ -1,0 +1,312 @@
+"""The parts of a robot, by what drives and carries them: joints, bodies, contacts."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...backends.starts import overlap_warning, usual_start
+from ...errors import BadInputError, EngineWarning, UnsupportedError
+from ...interface import (
+    MOCAP,
+    Array,
+    Contacts,
+    Data,
+    JointType,
+    Model,
+    forward,
+    make_data,
+    reset,
+)
+from ...interface.checks import check_entries
+from ...measures import ContactNames
+from ...measures.text import few
+
+ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+_PLANE, _HFIELD = 0, 1  # mjtGeom
+
+
+def is_the_arm(model: Model) -> bool:
+    """Whether the robot is an SO-101, ours or another's: that what is driven has its names."""
+    driven = model.actuator_jntid.tolist()
+    return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == ARM
+
+
+def has_floor(model: Model) -> bool:
+    """Whether a plane or a height field that can be touched stands still in the scene."""
+    compiled = model.compiled
+    if compiled is None:
+        return False
+    static = ~np.isin(model.geom_bodyid, list(carried_by(model, set(model.jnt_bodyid.tolist()))))
+    touches = (compiled.geom_contype != 0) | (compiled.geom_conaffinity != 0)
+    return bool((static & touches & np.isin(compiled.geom_type, (_PLANE, _HFIELD))).any())
+
+
+def scalar_joint(model: Model, name: str) -> tuple[int, int]:
+    """Addresses in qpos and qvel of a joint that must be a hinge or a slide."""
+    joint = model.joint_id(name)
+    if model.jnt_type[joint] not in (JointType.HINGE, JointType.SLIDE):
+        raise BadInputError(f"joint {name!r} is neither a hinge nor a slide")
+    return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+
+
+def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
+    """A full ctrl (nu,) from values; the error says how many are needed, or which is invalid."""
+    array = np.array(list(values), dtype=np.float64)
+    if array.shape != (model.nu,):
+        raise BadInputError(
+            f"{name} wants {model.nu} numbers, one for each actuator; got {array.size}"
+        )
+    check_entries(array, name)
+    return array
+
+
+def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
+    """These bodies and all that hang on them."""
+    carried = set(bodies)
+    for body in range(1, model.nbody):  # parents come before children
+        if int(model.body_parentid[body]) in carried:
+            carried.add(body)
+    return frozenset(carried)
+
+
+def carried_by_joint(model: Model, joint: str) -> frozenset[int]:
+    """Return the bodies that a joint moves."""
+    return carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
+
+
+def moved_by_actuators(model: Model) -> frozenset[int]:
+    """The robot's moving part: what the actuated joints carry."""
+    joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
+    return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
+
+
+def trees_of_actuators(model: Model) -> frozenset[int]:
+    """The whole robot: each tree of bodies of which an actuator drives a joint, its base included.
+
+    Where actuators drive no joint (but a tendon, a site or a body), all trees that move.
+    """
+    joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
+    bodies = {int(model.jnt_bodyid[joint]) for joint in joints or range(model.njnt)}
+    for body in range(model.nbody - 1, 0, -1):  # parents come before children
+        if body in bodies and model.body_parentid[body]:
+            bodies.add(int(model.body_parentid[body]))
+    return carried_by(model, bodies)
+
+
+def touching(
+    model: Model,
+    contacts: Contacts,
+    bodies: frozenset[int] | None = None,
+    each_other: bool = False,
+) -> tuple[str, ...]:
+    """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once.
+
+    Without `bodies`, whatever touches; with `each_other`, also what of them touches one another.
+    """
+    geoms = contacts.geom
+    if bodies is not None:
+        inside = np.isin(model.geom_bodyid[geoms], list(bodies)).sum(axis=1)
+        geoms = geoms[(inside == 1) | (each_other & (inside == 2))]
+    names = ContactNames.of(model) if len(geoms) else None
+    return tuple(dict.fromkeys(names.geoms(*pair) for pair in geoms.tolist())) if names else ()
+
+
+def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
+    """How many contacts each pair of bodies has, as {"gripper on box": 6}."""
+    names = ContactNames.of(model)
+    return Counter(names.pair(*geoms) for geoms in contacts.geom.tolist())
+
+
+# What a robot of any kind is told: where it starts, a pose to hold, waves to follow.
+#
+# A number of ctrl is what its actuator makes of it: a position servo takes it as a target, a motor
+# as a force. So a pose is asked of servos only, and a motor gets the force that holds its joint.
+
+TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
+_PART = 0.25  # of its range: how far a servo is sent
+_FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
+_OUTSIDE = 1e-3  # rad, m; less is how a file rounds its numbers
+_START = "the run starts outside of joint limits [rad or m]: {joints}{inside}"
+_INSIDE = "; inside with --keyframe {names}"
+_NO_FORCE = 1e-9  # N·m or N; less is rounding
+_DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
+
+
+def warn_of_start(model: Model, data: Data) -> None:
+    """Issue an EngineWarning of what is wrong with the state that a run starts in.
+
+    That is a hinge or a slide outside of its limits, and shapes inside each other.
+
+    Args:
+        model: What is run.
+        data: In the state that it starts in.
+    """
+    places = {name: getattr(data, name) for name in ("qpos", *MOCAP)}
+    if text := overlap_warning(model, places):
+        warnings.warn(text, EngineWarning, stacklevel=3)
+    _warn_of_limits(model, data.qpos)
+
+
+def _warn_of_limits(model: Model, qpos: Array) -> None:
+    """Warn of hinges and slides that are outside of their limits; `qpos` (nq,)."""
+    scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
+    joints = np.flatnonzero(scalar & model.jnt_limited)
+    starts = np.array([qpos, *(frame.qpos for frame in model.keyframes)])
+    at, (low, high) = starts[:, model.jnt_qposadr[joints]], model.jnt_range[joints].T
+    here, *there = np.maximum(low - at, at - high).round(6)
+    outside: list[str] = []
+    for k in np.argsort(-here, kind="stable"):
+        if here[k] > _OUTSIDE:
+            name = model.joint_names[joints[k]] or f"joint {joints[k]}"
+            outside.append(f"{name} by {here[k]:.3g}")
+    if outside:
+        frames = zip(model.keyframes, there, strict=True)
+        names = [f.name for f, beyond in frames if f.name and beyond.max() <= _OUTSIDE]
+        inside = _INSIDE.format(names=few(names, 3, " or ")) if names else ""
+        text = _START.format(joints=few(outside, 1), inside=inside)
+        warnings.warn(text, EngineWarning, stacklevel=4)
+
+
+def home(model: Model) -> str | None:
+    """The keyframe "home" if there is one, as is the custom; None for the default state."""
+    return usual_start(model)
+
+
+def start_keyframe(model: Model) -> str | None:
+    """Where a lesson starts: the arm in its default state, another robot at home."""
+    return None if is_the_arm(model) else home(model)
+
+
+def is_servo(model: Model) -> NDArray[np.bool_]:
+    """(nu,) whether each number of ctrl is the target of a position servo on a hinge or slide."""
+    return np.isfinite(model.actuator_kp) & _on_scalar_joint(model)
+
+
+def _on_scalar_joint(model: Model) -> NDArray[np.bool_]:
+    kinds = np.append(model.jnt_type, -1)[model.actuator_jntid]  # -1: it drives no joint
+    return np.isin(kinds, (int(JointType.HINGE), int(JointType.SLIDE)))
+
+
+def start_ctrl(model: Model) -> Array:
+    """Ctrl (nu,) at the start: the keyframe's, else zero."""
+    key = home(model)
+    return np.zeros(model.nu) if key is None else model.keyframes[model.key_id(key)].ctrl.copy()
+
+
+def hold_ctrl(model: Model) -> Array:
+    """The command (nu,) of `hold`: a pose for the servos, and what holds the other joints.
+
+    The SO-101 gets its own pose. Of another robot each position servo is sent from where it
+    starts by a quarter of its range, towards the farther end, and by at most 0.5 rad or 0.1 m. A
+    motor gets the force against gravity at the start, as far as that is known and in its range;
+    what else there is, as a muscle or a thruster, is left at the start's ctrl.
+
+    Raises:
+        BadInputError: The model has no actuators.
+    """
+    need_actuators(model)
+    if is_the_arm(model) and model.nu == len(TARGET):
+        return np.array(TARGET)
+    qpos, load = _start(model)
+    ctrl, servos, key = start_ctrl(model), is_servo(model), home(model)
+    for i in range(model.nu):
+        low, high = model.actuator_ctrlrange[i]
+        joint, gear = model.actuator_jntid[i], float(model.actuator_gear[i])
+        if servos[i]:
+            begin = ctrl[i] if key else float(qpos[model.jnt_qposadr[joint]] * gear)
+            most = _FARTHEST[JointType(int(model.jnt_type[joint]))] * abs(gear)
+            ctrl[i] = farther(begin, _reachable(model, i), most)
+        elif load is not None and _holds(model, i):
+            force = load[model.jnt_dofadr[joint]] / np.count_nonzero(model.actuator_jntid == joint)
+            if abs(force) > _NO_FORCE:
+                factor = model.actuator_gain[i] * gear
+                ctrl[i] = np.clip(force / factor, low, high)
+    return np.array([float(f"{value:.{_DIGITS}g}") + 0.0 for value in ctrl])
+
+
+def need_actuators(model: Model) -> None:
+    """Raise BadInputError for a model that nothing can be commanded in."""
+    if not model.nu:
+        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
+
+
+def _start(model: Model) -> tuple[Array, Array | None]:
+    """Qpos (nq,) at the start, and the force (nv,) that keeps it there, if that is told."""
+    with make_data(model) as data:
+        reset(model, data, home(model))
+        data.qvel[:] = 0
+        forward(model, data)
+        try:  # springs and what compensates for gravity are passive
+            load = np.array(data.qfrc_bias - data.qfrc_passive)
+        except UnsupportedError:
+            load = None
+        return data.qpos.copy(), load
+
+
+def load_at_start(model: Model) -> Array:
+    """The size (nv,) of the force that keeps each joint where it starts; zero if not told."""
+    _, load = _start(model)
+    return np.zeros(model.nv) if load is None else np.abs(load)
+
+
+def _reachable(model: Model, i: int) -> tuple[float, float]:
+    """What a servo may be told: its ctrlrange, within what its joint can reach."""
+    low, high = (float(end) for end in model.actuator_ctrlrange[i])
+    joint = model.actuator_jntid[i]
+    if model.jnt_limited[joint]:
+        ends = np.sort(model.jnt_range[joint] * model.actuator_gear[i])
+        if max(low, ends[0]) < min(high, ends[1]):
+            low, high = max(low, float(ends[0])), min(high, float(ends[1]))
+    return low, high
+
+
+def farther(begin: float, ends: tuple[float, float], most: float = np.inf) -> float:
+    """A step from a beginning towards the farther of two ends."""
+    low, high = ends
+    begin = min(max(begin, low), high)
+    step = min(_PART * (high - low), most)
+    return begin + step if high - begin >= begin - low else begin - step
+
+
+def _holds(model: Model, i: int) -> bool:
+    """Whether an actuator is a motor on a joint that hangs on no floating base.
+
+    The legs of a robot that floats carry what the floor gives back, which is not known.
+    """
+    if not (np.isfinite(model.actuator_gain[i]) and _on_scalar_joint(model)[i]):
+        return False
+    if not model.actuator_gain[i] * model.actuator_gear[i]:
+        return False
+    body = int(model.jnt_bodyid[model.actuator_jntid[i]])
+    while body:
+        kinds = model.jnt_type[model.jnt_bodyid == body]
+        if np.isin(kinds, (int(JointType.FREE), int(JointType.BALL))).any():
+            return False
+        body = int(model.body_parentid[body])
+    return True
+
+
+def waves(model: Model, seed: int) -> tuple[Array, Array, Array, Array]:
+    """Waves for every actuator: middle (nu,); size, frequency [Hz], phase (3, nu) of three sines.
+
+    They stay within the middle half of its range; without a range, of one from -1 to 1. A robot
+    with a keyframe "home" is moved about that one's ctrl.
+    """
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    low, high = np.nan_to_num(model.actuator_ctrlrange, posinf=1.0, neginf=-1.0).T
+    draw = np.random.default_rng(seed)
+    frequency = draw.uniform(0.2, 1.5, (3, model.nu))  # Hz
+    phase = draw.uniform(0.0, 2 * np.pi, (3, model.nu))
+    size = draw.uniform(0.2, 1.0, (3, model.nu))
+    size *= 0.25 * (high - low) / size.sum(axis=0)
+    middle = (low + high) / 2
+    if home(model) is not None:
+        quarter = 0.25 * (high - low)
+        middle = np.clip(start_ctrl(model), low + quarter, high - quarter)
+    return middle, size, frequency, phase

@@ -1,0 +1,209 @@
+"""What a robot can be asked to do on any engine: a start, a command over time, an end.
+
+A scenario says no word about an engine. Recorded on two of them it is what they are compared by.
+It is written for the SO-101; `Scenario.on` gives what it is on another robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...errors import BadInputError, check_name
+from ...interface import Array, Data, Model
+from ...interface.options import OptionValue
+from .drive import Controller
+from .robot import has_floor, hold_ctrl, home, is_the_arm, need_actuators, waves
+
+# Swings the arm with the box in its jaws by 23 degrees.
+MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One thing to do.
+
+    Attributes:
+        name: What it is called.
+        says: What happens, in one sentence.
+        model: The model that it is meant for.
+        seconds: How long it takes [s].
+        controller: Makes the controller, from the Model and a seed.
+        elsewhere: The sentence for any robot.
+        needs: Raises BadInputError for a Model on which it makes no sense.
+        keyframe: Where it starts; None for the model's default state.
+        options: What `Model.replace` is given.
+        seeded: Whether the seed changes anything.
+        own: Whether it is the user's: the same on every robot, and it may look at the state.
+    """
+
+    name: str
+    says: str
+    model: str
+    seconds: float
+    controller: Callable[[Model, int], Controller]
+    elsewhere: str
+    needs: Callable[[Model], None]
+    keyframe: str | None = None
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
+    seeded: bool = False
+    own: bool = False
+
+    def on(self, model: Model) -> Scenario:
+        """This scenario as it is on a Model: its start, and words that are true of it.
+
+        It starts where the scenario says; where it says nothing, a robot that is not the arm
+        starts at its keyframe "home" if it has one, else in its default state.
+
+        Raises:
+            BadInputError: It makes no sense on the Model; with the names of those that do.
+        """
+        if self.own or (is_the_arm(model) and (has_floor(model) or not self.says.count("floor"))):
+            return self
+        try:
+            self.needs(model)
+        except BadInputError as error:
+            others = fitting(model)
+            known = f"; what makes sense on it: {', '.join(others)}" if others else ""
+            raise BadInputError(f"{error}{known}") from None
+        if is_the_arm(model):
+            return replace(self, says=self.elsewhere)
+        key = self.keyframe or home(model)
+        begins = "" if key is None else f" It starts in the keyframe {key!r}."
+        return replace(self, says=self.elsewhere + begins, keyframe=key)
+
+
+def fitting(model: Model) -> tuple[str, ...]:
+    """Names of the scenarios that make sense on a Model."""
+    names = []
+    for known in SCENARIOS.values():
+        with suppress(BadInputError):
+            known.needs(model)
+            names.append(known.name)
+    return tuple(names)
+
+
+def _constant(ctrl: Array | None) -> Controller:
+    """One command from the beginning on; None where nobody writes ctrl."""
+    return lambda _time, _data: ctrl
+
+
+def _need_box(model: Model) -> None:
+    if not is_the_arm(model) or all(frame.name != "held" for frame in model.keyframes):
+        raise BadInputError(f"{model.path.name} has no SO-101 that holds a box (so101/scene_box)")
+
+
+def _need_joints(model: Model) -> None:
+    if not model.nv:
+        raise BadInputError(f"{model.path.name} has no joints: nothing in it can move")
+
+
+def _need_actuators(model: Model) -> None:
+    _need_joints(model)
+    need_actuators(model)
+
+
+def _waves(model: Model, seed: int) -> Controller:
+    """Every actuator follows a sum of three sines within the middle of its range."""
+    middle, size, frequency, phase = waves(model, seed)
+
+    def controller(time: float, _data: Data) -> Array:
+        # From where it stands: the waves grow in over half a second.
+        sines: Array = (size * np.sin(2 * np.pi * frequency * time + phase)).sum(axis=0)
+        return middle + min(1.0, 2 * time) * sines
+
+    return controller
+
+
+def _hold(model: Model, _seed: int) -> Controller:
+    """Each position servo is told a pose; any other actuator exerts what holds its joint."""
+    return _constant(hold_ctrl(model))
+
+
+def _nothing(_model: Model, _seed: int) -> Controller:
+    """Nobody writes ctrl."""
+    return _constant(None)
+
+
+def _move_the_box(_model: Model, _seed: int) -> Controller:
+    """The arm is told to swing aside, with the jaws closed."""
+    return _constant(np.array(MOVING))
+
+
+_ALL = (
+    Scenario(
+        "hold",
+        "The arm is told one pose and goes there; on the way a finger meets the floor.",
+        "so101/scene",
+        2.0,
+        _hold,
+        "Each position servo is told a pose and goes there; any other actuator exerts what "
+        "holds its joint at the start, or is left at the start's ctrl.",
+        _need_actuators,
+    ),
+    Scenario(
+        "gravity",
+        "The servos are off: the arm falls onto the floor.",
+        "so101/scene",
+        4.0,
+        _nothing,
+        "No actuator of the file acts: what can move is left to gravity and to what it touches.",
+        _need_joints,
+        options={"actuation": False},
+    ),
+    Scenario(
+        "droop",
+        "Nobody writes ctrl: the servos hold the arm at zero.",
+        "so101/scene",
+        2.0,
+        _nothing,
+        "Nobody writes ctrl: each servo holds, and any other actuator exerts, what the start's "
+        "ctrl says.",
+        _need_actuators,
+    ),
+    Scenario(
+        "fall",
+        "The servos are off and nothing can touch anything: the arm falls.",
+        "so101/scene",
+        2.0,
+        _nothing,
+        "No actuator of the file acts and nothing can touch anything: what can move is left "
+        "to gravity. A robot that floats falls as a whole.",
+        _need_joints,
+        options={"actuation": False, "contacts": False},
+    ),
+    Scenario(
+        "box",
+        "The jaws hold a box while the arm swings it aside.",
+        "so101/scene_box",
+        3.0,
+        _move_the_box,
+        "The jaws hold a box while the arm swings it aside.",
+        _need_box,
+        keyframe="held",
+    ),
+    Scenario(
+        "waves",
+        "Every joint follows waves that a seed draws.",
+        "so101",
+        4.0,
+        _waves,
+        "Every actuator follows waves that a seed draws.",
+        _need_actuators,
+        seeded=True,
+    ),
+)
+SCENARIOS = {scenario.name: scenario for scenario in _ALL}
+
+
+def scenario(name: str) -> Scenario:
+    """Return a scenario by name.
+
+    Raises:
+        UnknownNameError: There is none of this name.
+    """
+    check_name("experiment", name, SCENARIOS)
+    return SCENARIOS[name]

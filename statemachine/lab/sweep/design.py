@@ -1,0 +1,360 @@
+"""What a sweep varies, as it is typed, and its points: every combination, times samples.
+
+"timestep=0.001,0.005" is a list, "mass=0.8x:1.2x:5" a grid, "frictionloss=0:0.1" a range.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+import re
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ...errors import BadInputError, shown, unknown_name
+from ...installed import require_extra
+from ...interface import Array, JointType
+from ...typed_numbers import typed_float
+
+Kind = Literal["model", "option", "state", "parameter"]
+Value = bool | float | str
+
+STATES = ("qpos", "qvel")
+MODEL = "model"
+# What an option or a start is in, of a hinge and of a slide.
+UNITS = {
+    "timestep": ("s", "s"),
+    "latency": ("s", "s"),
+    "gravity": ("m/s²", "m/s²"),
+    "mass": ("kg", "kg"),
+    "qpos": ("rad", "m"),
+    "qvel": ("rad/s", "m/s"),
+    "max_qvel": ("rad/s", "m/s"),
+    "armature": ("kg·m²", "kg"),
+    "damping": ("N·m·s/rad", "N·s/m"),
+    "frictionloss": ("N·m", "N"),
+    "kp": ("N·m/rad", "N/m"),
+    "kv": ("N·m·s/rad", "N·s/m"),
+}
+_MEANINGS: dict[Kind, str] = {
+    "model": "the model, by its name or file",
+    "option": "{} of the model",
+    "state": "{} where the run starts",
+    "parameter": "{}, a keyword argument of the function",
+}
+_OWN = "{} as a multiple of the model's own value: 0.5 is half of it"
+_NAME = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]+)\])?")
+_RANGE = re.compile(r"([^:]*):([^:]*)(?::([0-9]+))?")
+_SWITCHES = {"on": True, "off": False, "true": True, "false": False}
+_DIGITS = 32  # hexadecimal, of a digest
+_DIMENSIONS = 21201  # that SciPy has Sobol directions for
+_TIMES = ("x", "×")  # behind a number: times the model's own value
+_MOST = 10**6  # values of one factor
+_GRID_DIGITS = 12  # of the values of a grid, so that 0.6 is not 0.6000000000000001
+
+
+@dataclass(frozen=True)
+class Vary:
+    """One thing that a sweep varies.
+
+    Attributes:
+        name: As typed, without the place: "damping", "qpos", "model", "gain".
+        place: What of it: "elbow_flex" of qpos[elbow_flex]; "" for all.
+        kind: Whether it is a variant of the model, an option of `Model.replace`, a coordinate
+            of the start, or a parameter of the user's function.
+        values: Those of a list or a grid; empty where it is sampled.
+        bounds: Between which it is sampled; None for a list or a grid.
+        times: Whether the numbers are times the model's own value.
+    """
+
+    name: str
+    place: str = ""
+    kind: Kind = "option"
+    values: tuple[Value, ...] = ()
+    bounds: tuple[float, float] | None = None
+    times: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name and place: "qpos[elbow_flex]"."""
+        return f"{self.name}[{self.place}]" if self.place else self.name
+
+    @property
+    def column(self) -> str:
+        """Its column in the dataset."""
+        return f"vary.{self.label}"
+
+    def unit_on(self, joints: Collection[int] = (JointType.HINGE, JointType.SLIDE)) -> str:
+        """Return its unit on joints of some `JointType`s; "" of what is no number or has none."""
+        if self.times or self.kind == "parameter" or self.name not in UNITS:
+            return ""
+        hinge, slide = UNITS[self.name]
+        if hinge == slide or JointType.SLIDE not in joints:
+            return hinge
+        return f"{hinge} or {slide}" if JointType.HINGE in joints else slide
+
+    @property
+    def type(self) -> str:
+        """Of its column."""
+        if self.numeric:
+            return "double"
+        return "bool" if isinstance(self.values[0], bool) else "string"
+
+    @property
+    def meaning(self) -> str:
+        """What its column says."""
+        return (_OWN if self.times else _MEANINGS[self.kind]).format(self.label)
+
+    @property
+    def numeric(self) -> bool:
+        """Whether its values are numbers."""
+        return self.bounds is not None or is_number(self.values[0])
+
+    @property
+    def extremes(self) -> tuple[Value, ...]:
+        """The values that a check has to look at."""
+        return self.values if self.bounds is None else self.bounds
+
+
+def is_number(value: object) -> bool:
+    """Tell whether a value is a number, and no switch."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
+    """Read words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi; `with_kinds` tells what they vary.
+
+    Args:
+        words: As typed behind `--vary`.
+
+    Raises:
+        BadInputError: A word is invalid, or two of them vary the same.
+    """
+    factors = tuple(map(_parsed, words))
+    labels = [vary.label for vary in factors]
+    for vary in factors:
+        if labels.count(vary.label) > 1:
+            raise BadInputError(f"{vary.label} is varied twice")
+        if vary.place and vary.name in labels:
+            raise BadInputError(f"{vary.name} and {vary.label} are both varied: name one of them")
+    return factors
+
+
+def with_kinds(
+    factors: Iterable[Vary], options: Collection[str], parameters: Collection[str] = ()
+) -> tuple[Vary, ...]:
+    """Return the same factors, each with its kind.
+
+    Args:
+        factors: As parsed.
+        options: Names that `Model.replace` takes on the backends of the sweep.
+        parameters: Of the user's function.
+
+    Raises:
+        UnknownNameError: There is nothing of this name.
+        BadInputError: What is typed is no value of that factor.
+    """
+    return tuple(replace(vary, kind=_kind(vary, options, parameters)) for vary in factors)
+
+
+def _parsed(word: str) -> Vary:
+    label, sign, text = word.partition("=")
+    match = _NAME.fullmatch(label.strip())
+    if not (sign and match):
+        raise BadInputError(
+            "--vary wants NAME=a,b,c, NAME=from:to:count or, with --samples, NAME=from:to; got "
+            f"{shown(word)}"
+        )
+    name, place = match[1], match[2] or ""
+    if name == MODEL or ":" not in text:
+        values, times = _values(label, text.split(","), name == MODEL)
+        return Vary(name, place, values=values, times=times)
+    low, high, count, times = math.nan, math.nan, None, False
+    if match := _RANGE.fullmatch(text):
+        ends, times = _values(label, [match[1], match[2]])
+        low, high = (float(end) if is_number(end) else math.nan for end in ends)
+        count = int(match[3]) if match[3] else None
+    if not low < high or (count is not None and not 2 <= count <= _MOST):
+        raise BadInputError(
+            f"{label}={text} wants from:to or from:to:count, two numbers, the smaller number "
+            f"first, with a count from 2 to {_MOST:,}"
+        )
+    if count is None:
+        return Vary(name, place, bounds=(low, high), times=times)
+    grid = np.linspace(low, high, count)
+    values = tuple(float(f"{x:.{_GRID_DIGITS}g}") for x in grid)
+    return Vary(name, place, values=values, times=times)
+
+
+def _values(
+    label: str, words: Sequence[str], names: bool = False
+) -> tuple[tuple[Value, ...], bool]:
+    """Return the values of words, and whether they are times the model's own."""
+    words = [word.strip() for word in words]
+    if "" in words:
+        raise BadInputError(f"--vary {label} has an empty value")
+    pairs = [(word, False) if names else _value(word) for word in words]
+    values = tuple(value for value, _ in pairs)
+    kinds = {(type(value), times) for value, times in pairs}
+    if len(kinds) > 1:
+        raise BadInputError(
+            f"{label} mixes values of different kinds: {', '.join(words)}; numbers, numbers with "
+            "an x behind (times the model's own), on and off, or names"
+        )
+    if len(set(values)) < len(values):
+        raise BadInputError(f"{label} has a value twice: {', '.join(words)}")
+    return values, pairs[0][1]
+
+
+def _value(word: str) -> tuple[Value, bool]:
+    if word.lower() in _SWITCHES:
+        return _SWITCHES[word.lower()], False
+    times = word.endswith(_TIMES)
+    try:
+        number = typed_float(word[:-1] if times else word)
+    except ValueError:
+        return word, False
+    if not math.isfinite(number):
+        raise BadInputError(f"{word} is not a finite number")
+    return number + 0.0, times  # no negative zero
+
+
+def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
+    """Return what a factor varies, and check that it can be varied as it is typed.
+
+    Raises:
+        UnknownNameError: There is nothing of its name.
+        BadInputError: It is varied as a whole and has no parts, or the other way round, or it has
+            no value of the model's own that could be multiplied.
+    """
+    name = vary.name
+    kind = _kind_of_name(vary, options, parameters)
+    if kind == "model" and vary.place:
+        raise BadInputError("model is varied as a whole: model=so101/scene,so101/scene_box")
+    if kind == "state" and not vary.place:
+        raise BadInputError(f"{name} is varied one coordinate at a time: {name}[JOINT]=…")
+    if kind == "option" and name in parameters:
+        raise BadInputError(
+            f"{name} is an option of the model and a parameter of the function: give the "
+            "parameter another name"
+        )
+    if vary.times and kind != "option":
+        raise BadInputError(f"{vary.label} has no value of the model's own: leave the x out")
+    return kind
+
+
+def _kind_of_name(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
+    """Return what is varied by its name.
+
+    Raises:
+        UnknownNameError: There is nothing of this name.
+    """
+    if vary.name == MODEL:
+        return "model"
+    if vary.name in STATES:
+        return "state"
+    if vary.name in options:
+        return "option"
+    if vary.name in parameters and not vary.place:
+        return "parameter"
+    raise unknown_name("thing to vary", vary.name, [*options, MODEL, *STATES, *parameters])
+
+
+@dataclass(frozen=True)
+class DesignPoint:
+    """One combination of values of what a sweep varies.
+
+    Attributes:
+        id: A digest of the values.
+        values: One for each `Vary`, in their order.
+    """
+
+    id: str
+    values: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Design:
+    """The points of a sweep.
+
+    Attributes:
+        factors: What is varied; none for the experiment as it is.
+        samples: How many points of the ranges are drawn.
+        seed: Of the scrambling of the Sobol sequence.
+    """
+
+    factors: tuple[Vary, ...] = ()
+    samples: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        ranges = [vary.label for vary in self.sampled]
+        if ranges and not self.samples:
+            raise BadInputError(f"{ranges[0]} has a range: say --samples N, or a count behind it")
+        if self.samples and not ranges:
+            raise BadInputError("--samples is of ranges, NAME=from:to, and none is varied")
+        if len(ranges) > _DIMENSIONS:
+            raise BadInputError(f"{len(ranges)} ranges are more than can be sampled")
+
+    @property
+    def sampled(self) -> tuple[Vary, ...]:
+        """The factors with a range."""
+        return tuple(vary for vary in self.factors if vary.bounds is not None)
+
+    @property
+    def listed(self) -> tuple[Vary, ...]:
+        """The factors with a list or a grid."""
+        return tuple(vary for vary in self.factors if vary.bounds is None)
+
+    @property
+    def size(self) -> int:
+        """Number of points; it may be too large for `len`."""
+        count = self.samples if self.sampled else 1
+        return count * math.prod(len(vary.values) for vary in self.listed)
+
+    def points(self) -> Iterator[DesignPoint]:
+        """Yield every point; the samples change slowest."""
+        names = [vary.label for vary in self.factors]
+        for sample in self.sample_values().tolist():
+            drawn = iter(sample)
+            choices = [vary.values or (next(drawn),) for vary in self.factors]
+            for values in itertools.product(*choices):
+                settings = dict(zip(names, values, strict=True))
+                yield DesignPoint(digest(settings), values)
+
+    def sample_values(self) -> Array:
+        """Return the values (n, r) of n samples of the r ranges; (1, 0) where there is no range."""
+        if not self.sampled:
+            return np.empty((1, 0))
+        low, high = np.array([vary.bounds for vary in self.sampled]).T
+        return low + (high - low) * _sobol(len(self.sampled), self.samples, self.seed)
+
+
+def _sobol(width: int, count: int, seed: int) -> Array:
+    """Return (count, width) points in the unit cube, of a scrambled Sobol sequence."""
+    engine = require_qmc().Sobol(width, scramble=True, rng=np.random.default_rng(seed))
+    with warnings.catch_warnings():  # of a number that is not a power of two: said when it is asked
+        warnings.simplefilter("ignore")
+        return engine.random(count)
+
+
+def require_qmc() -> Any:
+    """Return SciPy's module of quasi-Monte-Carlo designs.
+
+    Raises:
+        MissingEngineError: SciPy is not installed; the message names the extra.
+    """
+    return require_extra("scipy.stats.qmc", "sampling a range", "SciPy", "sweep")
+
+
+def digest(content: object) -> str:
+    """Return the digest of plain values; 1 and 1.0 are the same."""
+    plain = json.loads(json.dumps(content, allow_nan=False), parse_int=float)
+    text = json.dumps(plain, sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]

@@ -1,0 +1,228 @@
+"""All that is checked of a sweep before anything runs: names, values, models, engines."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ... import __version__
+from ...backends import backend_names, parse_backend
+from ...backends.starts import overlap_warning, places_in
+from ...errors import BadInputError, MissingEngineError, StateMachineError
+from ...installed import require_extra
+from ...interface import Model, make_data
+from ...interface.options import OptionValue, checked_options
+from ...models import resolve
+from ..compare.perturbed import EXACT, parse_uncertainty
+from ..runs.controllers import is_function, parameters_of
+from ..runs.drive import check_length, cost_of_a_second, steps_in
+from ..runs.provenance import model_digest
+from ..runs.scenarios import Scenario, scenario
+from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc, with_kinds
+from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
+from .rows import require_parquet
+from .worker import digest_of, load_of
+
+MODEL_OF_A_FUNCTION = "so101/scene"
+_MANY, _MOST = 10_000, 10**8  # cells that are told beforehand, and that the driver can remember
+_SWITCHES = ("contacts", "actuation", "limits")
+_LOOKED_AT = 1000  # values of a factor; of more, the ends
+
+
+def prepared(sweep: Sweep) -> PreparedSweep:
+    """Check a sweep: names, values, models, engines.
+
+    What one backend alone refuses is not an error: its cells will be rows that say so.
+
+    Raises:
+        UnknownNameError: No such experiment, backend, option, joint, …
+        BadInputError: A value is invalid, or the request contradicts itself.
+        MissingEngineError: An engine or a package is missing.
+        StateMachineError: A model cannot be loaded on any backend.
+    """
+    require_parquet()
+    require_extra("joblib", "a sweep", "joblib", "sweep")
+    typed = parse_vary(sweep.vary)
+    function = is_function(sweep.what)
+    usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
+    varied = [str(value) for vary in typed if vary.label == MODEL for value in vary.values]
+    sweep = dataclasses.replace(
+        sweep,
+        what=os.path.abspath(sweep.what) if function else sweep.what,
+        menagerie=sweep.menagerie and os.path.abspath(sweep.menagerie),
+    )
+    names = varied if varied else [sweep.model or usual]
+    files = {name: model_digest(resolve(name, sweep.menagerie)) for name in names}
+    places = {name: os.path.abspath(name) if Path(name).is_file() else name for name in names}
+    parameters = parameters_of(sweep.what) if function else ()
+    models, backends, said = _loaded(sweep, [*places.values()], _switched_off(sweep, typed))
+    options = dict.fromkeys(name for model in models for name in model.capabilities.options)
+    factors = with_kinds(typed, options, [name for name in parameters if name != "seed"])
+    design = Design(factors, sweep.samples, sweep.design_seed)
+    cells = design.size * sweep.seeds * len(backends)
+    if cells > _MOST:
+        raise BadInputError(
+            f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
+            "divide it into several"
+        )
+    if design.sampled:
+        require_qmc()
+    if sweep.samples & (sweep.samples - 1):
+        said.append(f"{sweep.samples} samples are not a power of two: a Sobol sequence wants one")
+    if cells > _MANY:
+        said.append(f"{cells:,} cells")
+    for vary in factors:
+        said += _check_values(vary, models)
+    chosen: dict[str, Value] = {"seed": 0} if "seed" in parameters else {}
+    chosen |= {vary.name: vary.extremes[0] for vary in factors if vary.kind == "parameter"}
+    asked = sweep.scenario(chosen)
+    _refused(models, lambda model: _check_run(asked, factors, model))
+    said += _overlaps_at_start(asked, models)
+    spread = EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(","))
+    return PreparedSweep(
+        sweep=sweep,
+        design=design,
+        backends=backends,
+        versions=_versions(models),
+        files=files,
+        places=places,
+        function=digest_of(sweep.what) if function else "",
+        parameters=parameters,
+        spread=spread,
+        cost={model.backend: _cost(model, asked.seconds) for model in models},
+        said=tuple(said),
+    )
+
+
+def _switched_off(sweep: Sweep, factors: Sequence[Vary]) -> dict[str, OptionValue]:
+    """Return the options with which models are loaded to be checked.
+
+    What an experiment switches off is nothing to refuse; a switch that is varied may be off.
+    """
+    options: dict[str, OptionValue] = {}
+    if not is_function(sweep.what):
+        options |= scenario(sweep.what).options
+    for vary in factors:
+        if vary.label in _SWITCHES and False in vary.values:
+            options[vary.label] = False
+    return options
+
+
+def _versions(models: Sequence[Model]) -> dict[str, str]:
+    """Return the versions of this library, of the models' engines and of packages."""
+    versions = {"statemachine": __version__}
+    for model in models:
+        versions[model.backend] = model.engine_version
+    versions["numpy"] = np.__version__
+    versions["python"] = platform.python_version()
+    return versions
+
+
+def _loaded(
+    sweep: Sweep, places: Sequence[str], options: Mapping[str, OptionValue]
+) -> tuple[list[Model], tuple[str, ...], list[str]]:
+    """Return every variant on every backend, the backends that are here, and lines for the reader.
+
+    A backend that refuses a model stays: its cells are rows that say so.
+    """
+    asked = list(dict.fromkeys(sweep.backends))
+    for name in asked:
+        if name != "all":
+            parse_backend(name)
+    models: list[Model] = []
+    said: list[str] = []
+    here: list[str] = []
+    failure: StateMachineError | None = None
+    for backend in backend_names() if "all" in asked else asked:
+        for place in places:
+            try:
+                models.append(load_of(sweep, place, backend, options))
+            except MissingEngineError as error:
+                if "all" not in asked:
+                    raise
+                failure = error
+                said.append(f"{error}; it is left out")
+                break
+            except StateMachineError as error:
+                failure = error
+                said.append(f"{place} on {backend}: {error}; its cells will say so")
+        else:
+            here.append(backend)
+    if failure and not models:
+        raise failure
+    return models, tuple(here), said
+
+
+def _refused(models: Sequence[Model], check: Callable[[Model], object]) -> list[str]:
+    """Raise what every model says of a check; else what some say, in lines."""
+    errors: list[StateMachineError] = []
+    for model in models:
+        try:
+            check(model)
+        except StateMachineError as error:
+            errors.append(error)
+    if len(errors) == len(models):
+        raise errors[0]
+    return [f"{text}; its cells will say so" for text in dict.fromkeys(map(str, errors))]
+
+
+def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
+    """Raise what every model says of a factor's values; else what some say, in lines."""
+    values = vary.extremes
+    if len(values) > _LOOKED_AT and vary.numeric:
+        values = (min(values), max(values))  # pyright: ignore[reportArgumentType, reportCallIssue]
+
+    def check(model: Model) -> None:
+        for value in values:
+            if vary.kind == "option":
+                checked_options(model, options_at(model, [(vary, value)]))
+            elif vary.kind == "state":
+                start_at(model, [(vary, value)])
+
+    said = _refused(models, check)
+    return said + (beyond_ranges(models[0], vary) if vary.kind == "state" else [])
+
+
+def _check_run(scenario: Scenario, factors: Sequence[Vary], model: Model) -> None:
+    """Raise what a model says of the run itself: its start, its length."""
+    keyframe = scenario.on(model).keyframe
+    if keyframe is not None:
+        model.key_id(keyframe)
+    steps_in(model, scenario.seconds)
+    variants: list[Model] = []
+    for vary in factors:
+        if vary.label == "timestep":
+            settings = [[(vary, value)] for value in vary.extremes]
+            variants += [model.replace(**options_at(model, setting)) for setting in settings]
+    if not variants:
+        variants = [model]
+    for variant in variants:
+        check_length(variant, scenario.seconds)
+
+
+def _overlaps_at_start(scenario: Scenario, models: Sequence[Model]) -> list[str]:
+    """Return a line for each file whose shapes are inside each other where its runs start."""
+    lines: list[str] = []
+    for model in models:
+        try:
+            keyframe = scenario.on(model).keyframe
+            line = overlap_warning(model, places_in(model, keyframe))
+        except StateMachineError:  # the cells of this model say so
+            continue
+        if line and line not in lines:
+            lines.append(line)
+    return lines
+
+
+def _cost(model: Model, seconds: float) -> float:
+    """Roughly what a cell costs by the clock [s]: a Model, a Data, the steps."""
+    began = time.perf_counter()
+    with make_data(model.replace(timestep=model.timestep)):
+        begin = time.perf_counter() - began
+    return begin + cost_of_a_second(model) * seconds

@@ -1,0 +1,1 @@
+"""Each engine against independent code and closed forms."""

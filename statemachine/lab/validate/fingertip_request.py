@@ -1,0 +1,71 @@
+"""Which places are certified, and the certificates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...backends.chosen import chosen_backends
+from ...errors import BadInputError
+from ...installed import DEFAULT
+from ...interface import Model
+from ...models import AnyPath
+from ..runs.drive import Progress
+from ..runs.each_backend import on_each_backend
+from ..runs.reporter import QUIET, Reporter
+from .fingertip import FingertipResult, certify, checked_poses
+
+
+@dataclass(frozen=True)
+class FingertipRequest:
+    """Question how far places on engines are from the witness's.
+
+    Attributes:
+        model: A name or a file of a model.
+        backends: As `parse_backend` reads them; "all" for those that are installed.
+        menagerie: A menagerie folder to look the model's name up in.
+        poses: Number of poses, at least 2: the default pose, then random ones.
+        seed: Of the random poses, at least 0.
+        site: Site or body on the engine; None for gripperframe if there is one, else for every
+            body at an end.
+        witness: File that the witness reads; None for the model's own.
+        witness_frame: Name of the frame there; None for `site`.
+    """
+
+    model: AnyPath = "so101"
+    backends: tuple[str, ...] = (DEFAULT,)
+    menagerie: AnyPath | None = None
+    poses: int = 200
+    seed: int = 0
+    site: str | None = None
+    witness: AnyPath | None = None
+    witness_frame: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.backends:
+            raise BadInputError("no backend is named: name one, or all")
+        chosen_backends(self.backends)
+        checked_poses(self.poses, self.seed)
+
+
+def answer(request: FingertipRequest, reporter: Reporter = QUIET) -> dict[str, FingertipResult]:
+    """Return a certificate for each backend.
+
+    Raises:
+        MissingEngineError: An engine that is named is not installed here, or the witness is not.
+        StateMachineError: The model cannot be loaded, or as `certify` does.
+    """
+
+    def compute(model: Model, _backend: str, progress: Progress) -> FingertipResult:
+        return certify(
+            model,
+            poses=request.poses,
+            seed=request.seed,
+            site=request.site,
+            witness=request.witness,
+            witness_frame=request.witness_frame,
+            progress=progress,
+        )
+
+    return on_each_backend(
+        request.backends, "fingertip", request.model, request.menagerie, compute, reporter
+    )

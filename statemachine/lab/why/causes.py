@@ -1,0 +1,245 @@
+"""What two sides differ in, as causes that can be equalized one by one.
+
+A cause is one difference, or several that are the same change of different elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...engines import room
+from ...engines.records import Edit, ModelDifference
+from ...installed import DEFAULT
+from ...interface import Model
+from ...measures.text import few, listed
+from ..compare.matching import Matched
+
+EXTRA_ACTUATOR = "extra actuator"
+# The subjects that the mass of a geom changes in its body.
+MASS_SUBJECTS = frozenset({"mass", "centre of mass", "inertia"})
+_NAMED = 3  # elements that a cause names before it counts them
+_PLURALS = {"body": "bodies", "equality": "equalities", "flex": "flexes"}
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """Differences that are equalized together.
+
+    Attributes:
+        name: What they are, and of what.
+        differences: At least one.
+    """
+
+    name: str
+    differences: tuple[ModelDifference, ...]
+
+    @property
+    def kind(self) -> str:
+        """The kind of the elements: "body", "joint", "option", "run", "engine", …"""
+        return self.differences[0].kind
+
+    @property
+    def only_read(self) -> bool:
+        """Whether nothing depends on it but a function of the user's that reads it."""
+        return all(row.only_read for row in self.differences)
+
+    @property
+    def refused(self) -> str:
+        """Why it cannot be equalized; "" if it can."""
+        return next((row.refused for row in self.differences if row.refused), "")
+
+    def edits(self, side: int) -> tuple[Edit, ...]:
+        """Return what is done to the first (0) or the second (1) compiled model."""
+        edits: list[Edit] = []
+        for row in self.differences:
+            edits += row.edits if side else row.edits_one
+        return tuple(edits)
+
+
+def differences_of(
+    left: Model,
+    right: Model,
+    matched: Matched,
+    world: bool = True,
+    finer: bool = False,
+    readable: bool = False,
+) -> tuple[ModelDifference, ...]:
+    """Return all that two Models differ in by their compiled models.
+
+    Args:
+        left: The Model that the other is brought to.
+        right: The other.
+        matched: What of one is what of the other.
+        world: Whether gravity and timestep count; not where they are an engine's own.
+        finer: By single entries, where they can be brought over one by one.
+        readable: Whether that counts on which nothing but a function of the user's depends.
+    """
+    own = room(DEFAULT)
+    rows = list(own.differences(left.compiled, right.compiled, matched, world=world))
+    if readable:
+        rows += readable_of(matched)
+    if finer:
+        rows = [part for row in rows for part in own.entries(right.compiled, row)]
+    only_left, only_right = matched.only
+    rows += [_extra_joint(name, "there", None) for name in only_left.get("joint", ())]
+    rows += [_extra_joint(name, None, "there") for name in only_right.get("joint", ())]
+    return tuple(rows)
+
+
+def _extra_joint(name: str, left: str | None, right: str | None) -> ModelDifference:
+    return ModelDifference(
+        subject="extra joint",
+        kind="joint",
+        where=name,
+        values=(("joint", left, right),),
+        refused="a joint cannot be added or taken away",
+    )
+
+
+def sensors_of(matched: Matched) -> list[ModelDifference]:
+    """Return what the sensors of two Models differ in, which only a controller reads."""
+    return room(DEFAULT).sensors(matched.left.compiled, matched.right.compiled, matched)
+
+
+def data_of(matched: Matched) -> list[ModelDifference]:
+    """Return what two Models keep for whoever reads it.
+
+    This is user data of elements, numeric, text and tuple.
+    """
+    return room(DEFAULT).readable(matched.left.compiled, matched.right.compiled, matched)
+
+
+def readable_of(matched: Matched) -> list[ModelDifference]:
+    """Return everything that differs, that no engine uses, and that a function may read."""
+    return [*sensors_of(matched), *data_of(matched)]
+
+
+def built(model: Model, edits: tuple[Edit, ...]) -> Model:
+    """Return a Model whose compiled model was edited.
+
+    Raises:
+        UnsupportedError, ModelError: As `Model.with_compiled`.
+    """
+    if not edits:
+        return model
+    return model.with_compiled(room(DEFAULT).edited(model.compiled, edits))
+
+
+def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
+    """Merge differences into causes: what was changed alike in several elements is one.
+
+    Alike means from one value of the right to one value of the left, as by a changed default of a
+    file's class: elements with other values are another cause, however many causes there are.
+    Masses and moments of inertia that are multiplied alike, as by a density, are one change; so is
+    the mass of a geom that takes the centre and the inertia of its body along.
+
+    Args:
+        rows: Differences, in their order.
+        finer: Each by itself.
+
+    Returns:
+        The causes, each with a name of its own.
+    """
+    return _with_own_names(_merged(rows, finer))
+
+
+def _merged(rows: Sequence[ModelDifference], finer: bool) -> tuple[Cause, ...]:
+    """Return differences as causes, of which several may have one name."""
+    able = [row for row in rows if not row.refused]
+    refused = _grouped([row for row in rows if row.refused], _title)
+    if finer:
+        return (*_grouped(able, _title), *refused)
+    changed_masses = {
+        (row.where, row.subject)
+        for row in able
+        if row.kind == "body" and row.subject in MASS_SUBJECTS
+    }
+
+    def change(row: ModelDifference) -> Hashable:
+        mass_and_what_it_takes_along = {(row.where, subject) for subject in MASS_SUBJECTS}
+        if (
+            row.kind == "body"
+            and row.subject in MASS_SUBJECTS
+            and mass_and_what_it_takes_along <= changed_masses
+        ):
+            return row.kind, row.where
+        return _change(row)
+
+    return (*_grouped(able, change), *refused)
+
+
+def _title(row: ModelDifference) -> Hashable:
+    return row.title
+
+
+def _with_own_names(merged: Iterable[Cause]) -> tuple[Cause, ...]:
+    """Give causes whose names are alike, such as "friction of 4 geoms", names that are not.
+
+    A cause is known by its name. One whose name is taken names its elements; where that is taken,
+    too, it is numbered.
+    """
+    named: dict[str, Cause] = {}
+    for cause in merged:
+        name = cause.name
+        if name in named:
+            places = list(dict.fromkeys(row.where for row in cause.differences))
+            name = f"{_subjects(cause.differences)} of {few(places, _NAMED)}"
+        first, number = name, 2
+        while name in named:
+            name, number = f"{first} ({number})", number + 1
+        named[name] = Cause(name, cause.differences)
+    return tuple(named.values())
+
+
+def _change(row: ModelDifference) -> Hashable:
+    """Return what is equal for two differences that are the same change of different elements."""
+    if row.subject == EXTRA_ACTUATOR:  # a file without motors is one difference
+        return row.subject, repr(row.values)
+    scale = scale_of(row)
+    if scale:
+        return row.kind, scale
+    if not row.where or row.subject.startswith("extra "):
+        return row.title
+    return row.kind, row.subject, row.unit, repr(row.values)
+
+
+def scale_of(row: ModelDifference) -> str:
+    """Return the factor from the left's mass or moments of a body to the right's.
+
+    It is "" for anything else, and where the moments of one body have several factors.
+    """
+    if row.kind != "body" or row.subject not in ("mass", "inertia"):
+        return ""
+    left, right = (np.ravel(value) for value in row.values[0][1:])
+    if not left.all():
+        return ""
+    factors = {f"{number:.8g}" for number in right / left}
+    return factors.pop() if len(factors) == 1 else ""
+
+
+def _grouped(
+    differences: Iterable[ModelDifference], key: Callable[[ModelDifference], Hashable]
+) -> tuple[Cause, ...]:
+    groups: dict[Hashable, list[ModelDifference]] = {}
+    for row in differences:
+        groups.setdefault(key(row), []).append(row)
+    return tuple(Cause(_name(rows), tuple(rows)) for rows in groups.values())
+
+
+def _subjects(rows: Sequence[ModelDifference]) -> str:
+    """Return what differences are of, in words: "mass and inertia"."""
+    return listed(list(dict.fromkeys(row.subject for row in rows)))
+
+
+def _name(rows: list[ModelDifference]) -> str:
+    """Return what a cause is, and of what: of up to three elements by name."""
+    first, places = rows[0], list(dict.fromkeys(row.where for row in rows))
+    subject = _subjects(rows)
+    if len(rows) == 1:
+        return first.title
+    if len(places) <= _NAMED:
+        return f"{subject} of {', '.join(places)}"
+    return f"{subject} of {len(places)} {_PLURALS.get(first.kind, f'{first.kind}s')}"

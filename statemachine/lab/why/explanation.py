@@ -1,0 +1,174 @@
+"""What the gap between two sides comes from, as a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from ...measures import Deviation
+from ..compare.matching import Only
+from ..runs.provenance import Provenance
+from .gap import FirstTouch, Measure
+from .locate import Localisation
+from .shapley import Method
+from .verdict import CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
+from .written import FigureValues, Place
+
+
+@dataclass(frozen=True)
+class Share:
+    """A cause, and its part of the gap.
+
+    Attributes:
+        name: What it is, and of what.
+        values: Each figure that differs; see `WrittenCause`.
+        unit: SI unit of the first figure.
+        units: SI unit of each figure.
+        place: The one line of the right's file that says it; None where that was not found.
+        kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
+            start, "engine" of a setting of an engine as it comes.
+        share: Its part of the gap (Shapley value); below zero where it hides others; None where it
+            cannot be equalized, or no set of causes with it could be run.
+        error: Standard error of the share; 0 where it is not an estimate.
+        alone: The part that it takes away as the only one; None where that could not be run.
+        last: The part that it takes away after all others; None where that could not be run.
+        note: Why there is no share, or what else is to be said.
+        chosen: Of an integrator the side that can choose, "left" or "right", and the one to choose;
+            else None.
+    """
+
+    name: str
+    values: tuple[FigureValues, ...]
+    unit: str
+    units: tuple[str, ...]
+    place: Place | None
+    kind: str
+    share: float | None = None
+    error: float = 0.0
+    alone: float | None = None
+    last: float | None = None
+    note: str = ""
+    chosen: tuple[Literal["left", "right"], str] | None = None
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What the gap between two sides comes from.
+
+    Attributes:
+        experiment: What was run.
+        says: What happens in it, in a sentence.
+        seconds: Simulated time [s].
+        labels: What the sides are called; differences are brought from the right to the left.
+        quantity: What the gap is measured in.
+        unit: Of the quantity.
+        measure: Which figure of the gap: the worst at any moment, that of the end, or the rms.
+        first: The gap in each quantity, as the sides come.
+        gap: The one that is explained, in `unit`.
+        shares: The causes in files, options, commands and settings of an engine, the largest share
+            first. The shares add up to `explained`.
+        method: How the shares were computed.
+        orders: How many orders were drawn for that.
+        brought: The gap with all causes equalized, in `unit`; None if that could not be run.
+        found_in: What the rest is found in by leaving features out on both sides.
+        explained: The part of the gap that goes where settings are equalized.
+        located: The part that goes only where something is left out on both sides: it says
+            where the rest comes from, not why.
+        unexplained: The part that stays.
+        negligible: Gaps below this are taken for rounding, in `unit`.
+        tolerance: A gap that does not matter, in `unit`.
+        floor: The chaos floor, in `unit`: how far the two sides are at most from themselves,
+            started and commanded anew with rounding, and with what is not known of the start.
+        draws: How many such runs were made of each side; 0 if the floor was not looked for.
+        one_engine: Whether both sides run on one engine and release, both with its own settings or
+            both with the model's.
+        redundant: Causes of which each one alone takes away nine tenths of the gap or more, and the
+            last of them less than a tenth.
+        impossible: Sets of causes that could not be run.
+        unmatched: What only one side has: joints, actuators, by side.
+        missing: What one side has nothing of, and the other has: see `missing_parts`.
+        notes: What a reader should know, in sentences.
+        unread: What differs, too, and nothing depends on but a function that reads it, where there
+            is none, or no gap.
+        still: Joints with a difference that the left hardly moves: it cannot show.
+        touch: The first contact; None without one.
+        moments: How many moments the runs are compared at.
+        between: Whether rows had to be interpolated there.
+        runs: How many runs it took.
+        took: What it took by the clock [s].
+        provenance: What each side was computed with.
+    """
+
+    experiment: str
+    says: str
+    seconds: float
+    labels: tuple[str, str]
+    quantity: str
+    unit: str
+    measure: Measure
+    first: Mapping[str, Deviation]
+    gap: float
+    shares: tuple[Share, ...]
+    method: Method
+    orders: int
+    brought: float | None
+    found_in: tuple[Localisation, ...]
+    explained: float
+    located: float
+    unexplained: float
+    negligible: float
+    tolerance: float
+    floor: float
+    draws: int
+    one_engine: bool
+    redundant: tuple[str, ...]
+    impossible: tuple[tuple[str, ...], ...]
+    unmatched: tuple[Only, Only]
+    missing: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+    unread: tuple[str, ...]
+    still: tuple[str, ...]
+    touch: FirstTouch | None
+    moments: int
+    between: bool
+    runs: int
+    took: float
+    provenance: tuple[Provenance, Provenance]
+
+    @property
+    def verdict(self) -> GapVerdict:
+        """What the gap comes from, and whether that answers the question."""
+        state = gap_state(self.gap, self.negligible, self.tolerance, self.floor)
+        refused = any(row.note for row in self.shares)
+        facts = Facts(
+            state=state,
+            differs=bool(self.shares),
+            refused=refused,
+            one_engine=self.one_engine,
+            explained=self.explained,
+            located=self.located,
+            unexplained=self.unexplained,
+            cause=self._largest_cause(),
+            places=self._places(),
+        )
+        return verdict_of(facts)
+
+    def _largest_cause(self) -> CausePart | None:
+        """Return the cause with the largest share; None if none takes away anything.
+
+        It comes first.
+        """
+        for row in self.shares:
+            if row.share:
+                return CausePart(row.share, row.alone, row.last)
+        return None
+
+    def _places(self) -> tuple[LocatedPart, ...]:
+        """Return what was left out on both sides, as the verdict takes it."""
+        causes = {row.name for row in self.shares}
+        return tuple(
+            # A feature that is a cause is on on one side, and off on the other.
+            LocatedPart(place.share, place.is_still, is_switch=place.name in causes)
+            for place in self.found_in
+        )

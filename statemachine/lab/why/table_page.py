@@ -1,0 +1,115 @@
+"""The table of what differs, and each difference's part of the gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ...measures.text import NONE, capital, percent
+from ...show.blocks import Block, Section, Table, TableCell
+from . import Explanation, Share
+from .answer_page import amount
+from .locate import Localisation
+from .values_page import figure_of, values_of
+
+_SHOWN = 12  # rows; the rest is folded away
+_SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
+_NO_PART = 1e-3  # of the gap: causes below that are one row
+_HEADS = ("what", "left", "right", "part", "alone", "last")
+_WORDS = frozenset({0, 1, 2})  # columns
+_TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
+_MEASURES = {
+    "worst": "each run at its largest",
+    "end": "in the end",
+    "rms": "as a root mean square",
+}
+
+Row = tuple[str, ...]
+
+
+def table(result: Explanation, able: Sequence[Share], small: Sequence[Share]) -> list[Block]:
+    """Return the differences, the largest share first.
+
+    Args:
+        result: The explanation.
+        able: The causes that can be equalized.
+        small: Those of them without an effect, which are one row.
+    """
+    rows = [_row_of_cause(result, row) for row in able if row not in small]
+    rows += [_row_of_place(place) for place in result.found_in]
+    if small:
+        rows.append(_row_of_small(small))
+    if not rows:
+        return []
+    heads = _HEADS
+    if all(row[4:] == (NONE, NONE) for row in rows):  # nothing was equalized by itself
+        heads, rows = heads[:4], [row[:4] for row in rows]
+    most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
+    shown = Table(heads, rows[:most], _title(result), words=_WORDS)
+    if most == len(rows):
+        return [shown]
+    heading = f"{len(rows) - most} more differences, with smaller parts"
+    more = Table(heads, rows[most:], heading, words=_WORDS)
+    return [shown, Section("", heading, [more], folded=True)]
+
+
+def without_effect(result: Explanation, able: Sequence[Share]) -> list[Share]:
+    """Return the differences without an effect, if there are several."""
+    if not result.verdict.divides:
+        return []
+    small = [row for row in able if not has_effect(row)]
+    return small if len(small) > 1 else []
+
+
+def has_effect(row: Share) -> bool:
+    """Tell whether a cause takes away a part of the gap: in the mean, alone, or last."""
+    parts = (row.share, row.alone, row.last)
+    return max(abs(part or 0.0) for part in parts) >= _NO_PART
+
+
+def is_beyond(row: Share) -> bool:
+    """Tell whether a cause takes away more than all of the gap."""
+    return abs(row.share or 0.0) > 1.0 + _NO_PART
+
+
+def is_noisy(result: Explanation) -> bool:
+    """Tell whether small parts of a gap are chance, so that its floor has to be spoken of."""
+    return result.verdict.divides and result.floor > _SMALL * result.gap
+
+
+def _title(result: Explanation) -> str:
+    if not result.verdict.divides:
+        return "What differs"
+    return _TITLE.format(
+        gap=amount(result, result.gap),
+        quantity=result.quantity,
+        measure=_MEASURES[result.measure],
+    )
+
+
+def _row_of_cause(result: Explanation, row: Share) -> Row:
+    what = capital(row.name) + figure_of(row)
+    left, right = values_of(row)
+    noise = result.floor / result.gap if result.verdict.divides else 0.0
+    if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
+        part = TableCell(f"< {percent(noise)}", share=row.share)
+        return what, left, right, part, NONE, NONE
+    explains = percent(row.share)
+    if row.error and math.isfinite(row.error):
+        explains += f" ± {percent(row.error)}"
+    part = TableCell(explains, share=row.share)
+    return what, left, right, part, percent(row.alone), percent(row.last)
+
+
+def _row_of_place(place: Localisation) -> Row:
+    """Return what a feature takes away when it is left out on both sides."""
+    left, right = place.values or (NONE, NONE)
+    mark = "†" if place.values else "*"
+    part = TableCell(f"{percent(place.share)}{mark}", share=place.share)
+    return capital(place.name), left, right, part, NONE, NONE
+
+
+def _row_of_small(small: Sequence[Share]) -> Row:
+    share = sum(row.share or 0.0 for row in small)
+    part = TableCell(percent(share), share=share)
+    return f"{len(small)} more, none above 0.1 %", NONE, NONE, part, NONE, NONE

@@ -1,0 +1,244 @@
+"""Runs of two sides with some of their differences equalized, each made once.
+
+Runs that are wanted together are shared among forks of this process. Threads are no faster, since
+the loop of a run is Python's: six runs took 1.1 times as long on two.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ...backends import load
+from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
+from ...installed import DEFAULT
+from ...interface import Model
+from ...measures import Deviation
+from ...processes.parallel import forks_for, in_forks
+from ..compare import perturbed
+from ..compare.matching import Matched
+from ..compare.perturbed import Uncertainty, perturbed_run
+from ..recordings import Rerun, Trace
+from .gap import Curves, FirstTouch, Measure, Ruler, first_touch
+from .request import WhyRequest
+from .setup import NONE, RunKey, Setup
+
+_LOST = "its process ended before it was done, twice"
+_AS_THEY_COME = (RunKey(0), RunKey(1))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What became of a run.
+
+    Attributes:
+        curves: The run by the ruler; None if it could not be made, or did not reach the end.
+        reason: Why not.
+        was_begun: Whether the run was begun.
+    """
+
+    curves: Curves | None
+    reason: str
+    was_begun: bool = True
+
+
+class Trials:
+    """Two sides, and what becomes of the gap between them.
+
+    Attributes:
+        setup: How each side is run.
+        traces: Both runs as they come, with what the engines derive.
+        ruler: What all runs are measured by.
+        ended: Why the last run that did not reach the end did not.
+    """
+
+    def __init__(self, request: WhyRequest, matched: Matched, ran: Callable[[], None]) -> None:
+        """Run both sides as they come.
+
+        Args:
+            request: The question; its scenario is as it is on the left.
+            matched: What of the left is what of the right.
+            ran: Called after each run.
+        """
+        self.setup = Setup(request, matched)
+        self._jobs, self._ran = request.jobs, ran
+        traces: list[Trace] = []
+        began = time.perf_counter()
+        for run in _AS_THEY_COME:
+            traces.append(self.setup.rerun(run, self.setup.models[run.side]).record())
+            ran()
+        # What is derived is read from a second run: so four were made.
+        self._took = (time.perf_counter() - began) / 4
+        self.traces: tuple[Trace, Trace] = traces[0], traces[1]
+        self.ruler = Ruler(matched, traces[0], traces[1], request.quantity)
+        self.ended, self._repeated = "", 0
+        self._trials: dict[RunKey, Trial] = {}
+        for run, trace in zip(_AS_THEY_COME, traces, strict=True):
+            self._trials[run] = self._measured(run.side, self.setup.models[run.side], trace)
+            self.ended = self.ended or trace.header.ended
+
+    @property
+    def count(self) -> int:
+        """How many runs were made, but for those of the floor."""
+        return self._repeated + sum(trial.was_begun for trial in self._trials.values())
+
+    def touch(self, quantity: str) -> FirstTouch | None:
+        """Find the first contact of either side as they come.
+
+        It is None where nothing touches, or no engine tells of it.
+
+        Args:
+            quantity: What the gap until then is measured in.
+        """
+        left, right = (self._trials[run].curves for run in _AS_THEY_COME)
+        if left is None or right is None:
+            return None
+        apart = self.ruler.distances(quantity, left, right)
+        return first_touch(self.traces, self.ruler.time, apart)
+
+    def gaps(
+        self, equalized: frozenset[str], without: frozenset[str] = NONE, integrator: str = ""
+    ) -> dict[str, Deviation]:
+        """Return the gap in each quantity; {} if a side did not reach the end.
+
+        Args:
+            equalized: Causes that are equalized.
+            without: Features that are left out on both sides.
+            integrator: Another one, on the sides that have several.
+        """
+        runs = self.setup.runs_of(equalized, without, integrator)
+        left, right = (self._curves(run) for run in runs)
+        return self.ruler.gaps(left, right) if left and right else {}
+
+    def extent(self, quantity: str, without: frozenset[str] = NONE) -> float:
+        """Return how far the left moves from where it starts, with or without some features."""
+        curves = self._curves(RunKey(0, NONE, without))
+        if not curves:
+            return 0.0
+        start = {name: curve[:1] for name, curve in curves.items()}
+        return float(self.ruler.distances(quantity, curves, start).max())
+
+    def ahead(self, wanted: Iterable[frozenset[str]]) -> None:
+        """Make the runs now that `gaps` of some sets of causes will want, several at once."""
+        runs = dict.fromkeys(run for subset in wanted for run in self.setup.runs_of(subset))
+        new = [run for run in runs if run not in self._trials]
+        jobs = self._forks_for(len(new))
+        if jobs > 1:
+            work = [partial(self._trial, run) for run in new]
+            for run, trial in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
+                self._trials[run] = Trial(None, _LOST) if trial is None else trial
+
+    def _forks_for(self, number: int) -> int:
+        """Return how many forks are to share some runs.
+
+        A function that commands may keep something between runs: it has one, unless asked for.
+        """
+        if self._jobs is None and self.setup.scenario.own:
+            return 1
+        return forks_for(number, self._took, self._jobs)
+
+    def _curves(self, run: RunKey) -> Curves | None:
+        """Return a run; None, with a reason in `ended`, if it did not reach the end."""
+        if run not in self._trials:
+            self._trials[run] = self._trial(run)
+            self._ran()
+        trial = self._trials[run]
+        if trial.curves is None:
+            self.ended = trial.reason or self.ended
+        return trial.curves
+
+    def _trial(self, run: RunKey) -> Trial:
+        """Make a run."""
+        was_begun = False
+        try:
+            model = self.setup.model(run)
+            was_begun = True
+            trace = self.setup.rerun(run, model).record(derive=False)
+            return self._measured(run.side, model, trace)
+        except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
+            return Trial(None, str(error), was_begun)
+
+    def _measured(self, side: int, model: Model, trace: Trace) -> Trial:
+        curves = self.ruler.curves(trace, self._posed(model), side)
+        return Trial(curves, trace.header.ended or "it left every bound")
+
+    def _posed(self, model: Model) -> Model:
+        """Return a Model of the same bodies by which poses are computed.
+
+        It is one of the engine that is fastest.
+        """
+        if model.backend == DEFAULT:
+            return model
+        first = self.setup.models[0]
+        base = first if first.backend == DEFAULT else load(model.path)
+        return base if model.compiled is None else base.with_compiled(model.compiled)
+
+    def repeats(self) -> bool:
+        """Tell whether the left moves the same when it is run again.
+
+        Only then a gap can have causes.
+        """
+        first, again = self._trials[RunKey(0)].curves, self._trial(RunKey(0)).curves
+        self._repeated = 1
+        self._ran()
+        if first is None or again is None:
+            return False
+        return all(np.array_equal(values, again[name]) for name, values in first.items())
+
+    def floor(self, uncertain: Uncertainty, measure: Measure) -> dict[str, float]:
+        """Compute the chaos floor of each quantity, in its unit.
+
+        Args:
+            uncertain: What is not known of the start.
+            measure: Which figure of a gap; the largest of all perturbed runs of both sides counts.
+
+        Raises:
+            EngineError: A process ended before its run was done, twice.
+        """
+        models = self.setup.models
+        reruns = [self.setup.rerun(run, models[run.side]) for run in _AS_THEY_COME]
+        posed = [self._posed(model) for model in models]  # a model is loaded once a side
+        work = [
+            partial(self._perturbed, side, k, reruns[side], posed[side], uncertain)
+            for side in (0, 1)
+            for k in range(perturbed.RUNS)
+        ]
+        curves = self._all_of(work)
+        left, right = (self._trials[run].curves for run in _AS_THEY_COME)
+        assert left is not None
+        assert right is not None
+        left_floor = self.ruler.floor(left, curves[: perturbed.RUNS], measure)
+        right_floor = self.ruler.floor(right, curves[perturbed.RUNS :], measure)
+        return {name: max(left_floor[name], right_floor[name]) for name in self.ruler.units}
+
+    def _perturbed(
+        self, side: int, k: int, rerun: Rerun, posed: Model, uncertain: Uncertainty
+    ) -> tuple[Curves | None]:
+        """Make one perturbed run; in a tuple, since what comes from a fork is not None."""
+        trace = perturbed_run(rerun, k, seed=self.setup.seed, uncertain=uncertain, derive=False)
+        return (self.ruler.curves(trace, posed, side),)
+
+    def _all_of(self, work: list[partial[tuple[Curves | None]]]) -> list[Curves | None]:
+        """Make perturbed runs, in forks where that pays.
+
+        Raises:
+            EngineError: A process ended before its run was done, twice.
+        """
+        jobs = self._forks_for(len(work))
+        if jobs > 1:
+            outcomes = in_forks(work, jobs, self._ran, self._took)
+        else:
+            outcomes = []
+            for call in work:
+                outcomes.append(call())
+                self._ran()
+        curves: list[Curves | None] = []
+        for outcome in outcomes:
+            if outcome is None:
+                raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
+            curves += outcome
+        return curves

@@ -1,0 +1,359 @@
+"""Pictures of a page, drawn by matplotlib from the figures of a run."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import math
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..atomic_files import replace_bytes
+from ..errors import BadInputError
+from ..installed import require_extra
+from ..interface import Array
+from .blocks import Bars, Block, Pipeline, Slots, Traces
+
+_COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
+INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
+_WRITTEN_OUT = range(-3, 4)  # powers of ten; others as 1e6
+_TITLE = 80  # letters of a line of it
+_LINES = ("-", "--", ":", "-.")
+_FLOOR = "#bdbdbd"
+_CENTRE: dict[str, Any] = {"ha": "center", "va": "center"}
+# A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
+SIDES: tuple[dict[str, Any], ...] = (
+    {"color": "#f0a830", "linewidth": 2.0, "linestyle": "-", "solid_capstyle": "butt"},
+    {"color": "#4b1f78", "linewidth": 0.8, "linestyle": (0, (4, 1.6))},
+)
+GAP: dict[str, Any] = {"color": INK, "linewidth": 1.0}  # of the sides
+Box = tuple[float, float, float, float]
+
+Drawn = Traces | Slots | Pipeline | Bars
+_DOTS = 150  # a PNG has to an inch
+SUFFIXES = (".svg", ".png", ".pdf")
+# The same figures give the same bytes: no settings of the user's, no random names, no date, no
+# version.
+SETTINGS: dict[str, Any] = {
+    "svg.fonttype": "none",  # text stays text: small, and found by a search
+    "svg.hashsalt": "statemachine",
+    "pdf.fonttype": 42,
+    "text.parse_math": False,  # a name may have a $ in it
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+_METADATA: dict[str, dict[str, Any]] = {
+    "svg": {"Date": None},
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+}
+
+
+def check_suffix(path: Path) -> str:
+    """The form of a figure's file, "svg", "png" or "pdf".
+
+    Raises:
+        BadInputError: It is not a figure.
+        MissingEngineError: matplotlib is not installed.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        kinds = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
+        raise BadInputError(f"a figure is a file {kinds}; got {path.name!r}")
+    require_matplotlib()
+    return suffix.lstrip(".")
+
+
+def require_matplotlib() -> Any:
+    """The package matplotlib.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    require_extra("matplotlib.figure", "a figure", "matplotlib", "plot")
+    return importlib.import_module("matplotlib")
+
+
+def saved(
+    draw: Callable[[], Any], form: str, settings: Mapping[str, Any] = SETTINGS, dpi: int = _DOTS
+) -> bytes:
+    """What is drawn, as svg, png or pdf; the same gives the same bytes.
+
+    Args:
+        draw: Makes a figure of matplotlib's.
+        form: "svg", "png" or "pdf".
+        settings: Of matplotlib.
+        dpi: Dots of a png to an inch.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    matplotlib = require_matplotlib()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(settings)
+        out = io.BytesIO()
+        draw().savefig(out, format=form, metadata=_METADATA[form], dpi=dpi)
+    return out.getvalue()
+
+
+def write_pictures(blocks: Sequence[Block], path: Path) -> int:
+    """Write all pictures among some blocks into one file, one above the other; its bytes.
+
+    Args:
+        blocks: Of a page.
+        path: A file .svg, .png or .pdf, written whole or not at all.
+
+    Raises:
+        BadInputError: There is no picture among them, or another suffix.
+        MissingEngineError: matplotlib is not installed.
+    """
+    pictures = [block for block in blocks if isinstance(block, Drawn)]
+    if not pictures:
+        raise BadInputError("there is no picture to write")
+    return replace_bytes(path, drawn(pictures, check_suffix(path)))
+
+
+def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
+    """Pictures one above the other, as svg, png or pdf.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    sizes = [_size_of(picture) for picture in pictures]
+    heights = [height for _, height in sizes]
+
+    def draw() -> Any:
+        from matplotlib.figure import Figure
+
+        size = max(width for width, _ in sizes), sum(heights)
+        figure = Figure(size, facecolor=_PAPER, layout="constrained")
+        rows = figure.subplots(len(pictures), height_ratios=heights, squeeze=False)[:, 0]
+        for axes, picture in zip(rows, pictures, strict=True):
+            draw_picture(axes, picture)
+            if heights[1:]:
+                axes.set_title(textwrap.fill(picture.title, _TITLE), fontsize="medium", loc="left")
+        return figure
+
+    return saved(draw, form)
+
+
+def draw_picture(axes: Any, picture: Drawn) -> None:
+    """Draw a picture on axes of matplotlib's."""
+    match picture:
+        case Traces():
+            _traces(axes, picture)
+        case Slots():
+            _slots(axes, picture)
+        case Pipeline():
+            _pipeline(axes, picture)
+        case Bars():
+            _bars(axes, picture)
+
+
+def chart(picture: Traces, size: tuple[float, float], box: Box) -> str:
+    """Curves as SVG without a legend, where something of the caller's goes along the axis of time.
+
+    Args:
+        picture: The curves.
+        size: Width and height [inches].
+        box: Left, bottom, width and height of the axes, as shares of that.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+
+    def draw() -> Any:
+        from matplotlib.figure import Figure
+
+        figure = Figure(size, facecolor="none")
+        draw_picture(figure.add_axes(box), picture)
+        return figure
+
+    settings = {"font.size": 8, "axes.linewidth": 0.6, "axes.facecolor": "none"}
+    return saved(draw, "svg", {**SETTINGS, **settings}).decode()
+
+
+def _traces(axes: Any, picture: Traces) -> None:
+    """Draw curves over one axis, with the tolerance and the chaos floor where they are known."""
+    curves = [(np.asarray(x, float), np.asarray(y, float)) for x, y in picture.curves.values()]
+    every = np.concatenate([y for _, y in curves])
+    least = _log_axis(axes, every, picture.tolerance) if picture.log else -np.inf
+    styles = _styles(picture)
+    for name, (x, y), style in zip(picture.curves, curves, styles, strict=True):
+        points = x, y
+        if picture.log:
+            points = _parted(x, np.where(y == 0, 0.0, np.maximum(y, least)))
+        axes.plot(*points, label=name, **style)
+    _spanned(axes, every, picture.least)
+    if picture.tolerance:
+        axes.axhline(picture.tolerance, color=INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
+    if picture.floor is not None:
+        x, y = (np.asarray(values) for values in picture.floor)
+        style = {"color": _FLOOR, "linewidth": 0, "zorder": 0.5}
+        axes.fill_between(x, axes.get_ylim()[0], y, where=y > least, **style)
+    axes.set_xlabel(picture.across)
+    axes.set_ylabel(picture.up)
+    axes.spines[["top", "right"]].set_visible(False)
+    if picture.sides:
+        axes.set_xlim(0, max(curves[0][0][-1], 1e-9))
+        return
+    axes.grid(alpha=0.3)
+    if len(picture.curves) > 1:
+        axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+
+
+def _styles(picture: Traces) -> list[dict[str, Any]]:
+    """Return the style of each curve.
+
+    Of curves that are called "engine: what", what has one colour, an engine one kind of line.
+    """
+    if picture.sides:
+        return [GAP if picture.log else SIDES[k] for k in range(len(picture.curves))]
+    parts = [name.rpartition(": ") for name in picture.curves]
+    engines = list(dict.fromkeys(engine for engine, _, _ in parts))
+    things = list(dict.fromkeys(thing for _, _, thing in parts))
+    styles = []
+    for engine, _, thing in parts:
+        colour = _COLOURS[things.index(thing) % len(_COLOURS)]
+        line = _LINES[engines.index(engine) % len(_LINES)]
+        styles.append({"linestyle": line, "color": colour})
+    return styles
+
+
+def _spanned(axes: Any, values: Array, least: float) -> None:
+    """Let the vertical axis go over so much at least: what does not matter is not blown up."""
+    values = values[np.isfinite(values)]
+    if len(values) and least > np.ptp(values):
+        middle = (values.min() + values.max()) / 2
+        axes.set_ylim(middle - 0.58 * least, middle + 0.58 * least)
+
+
+def _log_axis(axes: Any, values: Array, tolerance: float | None) -> float:
+    """Make the axis a log one with a level of its own for what is exactly zero.
+
+    Returns:
+        The least value that has a place: below a thousandth of the tolerance nothing matters.
+    """
+    shown = values[np.isfinite(values) & (values > 0)]
+    if tolerance:
+        shown = np.append(shown, tolerance)
+    most, least = (shown.max(), shown.min()) if len(shown) else (1.0, 1.0)
+    high = math.ceil(math.log10(most) + 0.05)
+    low = min(math.floor(math.log10(least)), high - 2)
+    if tolerance:
+        low = max(low, math.floor(math.log10(tolerance)) - 3)
+    below, has_zero = 10.0**low, bool((values == 0).any())
+    axes.set_yscale("symlog", linthresh=below, linscale=0.2 * (high - low))
+    axes.set_ylim(-0.25 * below if has_zero else below, 10.0**high)
+    if has_zero:
+        axes.axhspan(-0.25 * below, 0.5 * below, color=_BELOW, linewidth=0, zorder=0)
+    room = max(2, int(axes.bbox.height / axes.figure.dpi / 0.35))
+    powers = range(high, low - 1, -(high - low + 1) // room)[::-1]
+    names = [f"{10.0**k:g}" if k in _WRITTEN_OUT else f"1e{k}".replace("-", "−") for k in powers]
+    ticks = [10.0**k for k in powers]
+    if has_zero:
+        ticks, names = [0.0, *ticks], ["0", *names]
+    axes.set_yticks(ticks, names)
+    axes.minorticks_off()
+    return below
+
+
+def _parted(x: Array, y: Array) -> tuple[Array, Array]:
+    """Points of a line that is broken where it comes from zero or goes there.
+
+    Between zero and another value lie all powers of ten, and the line was at none of them.
+    """
+    breaks = np.flatnonzero(np.diff(y == 0)) + 1
+    return np.insert(x, breaks, np.nan), np.insert(y, breaks, np.nan)
+
+
+def _slots(axes: Any, picture: Slots) -> None:
+    """Rows of numbered boxes, one above the other, coloured by owner."""
+    owners = list(dict.fromkeys(owner for row in picture.rows.values() for owner, _, _ in row))
+    for level, (name, row) in enumerate(picture.rows.items()):
+        y = -2.0 * level
+        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace")
+        for owner, start, stop in row:
+            slots = range(start, stop)
+            colour = _COLOURS[owners.index(owner) % len(_COLOURS)]
+            boxes = axes.bar(slots, 1, 1, y, align="edge", **_pale(colour))
+            axes.bar_label(boxes, slots, label_type="center")
+            if level == 0:
+                # A name does not fit over one slot.
+                slope = {"ha": "left", "rotation": 35} if len(slots) == 1 else {"ha": "center"}
+                axes.text((start + stop) / 2, y + 1.15, owner, fontsize="small", **slope)
+    widest = max(stop for row in picture.rows.values() for _, _, stop in row)
+    axes.set_xlim(-1.5, widest + 0.5)
+    axes.set_ylim(-2.0 * len(picture.rows) + 1.7, 3.2)
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def _pale(colour: str) -> dict[str, str]:
+    return {"facecolor": colour + "30", "edgecolor": colour}
+
+
+def _pipeline(axes: Any, picture: Pipeline) -> None:
+    """Boxes from left to right; under them, what each call covers."""
+    deepest = max(len(content) for _, content in picture.stages)
+    top = deepest * 0.32 + 0.9
+    for k, (heading, content) in enumerate(picture.stages):
+        x, colour = 3.2 * k, _COLOURS[k % len(_COLOURS)]
+        axes.bar(x, top, 2.6, align="edge", **_pale(colour))
+        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold")
+        for line, text in enumerate(content):
+            y = top - 0.85 - 0.32 * line
+            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8)
+        if k:
+            axes.annotate(
+                "",
+                (x - 0.05, top / 2),
+                (x - 0.55, top / 2),
+                arrowprops={"arrowstyle": "->", "color": INK},
+            )
+    for k, (name, first, last) in enumerate(picture.spans):
+        y, left, right = -0.5 - 0.6 * k, 3.2 * first, 3.2 * last + 2.6
+        axes.annotate(
+            "", (right, y), (left, y), arrowprops={"arrowstyle": "|-|, widthA=.3, widthB=.3"}
+        )
+        paper = {"facecolor": _PAPER, "edgecolor": "none", "pad": 2}
+        axes.text((left + right) / 2, y, name, family="monospace", bbox=paper, **_CENTRE)
+    axes.set_xlim(-0.2, 3.2 * len(picture.stages) - 0.4)
+    axes.set_ylim(-0.6 * len(picture.spans) - 0.5, top + 0.1)
+    axes.axis("off")
+
+
+def _bars(axes: Any, picture: Bars) -> None:
+    """Bars from left to right, those of a name one below the other."""
+    high = 0.8 / len(picture.bars)
+    for k, (what, bars) in enumerate(picture.bars.items()):
+        places = [n + (k + 0.5) * high - 0.4 for n in range(len(bars))]
+        axes.barh(places, bars, high * 0.9, color=_COLOURS[k], alpha=0.75, label=what)
+    axes.set_yticks(range(len(picture.names)), picture.names)
+    axes.invert_yaxis()
+    axes.set_xlabel(picture.across)
+    axes.grid(alpha=0.3, axis="x")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+
+
+def _size_of(picture: Drawn) -> tuple[float, float]:
+    """Return width and height of a picture [inches]."""
+    match picture:
+        case Traces():
+            return 7.0, 3.4
+        case Slots():
+            return 7.5, 2.6
+        case Bars(names=names):
+            return 7.0, 0.9 + 0.42 * len(names)
+        case Pipeline(stages=stages):
+            longest = max(len(content) for _, content in stages)
+            return 7.5, 0.26 * longest + 1.6

@@ -1,0 +1,348 @@
+"""Both runs as data that the page's script draws: shapes, poses, trails, contacts, a camera."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...interface import Array, Ints
+from ...lab.compare.series import world_forces
+from ...lab.questions.finding import long_labels, traces_of
+from ...lab.questions.over_time import BothRuns
+from ...lab.recordings import Trace
+from ...measures import common_moments
+from .. import report_template as template
+from ..drawing import Drawing
+from ..drawing.scene import Camera, Motion, camera_for
+from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised, unit_quat
+
+# What a side is drawn as; or why that cannot be had, a sentence without its end.
+Look = Drawing | str
+_SMOOTH = 1 / 60  # seconds between two pictures that look like motion
+_BYTES = 450_000  # of the poses of both sides; each takes 14
+_FAR = 8.0  # extents of the model beyond which nothing is drawn
+_NEAR = 2.0  # extents beyond which nothing counts for where the camera stands
+_WAY = 2000  # points of the way of a site
+_DASH = 0.0015  # m between these
+_CLOSE = 0.05  # of the scene: a gap below it is looked at from near
+_TRIANGLES = 24_000  # of all shapes
+_CONTACTS = 9_000  # of one side, at all moments together
+_ASPECT = 1.45  # width of the picture through its height; the script has it too
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Both runs at the moments that are shown.
+
+    Attributes:
+        data: What is drawn, for the script; None if there is nothing to draw.
+        notes: What a reader should know of the picture, in sentences.
+        strongest: The largest contact force that is drawn [N].
+    """
+
+    data: dict[str, Any] | None
+    notes: list[str]
+    strongest: float = 0.0
+
+
+def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
+    """Moments to be shown: those that were compared, unless they are too few to look like motion.
+
+    Args:
+        left: A trace; without enough common moments its own are shown.
+        right: The other.
+        must: Moments that have to be among them [s].
+
+    Returns:
+        (n,) since the start [s], and how many compared moments are left out for their number.
+    """
+    bodies = len(left.header.bodies) + len(right.header.bodies)
+    most = max(60, min(1200, _BYTES // (14 * bodies)))
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep)).time
+    time, until = common, float(common[-1])
+    if until / max(1, len(common) - 1) > max(_SMOOTH, 1.5 * max(left.timestep, right.timestep)):
+        time = left.time - left.time[0]
+        time = time[time <= until + 1e-9]
+    wanted = np.searchsorted(time, np.array([*must, until]) - 1e-9)
+    keep = np.union1d(np.arange(0, len(time), -(-len(time) // most)), wanted)
+    time = time[np.minimum(keep, len(time) - 1)]
+    return time, max(0, len(common) - len(time))
+
+
+def rows_at(trace: Trace, times: Array) -> tuple[Ints, Array]:
+    """The row (n,) at or before each moment, and how far (n,) it has to go to the next, 0 to 1."""
+    elapsed = trace.time - trace.time[0]
+    row = np.searchsorted(elapsed, times + 1e-9, side="right") - 1
+    following = np.minimum(row + 1, len(elapsed) - 1)
+    width = np.where(following > row, elapsed[following] - elapsed[row], np.inf)
+    share = np.clip((times - elapsed[row]) / width, 0.0, 1.0)
+    return row, np.where(share < 1e-6, 0.0, share)
+
+
+def scene_of(
+    runs: BothRuns, looks: Sequence[Look], times: Array, left_out: int = 0, start: int = 0
+) -> Scene:
+    """Both runs at the moments that are shown.
+
+    Args:
+        runs: The runs.
+        looks: What each side is drawn as; the same object twice if both are of one model.
+        times: (n,) the moments that are shown [s].
+        left_out: How many compared moments are not.
+        start: The moment that the page opens at, among them.
+    """
+    traces, site = traces_of(runs.comparison), runs.comparison.tip
+    if any("xpos" not in trace or "xquat" not in trace for trace in traces):
+        return Scene(None, ["The traces tell no poses of the bodies: there is nothing to draw."])
+    labels = long_labels(runs.comparison)
+    notes, drawings = _drawings(traces, looks, labels)
+    shapes = list(dict.fromkeys(drawings))
+    meshes = [mesh_of(drawing, _TRIANGLES // len(shapes)) for drawing in shapes]
+    notes += [
+        f"The shapes are drawn with {len(mesh.faces)} of their {mesh.simplified} triangles."
+        for mesh in meshes
+        if mesh.simplified
+    ]
+    extent = max(drawing.extent for drawing in drawings)
+    places = [rows_at(trace, times) for trace in traces]
+    poses = [_between(trace["xpos"], *place) for trace, place in zip(traces, places, strict=True)]
+    box = _box(poses, drawings[0], extent)
+    if box is None:
+        return Scene(None, ["No pose of a body is a finite number: there is nothing to draw."])
+    motions = [
+        Motion(drawing, box.clipped(pos), _turned(trace["xquat"], *place))
+        for drawing, pos, trace, place in zip(drawings, poses, traces, places, strict=True)
+    ]
+    tips = _tips(traces, places, site)
+    few = max(2, _CONTACTS // len(times))
+    contacts = [
+        _contacts(trace, rows, few) for trace, (rows, _) in zip(traces, places, strict=True)
+    ]
+    sides = []
+    for k, motion in enumerate(motions):
+        side = _side_data(motion, shapes.index(motion.drawing), box)
+        side["tip"] = packed(tips[k], "f4") if tips else ""
+        side["contacts"] = contacts[k].as_data()
+        side |= _way(traces[k], site, times)
+        sides.append(side)
+    notes += template.texts(
+        "show/html/scene",
+        other=labels[1] if places[1][1].any() else None,
+        hidden=left_out if left_out else None,
+        few=few if any(of_side.more for of_side in contacts) else None,
+    )
+    camera = camera_for(motions, _ASPECT, _NEAR * extent)
+    data = {
+        "moving": _moving(*traces),
+        **box.as_data(),
+        "extent": extent,
+        **_nearness(tips, start, extent),
+        "floor": _floor_height(drawings[0]),
+        **_camera_data(camera),
+        "meshes": [mesh_as_data(mesh) for mesh in meshes],
+        "sides": sides,
+    }
+    return Scene(data, notes, max(of_side.strongest for of_side in contacts))
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """What part of space is drawn.
+
+    Attributes:
+        low: (3,) its lowest corner [m].
+        span: (3,) the lengths of its edges [m].
+    """
+
+    low: Array
+    span: Array
+
+    def clipped(self, pos: Array) -> Array:
+        """Return positions (n, nbody, 3) that are finite, within the box."""
+        return np.clip(_held(pos), self.low, self.low + self.span)
+
+    def as_data(self) -> dict[str, list[float]]:
+        """Return it for the script."""
+        return {"low": self.low.tolist(), "span": self.span.tolist()}
+
+
+def _box(poses: Sequence[Array], drawing: Drawing, extent: float) -> _Box | None:
+    """Return what has all positions (n, nbody, 3) that are not too far away in it.
+
+    None where none of them is finite.
+    """
+    finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos in poses])
+    if not len(finite):
+        return None
+    middle = np.asarray(drawing.center)
+    low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
+    high = np.minimum(finite.max(axis=0), middle + _FAR * extent)
+    return _Box(low, np.maximum(high - low, 1e-6))
+
+
+def _floor_height(drawing: Drawing) -> float | None:
+    """Return where the floor of a drawing is [m]; None without a floor."""
+    ground = [float(part.vertices[0, 2]) for part in drawing.parts if part.is_ground]
+    return ground[0] if ground else None
+
+
+def _side_data(motion: Motion, mesh: int, box: _Box) -> dict[str, Any]:
+    """Return the poses of a side, and the number of its mesh, for the script."""
+    return {
+        "mesh": mesh,
+        "bodies": motion.xpos.shape[1],
+        "pos": packed(quantised(motion.xpos, box.low, box.span), "u2"),
+        "quat": packed(np.round(motion.xquat * 32767), "i2"),
+    }
+
+
+def _camera_data(camera: Camera) -> dict[str, Any]:
+    """Return a camera for the script, which has its angles about the target, not of its view."""
+    azimuth = math.radians(camera.azimuth) - math.pi
+    elevation = -math.radians(camera.elevation)
+    return {
+        "camera": [*camera.target, camera.distance, azimuth, elevation],
+        "opening": math.radians(camera.fovy),
+    }
+
+
+def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:
+    """Whether to begin close to the site, and how close: so that a small gap is seen."""
+    if tips is None:
+        return {"begin_near": False, "near": 0.55 * extent}
+    gaps = np.linalg.norm(tips[0] - tips[1], axis=1)
+    return {
+        "begin_near": bool(0 < gaps.max() < _CLOSE * extent),
+        "near": float(np.clip(25 * gaps[start], 0.4 * extent, 0.55 * extent)),
+    }
+
+
+def _drawings(
+    traces: Sequence[Trace], looks: Sequence[Look], labels: Sequence[str]
+) -> tuple[list[str], list[Drawing]]:
+    """A drawing for each side, of sticks where there is none better; and notes on them."""
+    notes: list[str] = []
+    drawings: list[Drawing] = []
+    for trace, look, label in zip(traces, looks, labels, strict=True):
+        if drawings and look is looks[0]:
+            return notes, [*drawings, *drawings]
+        why_not = look if isinstance(look, str) else None
+        drawings.append(bones_of(trace) if isinstance(look, str) else look)
+        left_out = drawings[-1].left_out
+        notes += template.texts(
+            "show/html/scene_side",
+            left_out=", ".join(left_out) if left_out else None,
+            label=label,
+            why_not=why_not,
+        )
+    return notes, drawings
+
+
+def _held(pos: Array) -> Array:
+    """Positions that are not finite are those of the last moment that were."""
+    row, good = np.arange(len(pos))[:, None], np.isfinite(pos).all(axis=2)
+    last = np.maximum.accumulate(np.where(good, row, 0))
+    held = pos[last, np.arange(pos.shape[1])]
+    return np.where(np.isfinite(held), held, 0.0)
+
+
+def _between(values: Array, rows: Ints, share: Array) -> Array:
+    """Rows of values, each gone a share of the way to the next."""
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    after = values[np.minimum(rows + 1, len(values) - 1)]
+    return np.where(share > 0, (1 - share) * values[rows] + share * after, values[rows])
+
+
+def _turned(quat: Array, rows: Ints, share: Array) -> Array:
+    """The same of orientations, the shorter way, of unit length."""
+    after = quat[np.minimum(rows + 1, len(quat) - 1)]
+    same = (quat[rows] * after).sum(axis=-1, keepdims=True) >= 0
+    weight = share[:, None, None]
+    return unit_quat((1 - weight) * quat[rows] + weight * np.where(same, after, -after))
+
+
+def _tips(
+    traces: Sequence[Trace], places: Sequence[tuple[Ints, Array]], tip: str
+) -> tuple[Array, Array] | None:
+    if any("site_xpos" not in trace or tip not in trace.header.sites for trace in traces):
+        return None
+    left, right = (
+        _between(trace.site(tip)[0], *place) for trace, place in zip(traces, places, strict=True)
+    )
+    return (left, right) if np.isfinite([left, right]).all() else None
+
+
+def _way(trace: Trace, tip: str, shown: Array) -> dict[str, str]:
+    """The way of a site at the rows that its own side has, and how much of it lies behind."""
+    if "site_xpos" not in trace or tip not in trace.header.sites:
+        return {"way": "", "behind": ""}
+    elapsed = trace.time - trace.time[0]
+    rows = np.flatnonzero(elapsed <= shown[-1] + 1e-9)
+    rows = np.unique([*rows[:: -(-len(rows) // _WAY)], rows[-1]])
+    way = trace.site(tip)[0][rows]
+    if len(rows) < 2 or not np.isfinite(way).all():
+        return {"way": "", "behind": ""}
+    # Points as far apart on the way as each other, so that its dashes are as long.
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+    along += 1e-9 * np.arange(len(along))  # where it stands still, time goes on
+    at = np.linspace(0.0, along[-1], int(np.clip(along[-1] / _DASH, 2, _WAY)))
+    way = np.column_stack([np.interp(at, along, axis) for axis in way.T])
+    when = np.interp(at, along, elapsed[rows])
+    behind = np.clip(np.searchsorted(when, shown + 1e-9, side="right") - 1, 0, len(at) - 1)
+    return {"way": packed(way, "f4"), "behind": packed(behind, "u2")}
+
+
+@dataclass(frozen=True, eq=False)
+class _Contacts:
+    """The contacts of one side at the moments that are shown.
+
+    Attributes:
+        counts: (n,) how many there are at each moment; None where the trace tells none.
+        where: (c, 6) of each the place [m] and the force [N], in world axes.
+        strongest: The largest of the forces [N].
+        more: Whether there are more at some moment than are drawn.
+    """
+
+    counts: Ints | None
+    where: Array
+    strongest: float
+    more: bool
+
+    def as_data(self) -> dict[str, str]:
+        """Return them for the script."""
+        if self.counts is None:
+            return {"count": "", "at": ""}
+        return {"count": packed(self.counts, "u1"), "at": packed(self.where, "f4")}
+
+
+def _contacts(trace: Trace, rows: Ints, most: int) -> _Contacts:
+    """Return the contacts in each row, the strongest first, at most so many."""
+    if "contact_row" not in trace:
+        return _Contacts(None, np.empty((0, 6)), 0.0, more=False)
+    begins = np.searchsorted(trace["contact_row"], rows)
+    ends = np.searchsorted(trace["contact_row"], rows, side="right")
+    strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
+    counts = np.minimum(ends - begins, min(most, 255))
+    chosen = []
+    for begin, end, count in zip(begins, ends, counts, strict=True):
+        chosen.append(begin + np.argsort(-strength[begin:end], kind="stable")[:count])
+    places = np.concatenate(chosen)
+    where = np.hstack([trace["contact_pos"][places], world_forces(trace)[places]])
+    where = np.nan_to_num(where)
+    strongest = float(np.linalg.norm(where[:, 3:], axis=1).max(initial=0.0))
+    return _Contacts(counts, where, strongest, more=bool((ends - begins > most).any()))
+
+
+def _moving(left: Trace, right: Trace) -> list[int]:
+    """Whether each body of the second side is elsewhere at another time or on the other side."""
+    pairs = zip(left.header.bodies, right.header.bodies, strict=False)
+    still = np.array([left_body == right_body for left_body, right_body in pairs])
+    for trace, column in itertools.product((left, right), ("xpos", "xquat")):
+        moved = np.abs(trace[column][:, : len(still)] - left[column][0, : len(still)])
+        still &= moved.max(axis=(0, 2)) <= 1e-6
+    return [*np.where(still, 0, 1).tolist(), *[1] * (len(right.header.bodies) - len(still))]
