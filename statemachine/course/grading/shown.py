@@ -19,7 +19,7 @@ from ...models import models_dir
 from ...processes.places import View, python_view
 from .inside.guard import ROOMS
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PACKAGE = Path(__file__).resolve().parents[2]
 _INSIDE = ("__init__.py", "inside")  # of `grading`
 _FOR_TESTS = ("pytest", "_pytest", "pluggy", "iniconfig", "packaging", "pygments")
 _FAULTS = "faults"  # of `grading`: what puts a fault into an arm, for tests
@@ -34,7 +34,8 @@ def _of_machine(backend: str, _python_path: str | None) -> View:
     for name in ROOMS:
         rooms += compiled.glob(f"{name}.*.pyc")
         rooms += [place for place in (_PACKAGE / name, _PACKAGE / f"{name}.py") if place.exists()]
-    rooms += [_PACKAGE / "grading" / name for name in _INSIDE]
+    course = _PACKAGE / "course"
+    rooms += [course / "__init__.py", *(course / "grading" / name for name in _INSIDE)]
     return python_view(modules_of(backend)).with_more([*rooms, models_dir()])
 
 
@@ -58,6 +59,6 @@ def view_of(backend: str, own: Iterable[Path], faults: bool = False) -> View:
         own: Folders of what the student handed in, and of nobody else's.
         faults: Whether it runs tests on arms with faults, and so needs what makes these.
     """
-    more = [_PACKAGE / "grading" / _FAULTS] if faults else []
+    more = [_PACKAGE / "course" / "grading" / _FAULTS] if faults else []
     machine = _of_machine(backend, os.environ.get("PYTHONPATH"))
     return machine.with_more([*own, *more])

@@ -24,14 +24,14 @@ from ....models import models_dir
 
 # What a student's code may import of this package, beside its top.
 PUBLIC = (
-    "backends", "conformance", "errors", "interface", "kinematics", "lab/compare",
-    "lab/recordings", "lab/runs", "models", "rotations", "worlds",
+    "backends", "conformance", "errors", "interface", "kinematics", "lab", "models", "rotations",
+    "worlds",
 )  # fmt: skip
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
-    *PUBLIC, "_models", "atomic_files", "engines", "freshness", "installed", "lab/__init__",
-    "lab/installation", "lab/probes", "lab/validate", "measures", "model_files", "processes",
-    "release_names", "releases", "robot_packages", "show", "typed_numbers", "witness",
+    *PUBLIC, "_models", "atomic_files", "engines", "freshness", "gym", "installed", "measures",
+    "model_files", "processes", "release_names", "releases", "robot_packages", "show",
+    "typed_numbers", "witness",
 )  # fmt: skip
 
 _PROCESS, _PROGRAM = "it starts another process", "it starts another program"
@@ -127,7 +127,7 @@ class Guard:
         self._package = str(_PACKAGE) + os.sep
         self._inside = str(Path(__file__).parent) + os.sep
         self._ours = (self._package, str(Path(__file__).parents[3]) + os.sep)
-        rooms = [*ROOMS, "course/__init__", "course/grading/__init__", "course/grading/inside"]
+        rooms = [*ROOMS, "course/__init__", "course/__pycache__", "course/grading/inside"]
         if faults:
             rooms.append("course/grading/faults")
         self._rooms = tuple(str(_PACKAGE / room) for room in rooms)
