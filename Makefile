@@ -78,17 +78,17 @@ hooks: $(VENV)/test.stamp
 	@$(BIN)/pre-commit install --hook-type pre-commit --hook-type pre-push
 
 bench: $(VENV)/bench.stamp
-	@STATEMACHINE_ENGINES=$(VENV)/engines $(BIN)/python -m benchmarks
+	@STATEMACHINE_ENGINES=$(VENV)/engines $(BIN)/python -m tools.benchmarks
 
 fuzz: $(VENV)/test.stamp
-	@$(BIN)/python -m fuzz --seed $(SEED) --times $(TIMES)
+	@$(BIN)/python -m tools.fuzz --seed $(SEED) --times $(TIMES)
 
 mutate: $(VENV)/test.stamp
-	@$(BIN)/python -m mutants
+	@$(BIN)/python -m tools.mutants
 
 # make reference    which figure is another than before the house became smaller?
 reference: $(VENV)/test.stamp
-	@$(BIN)/python -m reference compare
+	@$(BIN)/python -m tools.reference compare
 
 # make picture      render models/so101/so101.png anew (needs EGL or OSMesa)
 picture: $(VENV)/test.stamp

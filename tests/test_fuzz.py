@@ -13,10 +13,10 @@ from unittest.mock import Mock
 import pytest
 
 import statemachine as sm
-from fuzz import command_lines, kills, models, threads, traces
-from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
 from statemachine.lab.recordings import formats
+from tools.fuzz import command_lines, kills, models, threads, traces
+from tools.fuzz.__main__ import run_apart, targets
 
 from .conftest import ROOT, assert_has, in_its_own_python, of_python
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are
 @pytest.mark.parametrize("target", targets())
 def test_each_target_runs_in_a_process_of_its_own(target: str) -> None:
     """Each with so many tries that none takes long, and the slow ones with several, too."""
-    tries = importlib.import_module(f"fuzz.{target}").TRIES
+    tries = importlib.import_module(f"tools.fuzz.{target}").TRIES
     assert_has(run_apart(target, seed=3, times=0.04), failures=[], tried=round(0.04 * tries))
 
 
@@ -43,7 +43,7 @@ def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
 # A step that looks for no other thread; MuJoCo lets go of Python's lock within it.
 UNGUARDED = """
 import json, mujoco, statemachine as sm
-from fuzz import threads
+from tools.fuzz import threads
 sm.step = lambda model, data, count=1: mujoco.mj_step(model.raw, data.raw, count)
 threads.available = lambda: (["mujoco"], [])
 print(json.dumps(threads.run(1, 20).failures))
@@ -137,8 +137,8 @@ def test_a_fault_is_found(
 def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
     """The table shows it, the others go on, and the exit code says so."""
     code = (
-        "import sys, fuzz.__main__ as fuzz\n"
-        "from fuzz._tally import Tally\n"
+        "import sys, tools.fuzz.__main__ as fuzz\n"
+        "from tools.fuzz._tally import Tally\n"
         "ends = {'kills': 'import os; os.abort()', 'models': ''}\n"
         "plain = fuzz.subprocess.Popen\n"
         "def start(words, **others):\n"
@@ -159,6 +159,6 @@ def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
 def test_every_file_of_the_folder_is_a_target() -> None:
     assert {"command_lines", "kills", "models", "traces"} <= set(targets())
     for name in targets():
-        module = importlib.import_module(f"fuzz.{name}")
+        module = importlib.import_module(f"tools.fuzz.{name}")
         assert callable(module.run)
         assert module.TRIES >= 100  # slow ones get their share, too

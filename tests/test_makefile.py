@@ -17,7 +17,7 @@ from .conftest import ROOT
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-OURS = ("statemachine", "benchmarks", "examples", "fuzz", "mutants", "reference", "tests")
+OURS = ("statemachine", "examples", "tests", "tools")
 # What an option of our command imports only when it is given, and the extra that brings it.
 EXTRA_OF_AN_OPTION = {"--html": "plot"}
 # Distributions of modules that may not be installed where this test runs.
@@ -92,9 +92,10 @@ def distributions_of(requirements: list[str]) -> set[str]:
 def programs_of(rule: Target) -> Iterator[Path]:
     """Yield the files of this checkout that a recipe starts with the environment's Python."""
     for line in rule.recipe:
-        for package in re.findall(r"\$\(BIN\)/python -m (\w+)", line):
-            if (ROOT / package / "__main__.py").is_file():
-                yield ROOT / package / "__main__.py"
+        for module in re.findall(r"\$\(BIN\)/python -m ([\w.]+)", line):
+            program = ROOT.joinpath(*module.split("."), "__main__.py")
+            if program.is_file():
+                yield program
         for script in re.findall(r"\$\(BIN\)/python ([\w/]+\.py)", line):
             yield ROOT / script
 
@@ -185,8 +186,8 @@ def test_programs_of_the_makefile_are_found() -> None:
         *("bench", "fuzz", "mutate", "reference", "picture", "urdf", "traces", "notebook"),
         *("student-kit", "autograder"),
     }
-    assert "gymnasium" in modules_needed_by(ROOT / "benchmarks" / "__main__.py")
-    assert "coverage" in modules_needed_by(ROOT / "mutants" / "__main__.py")
+    assert "gymnasium" in modules_needed_by(ROOT / "tools" / "benchmarks" / "__main__.py")
+    assert "coverage" in modules_needed_by(ROOT / "tools" / "mutants" / "__main__.py")
 
 
 @pytest.mark.parametrize(("target", "program"), PROGRAMS, ids=[name for name, _ in PROGRAMS])

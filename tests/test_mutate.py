@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from coverage import CoverageData
 
-from mutants import __main__ as run
-from mutants.covered import Covered
-from mutants.draw import Mutant, Site, all_sites, find, sites
+from tools.mutants import __main__ as run
+from tools.mutants.covered import Covered
+from tools.mutants.draw import Mutant, Site, all_sites, find, sites
 
 from .conftest import ROOT, assert_in, written, written_all
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from fuzz import random_models
 from statemachine.engines.mujoco.description import read
+from tools.fuzz import random_models
 
 from .conftest import Cli, written
 from .small_models import mjcf

@@ -1,4 +1,4 @@
-"""The figures of `reference/` are today's, and what compares them notices a change."""
+"""The figures of `tools/reference/` are today's, and what compares them notices a change."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from benchmarks import __main__ as bench
-from benchmarks.interleave import NULL, Ratio
-from reference.figures import DEFAULT, differences, flatten, largest_number, tolerance_of
-from reference.groups import GROUPS, QUICK, absent, changes, kept, write
+from tools.benchmarks import __main__ as bench
+from tools.benchmarks.interleave import NULL, Ratio
+from tools.reference.figures import DEFAULT, differences, flatten, largest_number, tolerance_of
+from tools.reference.groups import GROUPS, QUICK, absent, changes, kept, write
 
 from .conftest import REQUIRED, ROOT, of_python, refused
 
@@ -28,7 +28,7 @@ def test_the_figures_are_those_of_the_reference(group: str) -> None:
     if absent(group):
         assert "shared" not in REQUIRED, f"{group} is not beside the checkout"
         pytest.skip(f"the public model {group} is not beside the checkout")
-    of_python("-m", "reference", "compare", group, code=0)
+    of_python("-m", "tools.reference", "compare", group, code=0)
 
 
 def test_every_group_has_figures() -> None:
@@ -81,7 +81,8 @@ def test_an_eighth_digit_is_a_change_and_a_tenth_another_processor(group: str) -
 
 
 def test_every_wider_tolerance_has_its_reason() -> None:
-    rules = tomllib.loads((ROOT / "reference" / "tolerances.toml").read_text("utf-8"))["rule"]
+    text = (ROOT / "tools" / "reference" / "tolerances.toml").read_text("utf-8")
+    rules = tomllib.loads(text)["rule"]
     for rule in rules:
         assert len(rule["reason"]) > 20
         assert re.compile(rule["keys"])
@@ -137,7 +138,7 @@ def test_figures_are_made_into_a_folder_and_compared_bit_by_bit(tmp_path: Path) 
     assert changes("worlds", almost, tmp_path) == []
     assert len(changes("worlds", almost, tmp_path, bits=True)) == 1
     # What is stored in the repository may be of another machine.
-    done = of_python("-m", "reference", "compare", "worlds", "--bits", code=2)
+    done = of_python("-m", "tools.reference", "compare", "worlds", "--bits", code=2)
     assert "give their --folder" in done.stderr
 
 

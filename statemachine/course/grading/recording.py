@@ -30,7 +30,7 @@ START = 60.0  # [s] on the clock for Python, the engine and the worlds to get re
 _MEMORY_MOST = 2 * sandbox.GB
 _RECORD_MOST = 40_000_000  # bytes
 _TEXT_MOST = 2000  # characters
-_PACKAGES = Path(__file__).resolve().parents[2]
+_PACKAGES = Path(__file__).resolve().parents[3]
 _CHILD = (
     "import sys; sys.path.insert(0, sys.argv[2]); "
     "from statemachine.course.grading.inside.child import main; main(sys.argv[1])"

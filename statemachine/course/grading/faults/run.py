@@ -323,7 +323,7 @@ def _command(file: str, backend: str, folder: str, settings: str, record: str) -
 def _environment(backend: str) -> dict[str, str]:
     """Return that of a student's process, with this package to be found, for one pytest alone."""
     env = environment(backend)
-    paths = [str(Path(__file__).resolve().parents[3])]
+    paths = [str(Path(__file__).resolve().parents[4])]
     if env.get("PYTHONPATH"):
         paths.append(env["PYTHONPATH"])
     return {

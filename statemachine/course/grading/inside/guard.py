@@ -126,7 +126,7 @@ class Guard:
         self._standard = (*standard, *map(_PATH.realpath, standard))
         self._package = str(_PACKAGE) + os.sep
         self._inside = str(Path(__file__).parent) + os.sep
-        self._ours = (self._package, str(Path(__file__).parents[3]) + os.sep)
+        self._ours = (self._package, str(Path(__file__).parents[4]) + os.sep)
         rooms = [*ROOMS, "course/__init__", "course/__pycache__", "course/grading/inside"]
         if faults:
             rooms.append("course/grading/faults")

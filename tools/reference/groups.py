@@ -19,7 +19,7 @@ from statemachine.cli.main import main as statemachine
 from statemachine.installed import ENGINES, engine_version
 
 from . import questions
-from .cases import HERE, MODELS, PAIRS, Case, of_model, of_pair
+from .cases import HERE, MODELS, PAIRS, ROOT, Case, of_model, of_pair
 from .figures import Figures, curve, differences, of_output
 
 KEPT = HERE / "figures"
@@ -83,7 +83,7 @@ def _sweep() -> dict[str, Figures]:
 def _students() -> dict[str, Figures]:
     """What the judge says of each attempt, and of the solutions."""
     files = dict(questions.student_files(Path.cwd()))
-    files["the solution"] = HERE.parent / "teaching" / "solutions" / "step_loop.py"
+    files["the solution"] = ROOT / "teaching" / "solutions" / "step_loop.py"
     return {
         name: _of(Case(name, "check", ("check", str(file), "--json")))
         for name, file in files.items()

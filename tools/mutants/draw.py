@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 _OTHER: dict[type, Any] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,

@@ -1,4 +1,4 @@
-"""`python -m reference make` writes the figures, `compare` says what has changed since."""
+"""`python -m tools.reference make` writes the figures, `compare` says what has changed since."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .groups import GROUPS, KEPT, QUICK, absent, changes, figures, write
 
 def main() -> int:
     """Compute groups of figures in processes of their own, and write or compare them."""
-    parser = argparse.ArgumentParser("python -m reference", description=__doc__)
+    parser = argparse.ArgumentParser("python -m tools.reference", description=__doc__)
     parser.add_argument("action", choices=("make", "compare"))
     parser.add_argument("groups", nargs="*", metavar="GROUP", help=", ".join(GROUPS))
     parser.add_argument("--quick", action="store_true", help="only the groups of `make test`")
     parser.add_argument(
-        "--folder", type=Path, default=KEPT, help="where figures are kept; reference/figures"
+        "--folder", type=Path, default=KEPT, help="where figures are kept; tools/reference/figures"
     )
     parser.add_argument(
         "--bits",

@@ -145,7 +145,7 @@ def _table(results: list[dict[str, object]]) -> str:
 
 def main() -> int:
     """Replay the mutants of results.json, or draw them anew."""
-    parser = argparse.ArgumentParser("python -m mutants", description=__doc__)
+    parser = argparse.ArgumentParser("python -m tools.mutants", description=__doc__)
     parser.add_argument("--draw", type=int, metavar="N", help="draw N mutants anew")
     parser.add_argument("--seed", type=int, default=0, help="of what is drawn (0)")
     options = parser.parse_args()

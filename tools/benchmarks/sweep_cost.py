@@ -1,6 +1,6 @@
 """What a cell of a sweep costs, and how many tasks loky and Dask hand out: `docs/sweeps.md`.
 
-    python -m benchmarks.sweep_cost
+    python -m tools.benchmarks.sweep_cost
 
 It needs what sweeps on many machines need: pip install -e '.[cluster]'.
 

@@ -39,7 +39,7 @@ def measure(tree: Path, folder: Path) -> None:
     settings = folder / "coverage.ini"
     settings.write_text(_INI.format(tree=tree, folder=folder), "utf-8")
     watched = {"COVERAGE_PROCESS_START": str(settings), "MUTANTS_TIMES": str(folder / "times.json")}
-    command = [sys.executable, "-m", "pytest", "-p", "mutants.contexts", "-n", "auto"]
+    command = [sys.executable, "-m", "pytest", "-p", "tools.mutants.contexts", "-n", "auto"]
     subprocess.run(
         [*command, "--dist", "worksteal", *(f"--ignore={path}" for path in FROZEN)],
         cwd=tree,

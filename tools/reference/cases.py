@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parent
+ROOT = HERE.parents[1]
 _ROBOTS = ROOT.parent / "shared" / "robots" / "models"
 
 # The arm's three scenes and its URDF; public robots are read from beside the checkout.

@@ -19,7 +19,6 @@ import mujoco.batch
 import numpy as np
 
 import statemachine as sm
-from benchmarks.interleave import NULL, Ratio, interleaved
 from statemachine import __version__, releases
 from statemachine.lab.recordings import recorder
 from statemachine.lab.runs.drive import silent
@@ -29,6 +28,8 @@ from statemachine.lab.why import WhyRequest, explain
 from statemachine.lab.why.causes import built
 from statemachine.worlds import make_worlds
 from statemachine.worlds import step as step_worlds
+
+from .interleave import NULL, Ratio, interleaved
 
 STEPS = 100
 _LONG = 500  # of what begins anew each time

@@ -1,4 +1,4 @@
-"""Run the fuzzers: `python -m fuzz [--seed N] [--times X] [TARGET …]`.
+"""Run the fuzzers: `python -m tools.fuzz [--seed N] [--times X] [TARGET …]`.
 
 A target is a file of this folder with `run(seed, tries) -> Tally`, and TRIES, how many inputs it
 tries: many where one takes microseconds, and enough where one takes a process. So a seed tries the
@@ -40,7 +40,7 @@ def run_apart(target: str, seed: int, times: float) -> Tally:
     """
     with tempfile.TemporaryDirectory() as folder:
         answer = Path(folder) / "tally.json"
-        words = [sys.executable, "-m", "fuzz", "--child", str(answer), target]
+        words = [sys.executable, "-m", "tools.fuzz", "--child", str(answer), target]
         words += ["--seed", str(seed), "--times", str(times)]
         child = subprocess.Popen(
             words, cwd=ROOT, env=environment(), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL
@@ -62,7 +62,7 @@ def run_apart(target: str, seed: int, times: float) -> Tally:
 
 def main() -> int:
     """Run the targets, show the table; 1 if anything failed."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.fuzz", description=__doc__)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(targets()))
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is drawn (0)")
     parser.add_argument("--times", type=float, default=1.0, metavar="X", help="as many tries (1)")
@@ -73,7 +73,7 @@ def main() -> int:
         parser.error(f"no target {unknown[0]!r}; known: {', '.join(targets())}")
     if options.child:
         limit_memory()
-        module = importlib.import_module(f"fuzz.{options.targets[0]}")
+        module = importlib.import_module(f"tools.fuzz.{options.targets[0]}")
         tally = module.run(options.seed, max(1, round(options.times * module.TRIES)))
         Path(options.child).write_text(json.dumps(dataclasses.asdict(tally)))
         return 0

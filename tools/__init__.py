@@ -1,0 +1,1 @@
+"""What maintainers run: checks, reference figures, mutants, fuzzers, benchmarks."""
