@@ -21,7 +21,9 @@ models/so101/so101.xml: where each body sits on the one before it.
     pytest exercises/test_arm.py
 
 runs them on the healthy arm alone, and shows more of what fails. What a test asks for comes from
-conftest.py beside this file; without it: pytest -p statemachine.course.grading.faults.plugin test_arm.py
+conftest.py beside this file; without it:
+
+    pytest -p statemachine.course.grading.faults.plugin test_arm.py
 
 What to test against? Not what the arm gave you yesterday: what you know without it. A turn by
 90 degrees, a free fall, a circle about an axis, a weight on a spring, two runs that must agree.

@@ -1,8 +1,8 @@
 """A made-up engine in a Python of its own: MuJoCo, of which little is told.
 
 It is the template for an engine of yours that cannot be installed beside this package: the
-functions and the class that `statemachine/backends/served/child_server.py` asks for. `load` below is for
-this side: the Python and this file make a backend.
+functions and the class that `statemachine/backends/served/child_server.py` asks for. `load`
+below is for this side: the Python and this file make a backend.
 """
 
 from __future__ import annotations

@@ -29,16 +29,16 @@ def _parts() -> Any:
     from statemachine.backends import hidden_data as _hidden_data
     from statemachine.backends import hidden_world as _hidden_world
     from statemachine.backends import pybullet_backend
-    from statemachine.backends.bullet import driven as _bullet_driven
-    from statemachine.backends.bullet import joint_dynamics as _bullet_law
-    from statemachine.backends.bullet import plan as _bullet_plan
-    from statemachine.backends.bullet import world as _bullet_world
+    from statemachine.backends.bullet import driven as bullet_driven
+    from statemachine.backends.bullet import joint_dynamics
+    from statemachine.backends.bullet import plan as bullet_plan
+    from statemachine.backends.bullet import world as bullet_world
 
     class Parts:
-        data, hidden, driven = _hidden_data, _hidden_world, _bullet_driven
-        plan, ghost = _bullet_plan, _bullet_driven
-        law, world = _bullet_law, _bullet_world
-        backend, pb = pybullet_backend, _bullet_world.pb
+        data, hidden, driven = _hidden_data, _hidden_world, bullet_driven
+        plan, ghost = bullet_plan, bullet_driven
+        law, world = joint_dynamics, bullet_world
+        backend, pb = pybullet_backend, bullet_world.pb
 
     return Parts
 

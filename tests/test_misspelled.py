@@ -23,7 +23,7 @@ from tools.check_templates import contents
 from .conftest import ROOT
 
 SEED = 46
-ROOMS = ("commands", "report", "lessons", "grading", "compare", "sweep", "robots", "probes", "view")
+ROOMS = ("cli", "course", "lab", "view")
 WRONG = "zq"  # what a misspelled name ends with
 
 

@@ -17,7 +17,7 @@ import pytest
 import statemachine as sm
 from statemachine import worlds
 from statemachine.backends import compiled, mujoco_backend
-from statemachine.backends.mujoco import alarms as _mujoco_alarms
+from statemachine.backends.mujoco import alarms as mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
 from .conftest import (
@@ -128,7 +128,7 @@ def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:
             sm.reset(model, data)
             mujoco.set_mju_user_warning(old)
             sm.reset(model, data)
-        assert mujoco.get_mju_user_warning() is _mujoco_alarms._KEEP
+        assert mujoco.get_mju_user_warning() is mujoco_alarms._KEEP
 
 
 def test_a_warning_of_a_raw_simulation_does_not_come_out_of_our_step() -> None:
@@ -146,7 +146,7 @@ def test_what_is_kept_of_warnings_is_bounded(mujoco_scene: sm.Model) -> None:
             _step_raw_to_nan()
         sm.step(mujoco_scene, data)
         done.set()
-        assert len(_mujoco_alarms._TEXTS) <= 256
+        assert len(mujoco_alarms._TEXTS) <= 256
 
 
 def test_three_threads_that_diverge_at_once_each_hear_of_their_own(mujoco_box: sm.Model) -> None:

@@ -395,12 +395,12 @@ def test_what_is_dropped_gives_its_clients_back_at_once(monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("memory", ["free", "gone"])
 def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch, memory: str) -> None:
-    from statemachine.backends.bullet import client as _bullet_client
+    from statemachine.backends.bullet import client as bullet_client
 
     model, answers = load("so101"), [-1, -1]
     where, name, said = {
-        "free": (_bullet_client.pb, "connect", "1024 worlds in one process at most, of 35 MB each"),
-        "gone": (_bullet_client, "free_memory", "no memory for another world .*: one takes 35 MB"),
+        "free": (bullet_client.pb, "connect", "1024 worlds in one process at most, of 35 MB each"),
+        "gone": (bullet_client, "free_memory", "no memory for another world .*: one takes 35 MB"),
     }[memory]
     around(where, name)(lambda right, *_: answers.pop() if answers else right(*_))(monkeypatch)
     refused((EngineError, f"{said}.*close some Data", lambda: sm.make_data(model)))

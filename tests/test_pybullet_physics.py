@@ -321,15 +321,15 @@ def test_a_reset_forgets_what_the_links_of_one_arm_touched() -> None:
 
 def test_a_joint_on_its_limit_is_no_slower(tmp_path: Path) -> None:
     """Counted, not timed: friction and limit of one joint are found in a few solutions."""
-    from statemachine.backends.bullet import joint_dynamics as _bullet_law
+    from statemachine.backends.bullet import joint_dynamics
 
     model = sm.load("so101/scene", backend="pybullet")
     solved = []
-    right = _bullet_law.dense.factored
+    right = joint_dynamics.dense.factored
     with sm.make_data(model) as data, pytest.MonkeyPatch.context() as patch:
         data.ctrl[4] = 9.0  # beyond the joint's own range
         sm.step(model, data, 600)
-        patch.setattr(_bullet_law.dense, "factored", lambda m: solved.append(1) or right(m))
+        patch.setattr(joint_dynamics.dense, "factored", lambda m: solved.append(1) or right(m))
         sm.step(model, data, 100)
     assert 100 <= len(solved) - 2 * 100 <= 400  # two a step are of the mass matrices
 

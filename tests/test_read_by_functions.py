@@ -13,6 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.lab.model_differences import compare as compare_models
+from statemachine.lab.runs import scenarios
 from statemachine.lab.runs.controllers import function_scenario
 from statemachine.lab.why import Explanation, WhyRequest, explain
 
@@ -252,7 +253,7 @@ def test_what_no_function_reads_costs_no_run_and_is_named(tmp_path):
         WhyRequest(
             sm.load(paths["left"]),
             sm.load(paths["right"]),
-            sm.runs.scenarios.scenario("gravity"),
+            scenarios.scenario("gravity"),
             seconds=SECONDS,
             uncertain=None,
         )

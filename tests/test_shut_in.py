@@ -36,14 +36,14 @@ from .conftest import ROOT, refused, shown, written, written_all
 from .exercises import SOLUTION, TEMPLATE
 
 SECRET = "the-text-of-a-file-of-the-teachers"
-JUDGE = ROOT / "statemachine" / "grading" / "judges" / "gravity.py"
+JUDGE = ROOT / "statemachine" / "course" / "grading" / "judges" / "gravity.py"
 
 # By name: what is tried, and what is said of it, a pattern; "" where nothing can be seen.
 Attacks = dict[str, tuple[str, str]]
 SEEN_BY_THE_WATCH: Attacks = {
     "import a judge": (
         "from statemachine.course.grading.judges import gravity\nreturn 'GOT', gravity.TOLERANCE",
-        r"it imports statemachine\.grading",
+        r"it imports statemachine\.course\.grading",
     ),
     "import a judge by its name": (
         "import importlib\n"
@@ -52,12 +52,13 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "unpickle a judge": (
         "import pickle\n"
-        "return 'GOT', pickle.loads(b'cstatemachine.grading.judges.gravity\\nright\\n.')",
-        r"it imports statemachine\.grading",
+        "return 'GOT', pickle.loads(b'cstatemachine.course.grading.judges.gravity\\nright\\n.')",
+        r"it imports statemachine\.course\.grading",
     ),
     "load the file of a judge": (
         "from importlib.machinery import SourceFileLoader\n"
-        "return 'GOT', SourceFileLoader('statemachine.course.grading.judges', {judge!r}).load_module()",
+        "name = 'statemachine.course.grading.judges'\n"
+        "return 'GOT', SourceFileLoader(name, {judge!r}).load_module()",
         "of the judges|it imports statemachine",
     ),
     "what a judge was compiled to": (
@@ -68,7 +69,7 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "the data of the package": (
         "import pkgutil\n"
-        "return 'GOT', pkgutil.get_data('statemachine', 'grading/judges/gravity.py')",
+        "return 'GOT', pkgutil.get_data('statemachine', 'course/grading/judges/gravity.py')",
         "it opens gravity.py of the judges",
     ),
     "a lesson": (
@@ -239,7 +240,8 @@ SHUT_IN_ONLY: Attacks = {
     ),
     "objects that know what is right": (
         "import gc, sys\n"
-        "known = [n for n in sys.modules if 'judge' in n or n.startswith('statemachine.course.grading')]\n"
+        "ours = 'statemachine.course.grading'\n"
+        "known = [n for n in sys.modules if 'judge' in n or n.startswith(ours)]\n"
         "known += [o for o in gc.get_objects() if isinstance(o, dict) and 'TOLERANCE' in o"
         " and '_mistakes' in o]\n"
         "frame = sys._getframe()\n"
@@ -355,14 +357,15 @@ def test_what_a_submission_needs_is_there(
 
 
 def test_the_public_interface_is_what_the_package_tells() -> None:
-    assert {*sm._MODULES, "interface", "worlds"} == set(PUBLIC)
+    rooms = {module.partition(".")[0] for module in sm._MODULES.values()}
+    assert {*rooms, "interface", "worlds"} == set(PUBLIC)
 
 
 def test_what_lies_below_the_judges_is_shown() -> None:
     """A room that is added below has to be seen in there, or nothing can be judged."""
     tools = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]
     floors = tools["importlinter"]["contracts"][0]["layers"]
-    above = next(number for number, rooms in enumerate(floors) if "grading" in rooms)
+    above = next(number for number, rooms in enumerate(floors) if "course" in rooms)
     below = {room.strip() for rooms in floors[above + 1 :] for room in rooms.split("|")}
     assert below <= set(ROOMS)
 

@@ -23,19 +23,19 @@ PACKAGE = ROOT / "statemachine"
 
 # What a question guards that a type checker does not follow: `hasattr`, or an import that may fail.
 GUARDED = {
-    ("backends/_bullet_client.py", "memfd_create"),
-    ("backends/_hidden_world.py", "register_at_fork"),
+    ("backends/bullet_client.py", "memfd_create"),
+    ("backends/hidden_world.py", "register_at_fork"),
     ("interface/turns.py", "register_at_fork"),
-    ("backends/_child_server.py", "poll"),
+    ("backends/child_server.py", "poll"),
     ("processes/__init__.py", "resource"),  # there is no /proc
     ("processes/__init__.py", "sysconf"),
     ("processes/sandbox.py", "SIGKILL"),  # a return code below zero is POSIX's
     ("processes/sandbox.py", "SIGPROF"),
     ("processes/sandbox.py", "SIGXCPU"),
     ("installed.py", "register_at_fork"),
-    ("sweep/worker.py", "ITIMER_REAL"),
-    ("sweep/worker.py", "SIGALRM"),
-    ("sweep/worker.py", "setitimer"),
+    ("lab/sweep/worker.py", "ITIMER_REAL"),
+    ("lab/sweep/worker.py", "SIGALRM"),
+    ("lab/sweep/worker.py", "setitimer"),
     ("processes/signals.py", "SIG_BLOCK"),
     ("processes/signals.py", "SIG_SETMASK"),
     ("processes/signals.py", "pthread_sigmask"),
@@ -63,7 +63,7 @@ def test_every_text_file_names_its_encoding() -> None:
 
 
 # Letters that nobody prints: they are looked for, or belong to pages of HTML.
-_NOT_PRINTED = ("report/html/", "report/notebook.py", "report/markdown.py", "report/site.py")
+_NOT_PRINTED = ("show/html/", "course/notebook.py", "course/site.py")
 
 
 def test_every_letter_that_is_printed_has_a_spelling() -> None:

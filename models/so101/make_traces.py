@@ -18,7 +18,7 @@ from statemachine.course.lessons.hold import OLDER
 from statemachine.lab.recordings import Trace, record_scenario, write
 from statemachine.lab.runs.scenarios import SCENARIOS
 
-FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "runs" / "recorded"
+FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "lab" / "recordings" / "recorded"
 
 
 # Name of the file: the scenario, the backend, and how it is loaded.

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import statemachine as sm
-from statemachine.backends.bullet import urdf as _bullet_urdf
+from statemachine.backends.bullet import urdf as bullet_urdf
 
 HERE = Path(__file__).resolve().parent
 
@@ -19,8 +19,8 @@ HERE = Path(__file__).resolve().parent
 def main(target: Path = HERE / "so101.urdf") -> None:
     """Write the file."""
     raw = sm.load("so101").raw
-    (root,) = _bullet_urdf.roots(raw)
-    text = _bullet_urdf.write(raw, root, _bullet_urdf.Dialect(folder=HERE))
+    (root,) = bullet_urdf.roots(raw)
+    text = bullet_urdf.write(raw, root, bullet_urdf.Dialect(folder=HERE))
     beside = target.with_suffix(".new")
     beside.write_text(text)
     beside.replace(target)

@@ -15,7 +15,7 @@ A template is Markdown with named slots. Its paragraphs become the blocks of a p
 
 A slot takes a number with its unit or a name. On the page of a lesson a paragraph is filled in for
 each engine. It stands there once for all engines of which it says the same, under their names if
-not for all. The pages of reports have more rules: see `report/template.py`.
+not for all. The pages of reports have more rules: see `report_template.py`.
 """
 
 from __future__ import annotations

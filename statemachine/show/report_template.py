@@ -1,6 +1,6 @@
 """A report's text, from the template beside its code: `why.md` is that of `why.py`.
 
-The grammar is that of a lesson's template (`lessons/template.py`): Markdown with named slots,
+The grammar is that of a lesson's template (`lesson_template.py`): Markdown with named slots,
 whose paragraphs become the blocks of a page. In a report
 
     *{engines}, {seconds:g} s*        below the title: what it was computed with

@@ -54,7 +54,7 @@ class Plan:
         raw: The compiled model.
         surfaces: What can touch what; nothing where contacts are off.
         names: What everything is called in a URDF.
-        ghost: See `_bullet_driven`; None until it is needed.
+        ghost: See `bullet_driven`; None until it is needed.
         described: Gives the text and the files of a tree of bodies; see `_describe`.
         file: The URDF that a world as it comes reads itself; None where one is written for it.
         weighed: Whether the links of a world as it comes get the inertias of `raw`, not those of
@@ -92,7 +92,7 @@ class Plan:
     def padding(self) -> Array:
         """(nv,) what each degree of freedom gives of its armature to the stepped arm.
 
-        As inertia of the links; see `Dialect` and `_bullet_law`.
+        As inertia of the links; see `Dialect` and `joint_dynamics`.
         """
         return _padding(self.raw)
 

@@ -1,4 +1,4 @@
-"""An engine in a Python of its own, its process, and worlds there; see `_child_server`."""
+"""An engine in a Python of its own, its process, and worlds there; see `child_server`."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ...interface.records import Arrays, Sizes
 from ...processes import PipedChild
 from ...release_names import is_release, version_of
 from ..hidden_world import HiddenWorld, Memory, Moment, Read
-from . import child_server as _child_server
+from . import child_server
 
-_FILE = _child_server.__file__
+_FILE = child_server.__file__
 
 
 class ServedEngine(NamedTuple):
@@ -32,7 +32,7 @@ class ServedEngine(NamedTuple):
     Attributes:
         name: Of the backend.
         python: Its interpreter, which has NumPy and the engine.
-        child: The file that knows the engine, as `_child_server` says.
+        child: The file that knows the engine, as `child_server` says.
         title: What messages call it.
     """
 
@@ -116,7 +116,7 @@ class Server:
     def __init__(self, engine: ServedEngine) -> None:
         command = [engine.python, "-I", "-u", _FILE, engine.child]
         self._engine, self._turn, self.lives = engine, threading.RLock(), True
-        self._patience = _child_server.SPIN  # with which an answer is looked for [s]
+        self._patience = child_server.SPIN  # with which an answer is looked for [s]
         self.forgotten = deque[int]()  # models and worlds that it is to forget at the next call
         self._models = weakref.WeakKeyDictionary[Callable[..., Any], int]()
         self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
@@ -143,8 +143,8 @@ class Server:
         try:
             with self._turn:
                 free = [self.forgotten.popleft() for _ in range(len(self.forgotten))]
-                _child_server.send(self._process.to, {"verb": verb, "free": free, **job}, arrays)
-                answer, values, self._patience = _child_server.receive(
+                child_server.send(self._process.to, {"verb": verb, "free": free, **job}, arrays)
+                answer, values, self._patience = child_server.receive(
                     self._process.out, self._patience
                 )
         except (OSError, ValueError, EOFError, pickle.UnpicklingError) as error:

@@ -1,4 +1,4 @@
-"""A release of MuJoCo, as `_child_server` asks it, in the Python of that release's environment.
+"""A release of MuJoCo, as `child_server` asks it, in the Python of that release's environment.
 
 It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package. What is
 the same in every release the other modules take from here.
