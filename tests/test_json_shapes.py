@@ -34,7 +34,7 @@ COMMANDS = [
     "compare hold so101/scene so101/scene damping=1 --seconds 0.2",
     "compare hold so101/scene so101/scene damping=1 --seconds 0.2 --why",
     "compare --models so101 so101/scene",
-    "trace show {ROOT}/statemachine/runs/recorded/droop.pybullet.npz",
+    "trace show {ROOT}/statemachine/lab/recordings/recorded/droop.pybullet.npz",
     "check {ROOT}/teaching/solutions/step_loop.py",
     "check --faults {ROOT}/exercises/test_arm.py --only xyzw",
     "robots {ROOT}/models/so101/so101.xml --quick",

@@ -54,10 +54,10 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
         "statemachine/_models/so101/look/base_print.stl",
         "statemachine/py.typed",
         *(
-            f"statemachine/report/html/{name}"
+            f"statemachine/show/html/{name}"
             for name in ("page.html", "page.css", "page.js", "scene.js", "gl.js")
         ),
-        "statemachine/runs/recorded/hold.pybullet.npz",
+        "statemachine/lab/recordings/recorded/hold.pybullet.npz",
     )
     tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
     assert tops == {"statemachine", "statemachine_sim.py"}

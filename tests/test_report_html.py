@@ -62,7 +62,7 @@ from .test_strange_traces import added, cut
 from .test_strange_traces import changed as edited
 
 LIMIT = 2_000_000  # bytes
-CSS = ROOT / "statemachine/report/html/page.css"
+CSS = ROOT / "statemachine/show/html/page.css"
 Made = tuple[Comparison, Trace, Trace, Look]
 Seen = Callable[..., Any]
 

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.backends.mujoco import delays as _delays
-from statemachine.backends.mujoco import edits as _edits
+from statemachine.backends import delays as _delays
+from statemachine.backends import edits as _edits
 from statemachine.backends.mujoco.alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.course.grading.faults import patches

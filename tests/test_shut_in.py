@@ -74,7 +74,7 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "a lesson": (
         "from statemachine.course.lessons import gravity\nreturn 'GOT', gravity",
-        r"it imports statemachine\.lessons",
+        r"it imports statemachine\.course\.lessons",
     ),
     "a file of the teacher's": ("return 'GOT', open({secret!r}).read()", "it reads {secret}"),
     "by NumPy": (
@@ -240,7 +240,7 @@ SHUT_IN_ONLY: Attacks = {
     ),
     "objects that know what is right": (
         "import gc, sys\n"
-        "ours = 'statemachine.course.grading'\n"
+        "ours = 'statemachine.course'\n"
         "known = [n for n in sys.modules if 'judge' in n or n.startswith(ours)]\n"
         "known += [o for o in gc.get_objects() if isinstance(o, dict) and 'TOLERANCE' in o"
         " and '_mistakes' in o]\n"

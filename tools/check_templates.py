@@ -17,7 +17,7 @@ import statemachine
 from statemachine.show.check_templates import faults_of
 from statemachine.show.templates import PageContent
 
-ROOMS = ("report", "lessons", "grading", "compare", "sweep", "robots", "probes")
+ROOMS = ("course", "lab")
 
 
 def contents() -> list[type[PageContent]]:

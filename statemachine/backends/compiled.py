@@ -108,7 +108,7 @@ def compile_file(path: AnyPath) -> mujoco.MjModel:
     binary = read_binary(text) if is_binary(text) else None
     try:
         if binary is not None:
-            from .mujoco.delays import from_binary
+            from .delays import from_binary
 
             raw = from_binary(binary)
         else:

@@ -163,7 +163,7 @@ class MujocoModel(Model):
         Raises:
             OSError: It cannot be written.
         """
-        from .mujoco.delays import saved
+        from .delays import saved
 
         Path(path).write_bytes(saved(self.raw).tobytes())
 
@@ -182,7 +182,7 @@ class MujocoModel(Model):
     def _make_worlds(
         self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
     ) -> Any:
-        from .mujoco.edits import CONSTANTS_FOLLOW
+        from .edits import CONSTANTS_FOLLOW
         from .mujoco.worlds import MujocoWorlds
 
         base, arrays = self._varied(options) if options else (self, {})
@@ -199,7 +199,7 @@ class MujocoModel(Model):
         Returns:
             A Model, and (n, ...) arrays by name; see `changes`.
         """
-        from .mujoco.edits import step_length, varied
+        from .edits import step_length, varied
 
         self._check_friction(options)
         given = {name: np.array(values) for name, values in options.items()}
@@ -226,7 +226,7 @@ class MujocoModel(Model):
             raise unsupported(self, "friction", reason)
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
-        from .mujoco.edits import edited, step_length
+        from .edits import edited, step_length
 
         self._check_friction(options)
         substeps = options.get("substeps", self.substeps)
@@ -296,7 +296,7 @@ class MujocoData(Data):
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
             if self._home._holds_start:
-                from .mujoco.delays import hold
+                from .delays import hold
 
                 hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()

@@ -33,6 +33,7 @@ from ..interface.options import checked_options
 from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
+from . import edits as _edits
 from .bullet import urdf
 from .bullet.client import MOST_CLIENTS
 from .bullet.driven import Act, DrivenWorld
@@ -49,7 +50,6 @@ from .compiled import (
     fastest,
 )
 from .hidden_data import HiddenModel
-from .mujoco import edits as _edits
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",

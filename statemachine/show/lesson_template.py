@@ -40,7 +40,7 @@ Results = Mapping[str, R]  # the results of a lesson, by backend
 Blocks = Mapping[str, Block | Sequence[Block]]  # what stands alone in a template, by slot
 
 
-class Provenance(Protocol):
+class Origin(Protocol):
     """What a result was computed with."""
 
     @property
@@ -73,7 +73,7 @@ class HasProvenance(Protocol):
     """A result that says what it was computed with."""
 
     @property
-    def provenance(self) -> Provenance:
+    def provenance(self) -> Origin:
         """The model, the versions and the timestep of the run."""
         ...
 

@@ -72,7 +72,7 @@ _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
 
-class Reader(Protocol):
+class Audience(Protocol):
     """Somebody who sits at a terminal, is shown a screenful at a time, and is asked questions."""
 
     def read(self, text: str) -> None:
@@ -88,7 +88,7 @@ class Reader(Protocol):
         """Show what is new, a windowful at a time."""
 
 
-def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
+def show(page: Page, footer: str = "", reader: Audience | None = None) -> None:
     """Print a page on standard output, and a last line under it.
 
     Args:
@@ -112,7 +112,7 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
 class _Printer:
     """Prints the blocks of a page in their order, and keeps what became of predictions."""
 
-    def __init__(self, reader: Reader | None) -> None:
+    def __init__(self, reader: Audience | None) -> None:
         self._reader = reader
         self._tell = reader.read if reader else sys.stdout.write
         self._predicted: list[Block] = []  # the last answer, until the run has said its part

@@ -27,8 +27,8 @@ from ...release_names import is_release, version_of
 from ...releases import python_of
 from ..binary import is_binary
 from ..compiled import check_numbers, facts, fastest, spec_with_packages
+from ..edits import put
 from ..hidden_data import HiddenModel
-from ..mujoco.edits import put
 from ..mujoco_backend import MujocoModel
 from ..mujoco_backend import load as load_installed
 from . import release_child as child

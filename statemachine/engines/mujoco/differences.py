@@ -67,7 +67,7 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     What the compiler computes once (inverse weights, masks of bodies) is computed again. The tree
     of boxes that sorts out pairs of geoms is not: it is switched off, which changes no contact.
     """
-    from ...backends.mujoco.edits import put
+    from ...backends.edits import put
 
     mujoco = require("mujoco")
     model = copy.copy(raw)
@@ -95,7 +95,7 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
 
 def _read(raw: Any, edit: Edit) -> Any:
     """What stands where an edit goes."""
-    from ...backends.mujoco.edits import held
+    from ...backends.edits import held
 
     holder, field = held(raw, edit[0])
     now = getattr(holder, field)

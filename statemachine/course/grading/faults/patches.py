@@ -143,9 +143,9 @@ def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Patc
         for adapter in _adapters():
             patch.setattr(adapter, "compile_file", changing(adapter.compile_file))
             patch.setattr(adapter, "facts", unharmed(copied(adapter.facts)))
-        from ....backends.mujoco import edits as _edits  # once there is an adapter: it needs MuJoCo
+        from ....backends import edits  # once there is an adapter: it needs MuJoCo
 
-        patch.setattr(_edits, "edited", changing(unharmed(_edits.edited)))
+        patch.setattr(edits, "edited", changing(unharmed(edits.edited)))
 
     return fault
 

@@ -74,8 +74,8 @@ def main(job_file: str) -> None:
 
 
 def _forget_the_judge() -> None:
-    """Leave nothing of `grading` to be had by its name: an import of it is then heard."""
+    """Leave nothing of `course` to be had by its name: an import of it is then heard."""
     parent = sys.modules[__name__.partition(".")[0]]
-    for name in [name for name in sys.modules if name.startswith(f"{parent.__name__}.grading")]:
+    for name in [name for name in sys.modules if name.startswith(f"{parent.__name__}.course")]:
         del sys.modules[name]
-    vars(parent).pop("grading", None)
+    vars(parent).pop("course", None)

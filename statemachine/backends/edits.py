@@ -12,10 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...errors import BadInputError
-from ...interface import Array
-from ..actuators import servos
-from ..served.release_child import held
+from ..errors import BadInputError
+from ..interface import Array
+from .actuators import servos
+from .served.release_child import held
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off

@@ -15,10 +15,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...errors import BadInputError
-from ...interface import Array, Ints
-from ...processes import free_memory
-from ..actuators import commands_needed
+from ..errors import BadInputError
+from ..interface import Array, Ints
+from ..processes import free_memory
+from .actuators import commands_needed
 
 SHORTER = 1 - 1e-6
 _LARGE = 1e7  # bytes of buffers, from which on it is asked what memory is free
