@@ -248,7 +248,7 @@ HANDED_IN = {
     ),
     "a judge that is replaced, which is another process's": (
         (f"{_REPLACED_JUDGE}def demo_gravity(*_): return 1",
-         r"^line 7: it imports statemachine\.course, which is not of the public "),
+         r"^line 7: it imports statemachine\.course\.grading, which is not "),
         *((f"def {name}(*_): return 1", "^line 7: it imports") for name in [*JUDGES][1:]),
     ),
 }  # fmt: skip
