@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.engines.records import DifferingQuantity
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import Explanation, WhyRequest, explain
 from statemachine.lab.why.shapley import shapley
@@ -335,8 +336,10 @@ def test_one_edit_of_the_file_is_one_cause(
     left, right = (LINKS.format(**{"geom": "", "beam": "", slot: value}) for value in values)
     (row,) = explained(tmp_path, left, right, scenario=STILL, seconds=0.5).shares
     numbers = tuple(float(value.split('"')[1]) if value else 1000.0 for value in values)
-    assert_has(row, name=name, unit=unit, share=pytest.approx(1.0))
-    assert (*row.values[0][1:], row.place.line) == pytest.approx((*numbers, line))
+    assert_has(row, name=name, share=pytest.approx(1.0))
+    (value,) = row.values
+    assert value.unit == unit
+    assert (value.left, value.right, row.place.line) == pytest.approx((*numbers, line))
 
 
 def test_a_mass_that_moves_the_centre_of_its_body_is_one_cause(tmp_path: Path) -> None:
@@ -345,7 +348,8 @@ def test_a_mass_that_moves_the_centre_of_its_body_is_one_cause(tmp_path: Path) -
     run = partial(explained, tmp_path, *texts, scenario=STILL, seconds=0.5)
     (row,) = run().shares
     assert_has(row, name="mass, centre of mass and inertia of a", share=pytest.approx(1.0))
-    assert (*row.values[0][1:], row.place.line) == pytest.approx((1.2, 1.7, 3))
+    (value,) = row.values
+    assert (value.left, value.right, row.place.line) == pytest.approx((1.2, 1.7, 3))
     assert {"mass of a", "centre of mass (x) of a"} < set(shares(run(finer=True)))
 
 
@@ -733,8 +737,10 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
     }
     assert is_brought(found)
     values = {each.name: each.values for each in found.shares}
-    assert values["range (upper end) of shoulder"] == (("upper end", 2.0, 0.4),)
-    assert values["gravity (z)"] == (("z", -9.81, -9.0),)
+    assert values["range (upper end) of shoulder"] == (
+        DifferingQuantity("upper end", 2.0, 0.4, "rad"),
+    )
+    assert values["gravity (z)"] == (DifferingQuantity("z", -9.81, -9.0, "m/s²"),)
     # An entry that no motion depends on explains nothing: a hinge about y feels one moment.
     told = shares(found)
     assert abs(told["inertia (diaginertia[2]) of lower"]) < 1e-9

@@ -113,7 +113,7 @@ def test_an_option_of_an_engine_as_it_comes_counts(
     sides = ("n.xml", "n.xml@pybullet:engine", option)
     _, found = asked(capsys, "f.py:none", *sides, "--why", "--seconds", "0.3", "--no-chaos")
     (row,) = (row for row in found["shares"] if row["name"] == name)
-    assert row["values"][0][2] == word
+    assert row["values"][0]["right"] == word
     # What the file has none of, as the engine, is no difference.
     assert not {"armature", "dry friction", "joint limits"} & {r["name"] for r in found["shares"]}
 
@@ -134,24 +134,24 @@ def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
 
 SENSOR = '<sensor><jointpos name="p" joint="j1" {}/></sensor>'
 # What either side has, the function, the cause, its values, and the exit code of `--models`.
-ONE_CAUSE: dict[str, tuple[dict[str, str], dict[str, str], str, str, list[list[Any]], int]] = {
+ONE_CAUSE: dict[str, tuple[dict[str, str], dict[str, str], str, str, tuple[Any, ...], int]] = {
     "a muscle that pulls by its bias": (
         {"actuator": MUSCLE.format("-.5")},
         {"actuator": MUSCLE.format("-.2")},
         "wave",
         "length range of m",
-        [["lengthrange", [-0.5, 0.5], [-0.2, 0.5]]],
+        ("lengthrange", [-0.5, 0.5], [-0.2, 0.5], ""),
         1,
     ),
     "a start at another time": (
-        {}, {"key": 'time=".5"'}, "wave", "time of the start", [["time", 0.0, 0.5]], 1
+        {}, {"key": 'time=".5"'}, "wave", "time of the start", ("time", 0.0, 0.5, "s"), 1
     ),
     "a sensor that a function may read": (
         {"sensor": SENSOR.format("")},
         {"sensor": SENSOR.format('cutoff=".01"')},
         "sensed",
         "cutoff of p",
-        [["cutoff", 0.0, 0.01]],
+        ("cutoff", 0.0, 0.01, ""),
         0,
     ),
 }  # fmt: skip
@@ -159,11 +159,12 @@ ONE_CAUSE: dict[str, tuple[dict[str, str], dict[str, str], str, str, list[list[A
 
 @pytest.mark.parametrize("name", ONE_CAUSE)
 def test_one_cause_explains_all(folder: Path, capsys: Any, name: str) -> None:
-    left, right, function, known, values, models = ONE_CAUSE[name]
+    left, right, function, known, value, models = ONE_CAUSE[name]
     sides = file(folder, "l.xml", **left), file(folder, "r.xml", **right)
     code, found = asked(capsys, f"f.py:{function}", *sides, "--why", "--no-chaos")
     (cause,) = found["shares"]
-    assert_has(cause, name=known, values=values, share=pytest.approx(1.0))
+    assert_has(cause, name=known, share=pytest.approx(1.0))
+    assert [tuple(each.values()) for each in cause["values"]] == [value]
     assert (code, main(["compare", "--models", *sides])) == (0, models)
     assert "keyframe k time" in capsys.readouterr().out or known != "time of the start"
 

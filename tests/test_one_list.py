@@ -50,7 +50,7 @@ _ELBOW_DRIVE = '<position name="elbow" joint="elbow" kp="20" kv="1"/>'
         (
             (_CYLINDER, f'{_CYLINDER} fluidshape="ellipsoid"'),
             (_CYLINDER, f'{_CYLINDER} fluidshape="ellipsoid" fluidcoef="0.9 0.25 1.5 1 1"'),
-            "fluidcoef[0]",
+            "fluidcoef",
             (0.5, 0.9),
         ),
         (
@@ -63,7 +63,7 @@ _ELBOW_DRIVE = '<position name="elbow" joint="elbow" kp="20" kv="1"/>'
             ("", ""),
             (_ELBOW_DRIVE, _ELBOW_DRIVE.replace("/>", ' timeconst="0.1"/>')),
             "dyntype",
-            (0.0, 3.0),
+            ("none", "filterexact"),
         ),
     ],
 )

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.engines.records import DifferingQuantity
 from statemachine.lab.model_differences import compare as compare_models
 from statemachine.lab.runs import scenarios
 from statemachine.lab.runs.controllers import function_scenario
@@ -131,7 +132,7 @@ def test_the_order_of_qpos_is_a_cause_for_a_function_that_reads_by_number(tmp_pa
     wanted = np.abs(_plain_run(AFTER, command) - _plain_run(BEFORE, command)).max()
     assert found.gap == pytest.approx(wanted, rel=1e-6)
     assert _shares(found) == {"order of qpos": pytest.approx(1.0, abs=1e-6)}
-    assert found.shares[0].values == (("order", "j1 j2 fc", "fc j1 j2"),)
+    assert found.shares[0].values == (DifferingQuantity("order", "j1 j2 fc", "fc j1 j2"),)
 
 
 @pytest.mark.parametrize("right", [BEFORE, SWAPPED], ids=["qpos", "qpos and ctrl"])
@@ -213,7 +214,8 @@ def test_data_that_only_a_function_reads_is_a_difference_and_a_cause(kind, tmp_p
     wanted = np.abs(_plain_run(left, command) - _plain_run(right, command)).max()
     assert found.gap == pytest.approx(wanted, rel=1e-9)
     assert _shares(found) == {cause: pytest.approx(1.0, abs=1e-9)}
-    assert found.shares[0].values[0][1:] == (0.3, 0.6)
+    (value,) = found.shares[0].values
+    assert (value.left, value.right) == (0.3, 0.6)
     listed = compare_models(tmp_path / "left.xml", tmp_path / "right.xml")
     assert [row.where for row in listed.differences if row.matters] == [cause]
     assert not listed.equal

@@ -22,6 +22,7 @@ from PIL import Image
 
 import statemachine as sm
 from statemachine.course.notebook import markdown
+from statemachine.engines.records import DifferingQuantity
 from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.lab.compare import Comparison, compare, touches
 from statemachine.lab.compare.series import total_forces
@@ -37,7 +38,6 @@ from statemachine.lab.why.answer_page import answer, parts
 from statemachine.lab.why.gap import FirstTouch
 from statemachine.lab.why.locate import Localisation
 from statemachine.lab.why.page import causes, steps
-from statemachine.lab.why.written import FigureValues
 from statemachine.measures import Deviation
 from statemachine.measures.text import quantity
 from statemachine.show.blocks import (
@@ -299,9 +299,9 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     )  # fmt: skip
 
     def row(name: str, share: float) -> Share:
-        values = (FigureValues(name, "kp 998.2", "its motors"),)
+        values = (DifferingQuantity(name, "kp 998.2", "its motors"),)
         return Share(
-            name=name, kind="engine", values=values, unit="", units=("",), share=share, alone=share,
+            name=name, kind="engine", values=values, share=share, alone=share,
             last=share, place=None,
         )  # fmt: skip
 
@@ -348,7 +348,7 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
 
 
 def refused_cause(name: str, why: str) -> Share:
-    return Share(name, values=(), unit="", units=(), place=None, kind="joint", note=why)
+    return Share(name, values=(), place=None, kind="joint", note=why)
 
 
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
@@ -357,11 +357,11 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     worse = explanation_of(hold, **wider)  # all brought over widens the gap
     (contact,), rows = located.found_in, worse.shares
     switch = replace(
-        rows[0], name="contact", values=(FigureValues("contact", True, False),), share=0.1
+        rows[0], name="contact", values=(DifferingQuantity("contact", True, False),), share=0.1
     )
     # Two values that read the same are shown with all their digits.
-    close = FigureValues("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
-    rounded = replace(rows[0], values=(close,), units=("rad",))
+    close = DifferingQuantity("range", (-1.5708, 1.5708), (-1.5708, 1.570796), "rad")
+    rounded = replace(rows[0], values=(close,))
     masked = [
         [replace(row, **{part: value}) for row, value in zip(rows, values, strict=True)]
         for part, *values in (

@@ -36,8 +36,8 @@ EDITS = {
     "a geom is elsewhere": ("geom", 'pos="0 0 0.1"', "place", (0.0, 0.0, 0.1), "m"),
     "a hinge has a range": ("joint", 'range="-1 2"', "range", (-1.0, 2.0), "rad"),
     "a slide has a range": ("slide", 'range="-1 2"', "range", (-1.0, 2.0), "m"),
-    "a hinge is damped": ("joint", 'damping="2"', "damping", (2.0, 0.0, 0.0), "N·m·s"),
-    "a slide is damped": ("slide", 'damping="2"', "damping", (2.0, 0.0, 0.0), "N·s/m"),
+    "a hinge is damped": ("joint", 'damping="2"', "damping", 2.0, "N·m·s"),
+    "a slide is damped": ("slide", 'damping="2"', "damping", 2.0, "N·s/m"),
 }
 
 
@@ -54,12 +54,13 @@ def _rows(folder: Path, left: str, right: str) -> tuple[ModelDifference, ...]:
 def test_each_figure_has_its_own_unit(name, tmp_path):
     slot, text, figure, value, unit = EDITS[name]
     rows = _rows(tmp_path, MODEL.format(**SLOTS), MODEL.format(**{**SLOTS, slot: text}))
-    known = {told: (other, row.unit_of(told)) for row in rows for told, _, other in row.values}
-    shown, its_unit = known[figure]
+    known = {value.quantity: value for row in rows for value in row.values}
+    shown, its_unit = known[figure].right, known[figure].unit
     if isinstance(value, float):
         assert shown == pytest.approx(value, rel=1e-9)
+        assert isinstance(shown, float)
         assert math.isfinite(shown)
-    elif figure != "damping":
+    else:
         assert shown == pytest.approx(value)
     assert its_unit == unit
 

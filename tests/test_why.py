@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.engines.records import DifferingQuantity
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, UnknownNameError
 from statemachine.interface import Model
 from statemachine.lab.recordings import record_scenario, rerun
@@ -61,7 +62,8 @@ def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) ->
         one, two = on_both(written(tmp_path / "m.xml", text))
     result = explain(WhyRequest(one, two, FALL, seconds=1.0))
     (row,) = result.shares
-    assert (row.values[0][1:], row.chosen[0]) == (("rk4", "its own"), "left")
+    assert row.values == (DifferingQuantity("integrator", "rk4", "its own"),)
+    assert row.chosen == ("left", "euler")
     assert result.verdict.holds
     assert "can be chosen: type integrator=" in shown(report.page(result))
 
@@ -103,7 +105,10 @@ def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
     two = arm.replace(timestep=2 * arm.timestep, substeps=4, damping=0.7)
     result = explain(WhyRequest(arm, two, HOLD, uncertain=None))
     (step,) = [row for row in result.shares if row.name == "timestep"]
-    assert step.values == (("timestep", 0.005, 0.01), ("substeps", 1, 4))
+    assert step.values == (
+        DifferingQuantity("timestep", 0.005, 0.01, "s"),
+        DifferingQuantity("substeps", 1, 4),
+    )
     assert result.brought == result.unexplained == 0.0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from ..interface import Array, Model
@@ -135,8 +135,30 @@ class Counterparts:
 # The figure of a difference that is the angle [rad] by which the second model's element is turned.
 TURNED = "turned by"
 
+# What a compiled model has of a quantity: a word where the engine has a list of them; None where it
+# has none at all.
+QuantityValue = float | str | bool | tuple[float, ...] | None
+
 # An array of a compiled model or an option, where in it, and what is to stand there.
 Edit = tuple[str, tuple[int | slice, ...], Any]
+
+
+@dataclass(frozen=True)
+class DifferingQuantity:
+    """One quantity in which two sides differ.
+
+    Attributes:
+        quantity: What it is called, by MuJoCo's name where that has one: "solimp", "kp", "mass".
+        left, right: The value of each side, in `unit`. Of an array of which a file may write the
+            first numbers alone (solref, solimp, friction, gear, …) those up to the last that
+            differs; a word where the engine has a list of them; None where a side has none.
+        unit: SI unit of each number; "" without one.
+    """
+
+    quantity: str
+    left: QuantityValue
+    right: QuantityValue
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,13 +169,10 @@ class ModelDifference:
         subject: What it is: "mass", "range", "gravity".
         kind: Of the element that it is of: "body", "joint", "geom", "actuator", "option", …
         where: Name of that element; "" of the whole model.
-        values: For each figure that differs its name and both values; None: it has none.
-        unit: SI unit of the figures, but for those in `units`.
+        values: Each quantity that differs; none where only the element as a whole does.
         edits: What brings the second model to the first.
         edits_one: What brings the first to the second, where only it can be changed.
         refused: Why neither can be brought to the other; "" if one can.
-        units: SI unit of each figure that has another unit, by its name; "" of one without. The
-            entries of an array have that of the array.
         only_read: Whether the engine does not use it, so that nothing depends on it but a function
             of the user's that reads it.
     """
@@ -161,20 +180,13 @@ class ModelDifference:
     subject: str
     kind: str
     where: str
-    values: tuple[tuple[Any, ...], ...]
-    unit: str = ""
+    values: tuple[DifferingQuantity, ...]
     edits: tuple[Edit, ...] = ()
     edits_one: tuple[Edit, ...] = ()
     refused: str = ""
-    units: Mapping[str, str] = field(default_factory=dict)
     only_read: bool = False
 
     @property
     def title(self) -> str:
         """What it is, and of what."""
         return f"{self.subject} of {self.where}" if self.where else self.subject
-
-    def unit_of(self, figure: str) -> str:
-        """Return the SI unit of one of the figures in `values`, given by its name."""
-        array, _, _ = figure.partition("[")
-        return self.units.get(array, self.unit)

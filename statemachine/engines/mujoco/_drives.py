@@ -11,8 +11,8 @@ import numpy as np
 
 from ...backends.controls import ctrl_owners
 from ...installed import require
-from ..records import Counterparts, Edit, ModelDifference
-from ._sides import Sides, name_of, plain, same, zeros
+from ..records import Counterparts, DifferingQuantity, Edit, ModelDifference
+from ._sides import Sides, name_of, plain, quantity_of, same, word_in, zeros
 
 ORDER_OF_SENSORS = "order of sensordata"
 # mjtTrn: what an actuator acts on, and from which site it measures.
@@ -44,7 +44,7 @@ def drives(sides: Sides) -> Iterator[ModelDifference]:
         yield from _delay(sides, a, b)
         targets = [_targets(sides, side, k) for side, k in enumerate((a, b))]
         if targets[0][0] != targets[1][0]:
-            values = (("drives", *(words for _, words in targets)),)
+            values = (DifferingQuantity("drives", *(words for _, words in targets)),)
             yield sides.tell(
                 "transmission",
                 "actuator",
@@ -65,7 +65,7 @@ def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     laws = _law(sides.left, a), _law(sides.right, b)
     sized = laws[0][1:] == laws[1][1:]
     rows = list(sides.rows("actuator", [(a, b)]))
-    values = (("dyntype", laws[0][0], laws[1][0]),)
+    values = (quantity_of("actuator_dyntype", laws[0][0], laws[1][0]),)
     if not sized:
         why = "its own state has another size"
         rows = [row for row in rows if row.subject != "dynamics"]
@@ -75,7 +75,7 @@ def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         edits: list[Edit] = [("actuator_dyntype", (b,), laws[0][0])]
         edits += [edit for row in of_law for edit in row.edits]
         values += tuple(value for row in of_law for value in row.values)
-        yield sides.tell("law", "actuator", a, values, "", edits)
+        yield sides.tell("law", "actuator", a, values, edits)
         rows = [row for row in rows if row not in of_law]
     yield from rows
 
@@ -94,7 +94,7 @@ def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     back = bool(sizes[0][0] and not sizes[1][0])
     yield from sides.rows("actuator", [(a, b)], "delay", back=back)
     if left.actuator_delay[a] and right.actuator_delay[b] and not same(*sizes):
-        values = (("history", plain(sizes[0]), plain(sizes[1])),)
+        values = (DifferingQuantity("history", plain(sizes[0]), plain(sizes[1])),)
         yield sides.tell(
             "memory of commands",
             "actuator",
@@ -114,7 +114,7 @@ def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:
         kinds = _DRIVES.get(kind, ())
     targets = list(zip(kinds, ids, strict=False))
     names = [name_of(raw, target, i) for target, i in targets if i >= 0]
-    word = require("mujoco").mjtTrn(kind).name.removeprefix("mjTRN_").lower()
+    word = word_in("mjtTrn", kind)
     ids[: len(targets)] = [sides.there(side, target, i) for target, i in targets]
     return (kind, *ids), f"{word} {', '.join(names)}"
 
@@ -137,18 +137,20 @@ def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]
 
 
 def _sensors(sides: Sides) -> Iterator[ModelDifference]:
-    left, right, mujoco = sides.left, sides.right, require("mujoco")
+    left, right = sides.left, sides.right
     pairs = list(sides.by_name("sensor"))
     yield from sides.rows("sensor", pairs)
     for a, b in pairs:
-        kinds = [mujoco.mjtSensor(raw.sensor_type[k]).name for raw, k in ((left, a), (right, b))]
-        values = [("type", *kinds)] if kinds[0] != kinds[1] else []
+        kinds = [
+            word_in("mjtSensor", int(raw.sensor_type[k])) for raw, k in ((left, a), (right, b))
+        ]
+        values = [DifferingQuantity("type", *kinds)] if kinds[0] != kinds[1] else []
         for end in ("obj", "ref"):
             ours, theirs = _object(left, end, a), _object(right, end, b)
             # They may be counterparts, by whatever names.
             there = sides.ids.get(ours[0].removeprefix("x"), {}).get(ours[1])
             if ours[2] != theirs[2] and (ours[0], there) != theirs[:2]:
-                values.append((f"{end}id", ours[2], theirs[2]))
+                values.append(DifferingQuantity(f"{end}id", ours[2], theirs[2]))
         if values:
             yield sides.tell("sensor", "sensor", a, values)
     yield from sides.extras("sensor", pairs, lambda raw, k: zeros(("sensor_cutoff",), raw, k))
@@ -162,7 +164,7 @@ def _sensors(sides: Sides) -> Iterator[ModelDifference]:
             ORDER_OF_SENSORS,
             "sensor",
             "",
-            (("order", *orders),),
+            (DifferingQuantity("order", *orders),),
             edits=() if refused else _reordered_sensors(right, ours),
             refused=refused,
         )

@@ -13,9 +13,9 @@ from ...interface import Array, JointType
 from ...measures.text import grouped
 from ...rotations import HERE, Placement, matrix_from_quat
 from ..description.records import OF_A_SLIDE
-from ..records import Edit, ModelDifference
+from ..records import DifferingQuantity, Edit, ModelDifference
 from ._geoms import NO_TOUCH, touches
-from ._sides import Pairs, Sides, differing, name_of, plain, quat_of, same, zeros
+from ._sides import Pairs, Sides, name_of, plain, quantity_of, quat_of, same, zeros
 
 # In the place of a field: what a pair has is to be that of its geoms, as edited as these are.
 AS_GEOMS = "pair as its geoms"
@@ -78,9 +78,11 @@ def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 
 def _of_a_slide(difference: ModelDifference) -> ModelDifference:
-    """Give a difference of a joint the units that its figures have of a slide."""
-    units = {figure: OF_A_SLIDE.get(unit, "") for figure, unit in difference.units.items()}
-    return replace(difference, unit=OF_A_SLIDE.get(difference.unit, ""), units=units)
+    """Give a difference of a joint the units that its quantities have of a slide."""
+    values = tuple(
+        replace(value, unit=OF_A_SLIDE.get(value.unit, "")) for value in difference.values
+    )
+    return replace(difference, values=values)
 
 
 def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDifference]:
@@ -91,10 +93,12 @@ def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDiffer
     ours, theirs = left.qpos_spring[here:][: kind.nq], right.qpos_spring[there:][: kind.nq]
     acts = any(getattr(left, n)[a].any() or getattr(right, n)[b].any() for n in stiff)
     if acts and not same(ours, theirs):
-        edits = [("qpos_spring", (there + k,), float(ours[k])) for k in range(kind.nq)]
-        values = (("springref", plain(ours), plain(theirs)),)
+        edits: list[Edit] = [("qpos_spring", (there + k,), float(ours[k])) for k in range(kind.nq)]
         unit = "rad" if kind.nq == 1 else ""
-        yield sides.tell("rest of the spring", "joint", a, values, unit, edits)
+        if kind.nq == 1:
+            ours, theirs = ours[0], theirs[0]
+        value = DifferingQuantity("springref", plain(ours), plain(theirs), unit)
+        yield sides.tell("rest of the spring", "joint", a, (value,), edits)
 
 
 def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
@@ -106,11 +110,11 @@ def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         yield sides.tell("path", "tendon", a, refused="it takes another path")
     elif differ:
         start, other = int(sides.left.tendon_adr[a]), int(sides.right.tendon_adr[b])
-        values = [(f"coef[{k}]", ours[k][2], theirs[k][2]) for k in differ]
+        values = [DifferingQuantity(f"coef[{k}]", ours[k][2], theirs[k][2]) for k in differ]
         edits: list[Edit] = [
             ("wrap_prm", (other + k,), float(sides.left.wrap_prm[start + k])) for k in differ
         ]
-        yield sides.tell("coefficients", "tendon", a, values, "", edits)
+        yield sides.tell("coefficients", "tendon", a, values, edits)
 
 
 def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:
@@ -141,9 +145,8 @@ def equalities(sides: Sides) -> Iterator[ModelDifference]:
             turns = [matrix_from_quat(_unit(data[6:10])) for data in (wanted, there)]
             off = np.append(off[[*range(6), 10]], np.abs(turns[0] - turns[1]).max())
         if off.max() > _NEAR:
-            values = differing(("eq_data",), [wanted[:used]], [there[:used]])
-            edits = [("eq_data", (b,), wanted)]
-            yield sides.tell("parameters", "equality", a, values, "", edits)
+            value = quantity_of("eq_data", wanted[:used], there[:used])
+            yield sides.tell("parameters", "equality", a, (value,), [("eq_data", (b,), wanted)])
     yield from sides.extras("equality", pairs, _deactivated)
 
 

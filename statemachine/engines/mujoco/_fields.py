@@ -31,6 +31,18 @@ class FieldRow:
     when: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
 
+    def unit_of(self, array: str) -> str:
+        """Return the SI unit of the entries of one of its arrays; "" without one."""
+        if array in FLAGS_OF_ELEMENTS or array in CHOICES:
+            return ""
+        return self.units.get(word_of(array), self.unit)
+
+
+def word_of(array: str) -> str:
+    """Return what an array is called without the kind of its element: "solref"."""
+    kind, _, rest = array.partition("_")
+    return rest or kind
+
 
 # A limited quantity is compared with its range; a range without the flag says nothing.
 LIMITED = {
@@ -168,13 +180,32 @@ OPTIONS = {
     "actuator groups": ("disableactuator",),
     "sleep": ("sleep_tolerance",),
 }
-# Options that are one of a list, and the enumeration that names it.
-CHOICES = {
+# Options and arrays whose entries are one of a list, and the enumeration that names it.
+OPTION_CHOICES = {
     "integrator": "mjtIntegrator",
     "solver": "mjtSolver",
     "cone": "mjtCone",
     "jacobian": "mjtJacobian",
 }
+CHOICES = {
+    "actuator_dyntype": "mjtDyn",
+    "actuator_gaintype": "mjtGain",
+    "actuator_biastype": "mjtBias",
+    "tree_sleep_policy": "mjtSleepPolicy",
+}
+# Arrays whose entries are on or off.
+FLAGS_OF_ELEMENTS = frozenset(
+    {
+        *("jnt_limited", "jnt_actfrclimited", "jnt_actgravcomp", "tendon_limited"),
+        *("tendon_actfrclimited", "actuator_ctrllimited", "actuator_forcelimited"),
+        *("actuator_actlimited", "actuator_actearly", "eq_active0"),
+    }
+)
+# Arrays of an element of which a file may write the first numbers alone.
+BEGINNINGS = (
+    *("*_solref*", "*_solimp*", "*_friction", "*poly", "*prm", "actuator_gear", "eq_data"),
+    *("opt.o_solref", "opt.o_solimp", "opt.o_friction", "geom_surfacevel", "fluidcoef"),
+)
 FLAGS = ("disableflags", "enableflags")
 # SI unit of each of these that has one.
 OPTION_UNITS = {
@@ -257,6 +288,11 @@ FATES = {
         "pair_signature plugin_stateadr plugin_statenum"
     ),
 }
+
+
+def is_beginning(array: str) -> bool:
+    """Tell whether a file may write the first numbers of an array's entries alone."""
+    return any(fnmatchcase(array, pattern) for pattern in BEGINNINGS)
 
 
 def known(name: str) -> str:

@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from ...interface import Array
 from ...measures.text import few
 from ..description.records import CollisionShape
 from ..description.shapes import angle_between, likest
-from ..records import Edit, ModelDifference
+from ..records import DifferingQuantity, Edit, ModelDifference
 from . import _shapes as shapes
-from ._sides import NEAR, Pairs, Sides, copies, name_of, same, zeros
+from ._sides import NEAR, Pairs, Sides, copies, name_of, quantity_of, same, zeros
 
 NO_TOUCH = -1e3  # [m] a margin at which nothing touches
 _VERTEX = 1e-6  # [m]: vertices are single precision
-# How a medium flows around a geom; what follows from its shape stands behind these.
-_FLUID = ("fluidshape", *(f"fluidcoef[{k}]" for k in range(5)))
-# Of the figures of a shape those without a unit.
-_NO_LENGTHS = {"type": "", "fluidshape": "", "fluidcoef": "", "fluid": ""}
+# How a medium flows around a geom: by its ellipsoid or not, and the coefficients for that. What
+# follows from its shape stands behind these.
+_FLUID_SHAPES = ("none", "ellipsoid")
+_FLUID_COEFFICIENTS = slice(1, 6)
 _BOUNDS = ("geom_size", "geom_rbound", "geom_aabb")
 _WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
 
@@ -80,7 +81,9 @@ class Geoms:
         if kinds == ("mesh", "mesh"):
             yield from self._mesh(a, b)
             return
-        values: list[tuple[Any, ...]] = [("type", *kinds)] if kinds[0] != kinds[1] else []
+        values: list[DifferingQuantity] = []
+        if kinds[0] != kinds[1]:
+            values.append(DifferingQuantity("type", *kinds))
         if values and not {*kinds} <= shapes.PRIMITIVES.keys():
             yield sides.tell(
                 "shape",
@@ -93,16 +96,11 @@ class Geoms:
         if kinds[0] == "hfield":
             yield from shapes.heights(sides, a, b)
         if not same(ours.size, theirs.size):
-            values.append(("size", ours.size, theirs.size))
-        values += [
-            (name, *map(float, fluid))
-            for name, *fluid in zip(_FLUID, left.geom_fluid[a], right.geom_fluid[b], strict=False)
-            if not same(*fluid)
-        ]
+            values.append(DifferingQuantity("size", ours.size, theirs.size, "m"))
+        values += _of_fluids(left.geom_fluid[a], right.geom_fluid[b])
         if values:
             edits = copies(("geom_type", *_BOUNDS, "geom_fluid"), left, a, b)
-            difference = sides.tell("shape", "geom", a, values, "m", edits)
-            yield replace(difference, units=_NO_LENGTHS)
+            yield sides.tell("shape", "geom", a, values, edits)
         if _off(ours, theirs):
             yield self._moved(a, b)
 
@@ -141,11 +139,11 @@ class Geoms:
         for pair in together if edits else ():
             edits += (*copies(_BOUNDS, left, *pair), *self._moved(*pair).edits)
         name = few([name_of(left, "geom", geom) for geom, _ in together])
-        counts, unit = [len(geom) for geom in corners], ""
-        value = ("corners of its hull", *counts)
+        counts = [len(geom) for geom in corners]
+        value = DifferingQuantity("corners of its hull", counts[0], counts[1])
         if counts[0] == counts[1]:
-            value, unit = ("farthest corner", 0.0, off), "m"
-        yield ModelDifference(subject, "geom", name, (value,), unit, edits, (), why)
+            value = DifferingQuantity("farthest corner", 0.0, off, "m")
+        yield ModelDifference(subject, "geom", name, (value,), edits, refused=why)
 
     @cached_property
     def _choices(self) -> dict[int, int]:
@@ -168,6 +166,17 @@ class Geoms:
             if not shapes.identical(left, mesh, left, int(left.geom_dataid[geom])):
                 return []
         return pairs
+
+
+def _of_fluids(left: Array, right: Array) -> Iterator[DifferingQuantity]:
+    """Yield what two geoms (12,) differ in as a medium flows around them."""
+    shapes_of_fluid = [_FLUID_SHAPES[int(fluid[0] > 0)] for fluid in (left, right)]
+    if shapes_of_fluid[0] != shapes_of_fluid[1]:
+        yield DifferingQuantity("fluidshape", *shapes_of_fluid)
+        return
+    ours, theirs = left[_FLUID_COEFFICIENTS], right[_FLUID_COEFFICIENTS]
+    if not same(ours, theirs):
+        yield quantity_of("fluidcoef", ours, theirs)
 
 
 def touches(raw: Any) -> Any:

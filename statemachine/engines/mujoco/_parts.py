@@ -13,22 +13,15 @@ from ...installed import require
 from ...interface import Array, JointType
 from ...rotations import HERE, angle_between
 from ..description.records import Inertial, motion
-from ..records import TURNED, BodyPair, Edit, ModelDifference
+from ..records import TURNED, BodyPair, DifferingQuantity, Edit, ModelDifference
 from ._sides import NEAR, Sides, apart, copies, plain, quat_of, same, zeros
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
-# What a body weighs: the fields of each figure, and its unit.
+# What a body weighs: the arrays of each subject.
 _WEIGHS = {
-    "mass": (("body_mass",), "kg"),
-    "centre of mass": (("body_ipos",), "m"),
-    "inertia": (("body_inertia", "body_iquat"), "kg m²"),
-}
-_TURN_UNIT = {TURNED: "rad"}
-# The figures of each subject, and their units.
-_FIGURES = {
-    "mass": {"mass": "kg"},
-    "centre of mass": {"com": "m"},
-    "inertia": {"moments": "kg m²", **_TURN_UNIT},
+    "mass": ("body_mass",),
+    "centre of mass": ("body_ipos",),
+    "inertia": ("body_inertia", "body_iquat"),
 }
 _TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal have of rounding
 _EQUAL = 1e-6  # of the largest moment: two that are nearer to each other are equal
@@ -54,30 +47,32 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
             yield _lumped(sides, pair, composite, there)
 
 
-def _differing(left: Inertial, right: Inertial) -> dict[str, list[tuple[str, Any, Any]]]:
-    """What two bodies weigh otherwise, by subject: each figure's name and values."""
-    figures: dict[str, list[tuple[str, Any, Any]]] = {}
+def _differing(left: Inertial, right: Inertial) -> dict[str, list[DifferingQuantity]]:
+    """What two bodies weigh otherwise, by subject."""
+    values: dict[str, list[DifferingQuantity]] = {}
     if not same(left.mass, right.mass):
-        figures["mass"] = [("mass", left.mass, right.mass)]
+        values["mass"] = [DifferingQuantity("mass", left.mass, right.mass, "kg")]
     if not np.linalg.norm(left.com - right.com) <= NEAR:
-        figures["centre of mass"] = [("com", plain(left.com), plain(right.com))]
+        values["centre of mass"] = [
+            DifferingQuantity("com", plain(left.com), plain(right.com), "m")
+        ]
     size = max(np.abs(left.tensor).max(), np.abs(right.tensor).max())
     if not np.abs(left.tensor - right.tensor).max() <= 1e-9 * size:
-        figures["inertia"] = _of_tensors(left.tensor, right.tensor)
-    return figures
+        values["inertia"] = _of_tensors(left.tensor, right.tensor)
+    return values
 
 
-def _of_tensors(left: Array, right: Array) -> list[tuple[str, Any, Any]]:
+def _of_tensors(left: Array, right: Array) -> list[DifferingQuantity]:
     """What two tensors of inertia (3, 3) [kg m²] differ in: their moments, and their axes."""
     moments = [np.linalg.eigvalsh(tensor)[::-1] for tensor in (left, right)]
     angle = _turn_of_axes(left, right)
-    turned = (TURNED, 0.0, angle)
+    turned = DifferingQuantity(TURNED, 0.0, angle, "rad")
     if np.allclose(*moments, rtol=1e-9, atol=0) and angle:
         return [turned]
-    figures: list[tuple[str, Any, Any]] = [("moments", *map(plain, moments))]
+    values = [DifferingQuantity("moments", plain(moments[0]), plain(moments[1]), "kg m²")]
     if angle > _TILTED:
-        figures.append(turned)
-    return figures
+        values.append(turned)
+    return values
 
 
 def _turn_of_axes(left: Array, right: Array) -> float:
@@ -136,18 +131,17 @@ def _of_body(
     simple = left.body_simple[pair.left]
     fits = not right.body_simple[target] or simple
     back_fits = not simple and align is HERE
-    for subject, figures in _differing(wanted, sides.solids[1].inertial(target)).items():
-        (fields, unit), edits, back, why = _WEIGHS[subject], (), (), ""
+    for subject, values in _differing(wanted, sides.solids[1].inertial(target)).items():
+        arrays, edits, back, why = _WEIGHS[subject], (), (), ""
         if subject == "mass" or fits:
             edits = _weighs(sides, subject, target, wanted)
             if subject == "inertia" and exact:
-                edits = copies(fields, left, pair.left, target)
+                edits = copies(arrays, left, pair.left, target)
         elif back_fits:
-            back = copies(fields, right, pair.right, pair.left)
+            back = copies(arrays, right, pair.right, pair.left)
         else:
             why = _DIAGONAL
-        difference = sides.tell(subject, "body", pair.left, figures, unit, edits, back, why)
-        yield replace(difference, units=_TURN_UNIT)
+        yield sides.tell(subject, "body", pair.left, values, edits, back, why)
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
@@ -158,7 +152,7 @@ def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edi
     else:
         values = (there.mass if subject == "mass" else inner.of(there.com),)
     return tuple(
-        (name, (body,), value) for name, value in zip(_WEIGHS[subject][0], values, strict=True)
+        (name, (body,), value) for name, value in zip(_WEIGHS[subject], values, strict=True)
     )
 
 
@@ -170,11 +164,9 @@ def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) ->
     emptied = [zeros(("body_mass", "body_inertia"), sides.right, body) for body in fixed]
     filled = [_weighs(sides, figure, pair.right, there) for figure in _WEIGHS]
     why = _DIAGONAL if sides.right.body_simple[pair.right] else ""
-    units = {figure: unit for subject in differing for figure, unit in _FIGURES[subject].items()}
-    values, unit = chain(*differing.values()), _WEIGHS[subject][1]
     edits = () if why else chain(*emptied, *filled)
-    difference = sides.tell(subject, "body", pair.left, values, unit, edits, refused=why)
-    return replace(difference, units=units)
+    values = chain(*differing.values())
+    return sides.tell(subject, "body", pair.left, values, edits, refused=why)
 
 
 def _principal(tensor: Array) -> tuple[Array, Array]:
@@ -210,7 +202,7 @@ def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
     numbers = int(left.body_jntnum[pair.left]), int(right.body_jntnum[pair.right])
     parent = sides.part(int(left.body_parentid[pair.left]))
     if numbers != (len(joints), len(joints)):
-        values = (("joints", *numbers),)
+        values = (DifferingQuantity("joints", *numbers),)
         yield sides.tell("joints", "body", pair.left, values, refused="it has other joints")
         return
     if pair.moved or parent is None:
@@ -225,15 +217,15 @@ def _axis(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDiffere
     left, right, align = sides.left, sides.right, pair.align
     kind, axis = int(left.jnt_type[a]), align.mat @ left.jnt_axis[a]
     if kind in (_SLIDE, _HINGE) and np.abs(axis - right.jnt_axis[b]).max() > NEAR:
-        values = (("axis", plain(axis), plain(right.jnt_axis[b])),)
-        yield sides.tell("axis", "joint", a, values, "", [("jnt_axis", (b,), axis)])
+        value = DifferingQuantity("axis", plain(axis), plain(right.jnt_axis[b]))
+        yield sides.tell("axis", "joint", a, (value,), [("jnt_axis", (b,), axis)])
     anchor = align.of(left.jnt_pos[a])
     off = anchor - right.jnt_pos[b]
     if kind == _HINGE:  # a point along the axis is as good
         off = off - axis * (off @ axis)
     if kind in (_HINGE, _BALL) and np.linalg.norm(off) > NEAR:
-        values = (("anchor", plain(anchor), plain(right.jnt_pos[b])),)
-        yield sides.tell("anchor", "joint", a, values, "m", [("jnt_pos", (b,), anchor)])
+        value = DifferingQuantity("anchor", plain(anchor), plain(right.jnt_pos[b]), "m")
+        yield sides.tell("anchor", "joint", a, (value,), [("jnt_pos", (b,), anchor)])
 
 
 def _place(
@@ -256,8 +248,11 @@ def _place(
             unit = "rad"
         elif kinds == {int(_SLIDE)}:
             unit = "m"
-        values = (("ref", *zip(*refs, strict=True)),)
-        yield sides.tell("zero", "body", pair.left, values, unit, zero)
+        lefts, rights = zip(*refs, strict=True)
+        value = DifferingQuantity("ref", lefts, rights, unit)
+        if len(refs) == 1:
+            value = DifferingQuantity("ref", lefts[0], rights[0], unit)
+        yield sides.tell("zero", "body", pair.left, (value,), zero)
         alike = True
     wanted = parent.align @ ours @ pair.align.inverse
     if not alike:  # the same zero, another reference: turn back by ours, on by theirs

@@ -17,7 +17,7 @@ from ...errors import ModelError
 from ...installed import require
 from ...interface import Array
 from ..description.shapes import one_to_one
-from ..records import Counterparts, Edit, ModelDifference
+from ..records import Counterparts, DifferingQuantity, Edit, ModelDifference, QuantityValue
 from ._geoms import Geoms
 from ._sides import NOBODY, Pairs, Sides, name_of
 
@@ -113,7 +113,7 @@ def _user_data(
             "user data",
             kind,
             name_of(sides.left, kind, a),
-            (("user", _plain(left), _plain(right)),),
+            (DifferingQuantity("user", _plain(left), _plain(right)),),
             edits=edits,
             refused=refused,
             only_read=True,
@@ -140,7 +140,7 @@ class _Entry:
         room: How much it takes.
     """
 
-    value: Any
+    value: QuantityValue
     edits: tuple[Edit, ...]
     room: int
 
@@ -162,7 +162,7 @@ def _custom(sides: Sides, kind: str) -> Iterator[ModelDifference]:
             f"{kind} data",
             kind,
             name,
-            (("data", left.value, right.value),),
+            (DifferingQuantity("data", left.value, right.value),),
             edits=left.edits if fits else (),
             refused="" if fits else _ANOTHER_SIZE,
             only_read=True,
@@ -182,7 +182,7 @@ def _names_of_custom(raw: Any, kind: str) -> list[str]:
 
 def _extra(kind: str, name: str, sides: tuple[str | None, str | None]) -> ModelDifference:
     """Tell that only one model has an element of `<custom>`."""
-    values = ((kind, *sides),)
+    values = (DifferingQuantity(kind, *sides),)
     return ModelDifference(f"extra {kind}", kind, name, values, refused=_BUILT, only_read=True)
 
 

@@ -11,7 +11,7 @@ from ...installed import require
 from ...interface import Array
 from ..description.records import CollisionShape
 from ..description.shapes import volume_of
-from ..records import Edit, ModelDifference
+from ..records import DifferingQuantity, Edit, ModelDifference
 from ._sides import Sides, copies, name_of, placed, same
 
 MESH = 7  # mjtGeom
@@ -175,9 +175,9 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     left, right = sides.raws
     (ours, grid, here), (theirs, other, there) = _field(left, a), _field(right, b)
     if grid != other:
-        values = (("points", *(f"{rows} x {columns}" for rows, columns in (grid, other))),)
+        words = (f"{rows} x {columns}" for rows, columns in (grid, other))
         why = "it is a height field of another size"
-        yield sides.tell("heights", "geom", a, values, refused=why)
+        yield sides.tell("heights", "geom", a, (DifferingQuantity("points", *words),), refused=why)
         return
     data = left.hfield_data[here], right.hfield_data[there]
     sizes = left.hfield_size[ours], right.hfield_size[theirs]
@@ -192,8 +192,8 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     edits += copies(("geom_size", "geom_rbound", "geom_aabb"), left, a, b)
     users = (right.geom_type == right.geom_type[b]) & (right.geom_dataid == theirs)
     why = "another geom has this height field, too" if users.sum() > 1 else ""
-    values = (("farthest point", 0.0, float(far)),)
-    yield sides.tell("heights", "geom", a, values, "m", () if why else edits, refused=why)
+    value = DifferingQuantity("farthest point", 0.0, float(far), "m")
+    yield sides.tell("heights", "geom", a, (value,), () if why else edits, refused=why)
 
 
 def _field(raw: Any, geom: int) -> tuple[int, tuple[int, int], slice]:

@@ -6,7 +6,6 @@ What moves as one is compared in one frame: fixed bodies are no difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -19,13 +18,12 @@ from ...rotations import HERE, Placement, matrix_from_quat
 from ..description.records import Inertial
 from ..description.shapes import one_to_one
 from ..description.tree import together
-from ..records import TURNED, BodyPair, Counterparts, Edit, ModelDifference
+from ..records import TURNED, BodyPair, Counterparts, DifferingQuantity, Edit, ModelDifference
 from . import _fields as fields
 
 NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
 _SAME_PLACE = 1e-15  # the same: what composing with frames that are none leaves
 NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
-_TOGETHER = 3  # entries: a longer array is told by those that differ
 _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
 _COUNTED = {"equality": "eq", "camera": "cam"}  # in the names of counts and of views
 
@@ -46,21 +44,52 @@ def plain(value: Any) -> Any:
     return tuple(np.asarray(value).tolist()) if np.ndim(value) else np.asarray(value).item()
 
 
+def word_in(enumeration: str, number: int) -> str:
+    """The word by which an MJCF says an entry of one of the engine's enumerations: "affine"."""
+    return getattr(require("mujoco"), enumeration)(number).name.partition("_")[2].lower()
+
+
+def quantity_of(
+    array: str, left: Any, right: Any, unit: str = "", called: str = ""
+) -> DifferingQuantity:
+    """What two elements have in one array, as a quantity.
+
+    Args:
+        array: Its name in an mjModel; of an option as "opt.o_solref".
+        left: The entry of the first model's element: a number, or some.
+        right: That of the second's.
+        unit: SI unit of each number.
+        called: What the quantity is called; "" for the array's name without its kind.
+    """
+    name = called or fields.word_of(array)
+    if array in fields.CHOICES:
+        words = (word_in(fields.CHOICES[array], int(entry)) for entry in (left, right))
+        return DifferingQuantity(name, *words)
+    if array in fields.FLAGS_OF_ELEMENTS:
+        return DifferingQuantity(name, bool(left), bool(right))
+    if fields.is_beginning(array) and np.size(left) == np.size(right) > 1:
+        end = 1 + max(k for k in range(len(left)) if not same(left[k], right[k]))
+        left, right = left[:end], right[:end]
+        if end == 1:
+            left, right = left[0], right[0]
+    return DifferingQuantity(name, plain(left), plain(right), unit)
+
+
 def differing(
-    names: Sequence[str], left: Sequence[Any], right: Sequence[Any]
-) -> tuple[tuple[str, Any, Any], ...]:
-    """The figures of these that differ, by name; of a long array each entry that does."""
-    figures: list[tuple[str, Any, Any]] = []
-    for name, a, b in zip(names, left, right, strict=True):
-        word, entries = name.partition("_")[2] or name, {"": (a, b)}
-        if np.size(a) > _TOGETHER and np.shape(a) == np.shape(b):
-            entries = {f"[{k}]": pair for k, pair in enumerate(zip(a, b, strict=True))}
-        figures += [
-            (word + place, plain(ours), plain(theirs))
-            for place, (ours, theirs) in entries.items()
-            if not same(ours, theirs)
-        ]
-    return tuple(figures)
+    row: fields.FieldRow, left: Sequence[Any], right: Sequence[Any]
+) -> tuple[DifferingQuantity, ...]:
+    """The quantities of a row that differ.
+
+    Args:
+        row: Of `fields.ROWS`.
+        left: For each of its arrays the entry of the first model's element.
+        right: Those of the second's.
+    """
+    return tuple(
+        quantity_of(array, ours, theirs, row.unit_of(array))
+        for array, ours, theirs in zip(row.fields, left, right, strict=True)
+        if not same(ours, theirs)
+    )
 
 
 def copies(names: Iterable[str], raw: Any, a: int, b: int) -> tuple[Edit, ...]:
@@ -243,8 +272,7 @@ class Sides:
         subject: str,
         kind: str,
         element: int,
-        values: Iterable[tuple[Any, ...]] = (),
-        unit: str = "",
+        values: Iterable[DifferingQuantity] = (),
         edits: Iterable[Edit] = (),
         back: Iterable[Edit] = (),
         refused: str = "",
@@ -252,7 +280,7 @@ class Sides:
         """A difference of an element of the first model; the rest as of ModelDifference."""
         name = name_of(self.left, kind, element)
         return ModelDifference(
-            subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused
+            subject, kind, name, tuple(values), tuple(edits), tuple(back), refused
         )
 
     def rows(
@@ -274,21 +302,12 @@ class Sides:
         """
         for a, b in pairs:
             for row in fields.ROWS[table or kind]:
-                values = differing(row.fields, *self._entries(row.fields, a, b))
+                values = differing(row, *self._entries(row.fields, a, b))
                 if values and self._acts(row, a, b):
                     edits = () if back else copies(row.fields, self.left, a, b)
                     edits_one = copies(row.fields, self.right, b, a) if back else ()
                     where = name or name_of(self.left, kind, a)
-                    yield ModelDifference(
-                        row.subject,
-                        kind,
-                        where,
-                        values,
-                        row.unit,
-                        edits,
-                        edits_one,
-                        units=row.units,
-                    )
+                    yield ModelDifference(row.subject, kind, where, values, edits, edits_one)
 
     def _acts(self, row: fields.FieldRow, a: int, b: int) -> bool:
         """Tell whether what a row needs to act is there, in one of two elements at least."""
@@ -326,10 +345,10 @@ class Sides:
                     continue
                 subject, name = f"extra {called or kind}", name_of(raw, kind, k)
                 if side:
-                    values = ((kind, None, value),)
+                    values = (DifferingQuantity(kind, None, value),)
                     yield ModelDifference(subject, kind, name, values, edits=edits)
                 else:
-                    values = ((kind, value, None),)
+                    values = (DifferingQuantity(kind, value, None),)
                     yield ModelDifference(subject, kind, name, values, edits_one=edits)
 
     def elsewhere(
@@ -345,11 +364,11 @@ class Sides:
             theirs: Where it is.
         """
         far, turn = apart(wanted, theirs)
-        values: list[tuple[str, Any, Any]] = []
+        values: list[DifferingQuantity] = []
         if far > NEAR:
-            values.append(("place", plain(wanted.pos), plain(theirs.pos)))
+            values.append(DifferingQuantity("place", plain(wanted.pos), plain(theirs.pos), "m"))
         if turn > NEAR:
-            values.append((TURNED, 0.0, wanted.angle(theirs)))
+            values.append(DifferingQuantity(TURNED, 0.0, wanted.angle(theirs), "rad"))
         names = f"{kind}_pos", f"{kind}_quat"
         on = self.right.body_parentid if kind == "body" else getattr(self.right, f"{kind}_bodyid")
         inner = self.solids[1].place(int(on[b])).inverse @ wanted
@@ -357,8 +376,7 @@ class Sides:
         # The first model's own numbers, where they say that place: both move by the same bits.
         if max(apart(inner, placed(*(value for _, _, value in edits)))) > _SAME_PLACE:
             edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
-        difference = self.tell("place", kind, a, values, "m", edits)
-        return replace(difference, units={TURNED: "rad"})
+        return self.tell("place", kind, a, values, edits)
 
 
 def _values(raw: Any, names: Sequence[str], k: int) -> list[Any]:

@@ -17,14 +17,14 @@ import numpy as np
 
 from ...installed import require
 from ...measures.text import grouped
-from ..records import Counterparts, Edit, ModelDifference
+from ..records import Counterparts, DifferingQuantity, Edit, ModelDifference, QuantityValue
 from . import _fields as fields
 from ._drives import drives
 from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
 from ._geoms import Geoms
 from ._parts import places, weights
 from ._readable import patched_text
-from ._sides import Sides, plain, same
+from ._sides import Sides, plain, quantity_of, same, word_in
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {
@@ -137,26 +137,31 @@ def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
             continue
         names = [name for name in options if not same(ours[name], theirs[name])]
         if names:
-            values = tuple((name, ours[name], theirs[name]) for name in names)
-            edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
-            units = {name: fields.OPTION_UNITS.get(name, "") for name in names}
-            yield ModelDifference(
-                subject, "option", "", values, units[names[0]], edits, units=units
+            values = tuple(
+                quantity_of(f"opt.{name}", ours[name], theirs[name], _unit_of(name), name)
+                for name in names
             )
+            edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
+            yield ModelDifference(subject, "option", "", values, edits)
     for field, word, bit in _flag_bits():
         name = f"flag {word}"
         if ours[name] != theirs[name]:
             edits = ((f"opt.{field}", (bit,), bool(getattr(left.opt, field) & bit)),)
-            yield ModelDifference(word, "flag", "", ((name, ours[name], theirs[name]),), "", edits)
+            value = DifferingQuantity(name, ours[name], theirs[name])
+            yield ModelDifference(word, "flag", "", (value,), edits)
+
+
+def _unit_of(option: str) -> str:
+    """Return the SI unit of an option of the engine; "" without one."""
+    return fields.OPTION_UNITS.get(option, "")
 
 
 def settings_of(raw: Any) -> dict[str, Any]:
     """The options and flags of a compiled model by name; what is chosen from a list in words."""
     names = [name for group in fields.OPTIONS.values() for name in group]
     settings = {name: plain(getattr(raw.opt, name)) for name in names}
-    for name, choices in fields.CHOICES.items():
-        chosen = getattr(require("mujoco"), choices)(settings[name]).name
-        settings[name] = chosen.partition("_")[2].lower()
+    for name, enumeration in fields.OPTION_CHOICES.items():
+        settings[name] = word_in(enumeration, settings[name])
     for field, word, bit in _flag_bits():
         raised = bool(getattr(raw.opt, field) & bit)
         settings[f"flag {word}"] = "on" if raised == (field == "enableflags") else "off"
@@ -184,7 +189,8 @@ def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
         if not all(same(getattr(left, n), getattr(right, n)) for n in names):
             counts = [int(getattr(raw, f"n{pattern.rstrip('_')}", 0)) for raw in (left, right)]
             why = "they are compared as a whole, and not brought over"
-            yield ModelDifference(subject, "model", "", (("count", *counts),), refused=why)
+            value = DifferingQuantity("count", counts[0], counts[1])
+            yield ModelDifference(subject, "model", "", (value,), refused=why)
 
 
 _GAINS = ("actuator_gainprm", "actuator_biasprm")
@@ -215,6 +221,10 @@ _SPLIT: dict[str, Sequence[str]] = {
     "actuator_biasprm": _EACH,
     "body_inertia": ("diaginertia[{1}]",),
 }
+# SI units of arrays whose quantities have names of their own.
+_UNITS_OF_ARRAYS = {
+    **{"ipos": "m", "pos": "m", "inertia": "kg m²"},
+}
 # A difference that sets one of these is a thing of one piece: the rest means something else then.
 _KINDS = ("geom_type", "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "body_iquat")
 
@@ -235,8 +245,10 @@ def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, .
         return (difference,)
     changes: list[tuple[str, _Entry]] = []
     is_servo = _changes_a_servo(right, edits)
+    units = {value.quantity: value.unit for value in difference.values}
+    units |= _UNITS_OF_ARRAYS
     for edit in edits:
-        for entry in _by_entry(right, edit):
+        for entry in _by_entry(right, edit, units.get(_word(edit[0]), "")):
             # The gain of a servo stands in two places, which are one entry.
             is_gain = is_servo and entry.name in ("gainprm[0]", "biasprm[1]")
             changes.append(("kp" if is_gain else entry.name, entry))
@@ -267,20 +279,18 @@ def _changes_a_servo(right: Any, edits: Sequence[Edit]) -> bool:
 def _part(difference: ModelDifference, name: str, entries: Sequence[_Entry]) -> ModelDifference:
     """Return the part of a difference that is of one entry, which may stand in several places."""
     first = entries[0]
+    value = DifferingQuantity(name, first.left, first.right, first.unit)
     return replace(
         difference,
         subject=f"{difference.subject} ({name})",
-        values=((name, first.left, first.right),),
-        unit=first.unit or difference.unit_of(_word(first.edit[0])),
-        units={},
+        values=(value,),
         edits=tuple(entry.edit for entry in entries),
     )
 
 
 def _word(array: str) -> str:
     """Return what an array, or an option, is called without the kind of its element."""
-    kind, _, rest = array.partition("." if array.startswith("opt.") else "_")
-    return rest or kind
+    return array.removeprefix("opt.") if array.startswith("opt.") else fields.word_of(array)
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,19 +300,19 @@ class _Entry:
     Attributes:
         name: What it is called.
         left, right: Its value in each model.
-        unit: Its SI unit, if that is another one than that of its array.
+        unit: Its SI unit.
         edit: What brings it over.
     """
 
     name: str
-    left: Any
-    right: Any
+    left: QuantityValue
+    right: QuantityValue
     unit: str
     edit: Edit
 
 
-def _by_entry(right: Any, edit: Edit) -> Iterator[_Entry]:
-    """Yield the entries that an edit changes."""
+def _by_entry(right: Any, edit: Edit, unit: str) -> Iterator[_Entry]:
+    """Yield the entries that an edit changes; `unit` is that of its array."""
     (name, index, value), old = edit, _read(right, edit)
     word, names = _word(name), _SPLIT.get(name)
     if name in ("body_quat", "geom_quat", "site_quat"):
@@ -310,13 +320,13 @@ def _by_entry(right: Any, edit: Edit) -> Iterator[_Entry]:
         yield _Entry("turn", 0.0, angle, "rad", edit)
     elif names is None or not np.ndim(value):
         word += "".join(f"[{k}]" for k in index[1:2])
-        yield _Entry(word, plain(value), plain(old), "", edit)
+        yield _Entry(word, plain(value), plain(old), unit, edit)
     else:
         for k in range(len(value)):
             if not same(value[k], old[k]):
                 called = names[0].format(word, k) if len(names) == 1 else names[k]
                 left, other = float(value[k]), float(old[k])
-                yield _Entry(called, left, other, "", (name, (*index, k), left))
+                yield _Entry(called, left, other, unit, (name, (*index, k), left))
 
 
 def _is_servo(gains: Any, biases: Any) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
-from ...engines.records import TURNED, ModelDifference
+from ...engines.records import TURNED, DifferingQuantity, ModelDifference, QuantityValue
 from ...interface import Keyframe, Model
 from ...measures.text import few
 from ..compare.matching import Matched, match_models
@@ -113,7 +113,7 @@ def _keys(difference: ModelDifference, names: Mapping[str, str], tree: GroupTree
         tree: The reading of the first, by these names.
     """
     kind, where = difference.kind, names.get(difference.where, difference.where)
-    figures = [name for name, _, _ in difference.values]
+    figures = [value.quantity for value in difference.values]
     if kind in _SETTINGS:
         return [("option", where, word) for word in sorted({*figures})]
     if kind == "body" and where in tree.at:
@@ -156,18 +156,18 @@ def _enter_orders(book: Ledger, matched: Matched) -> None:
         names = [few(list(model.actuator_names), 6) for model in (matched.left, matched.right)]
         book.differ(Figure("further", "ctrl", "order"), names, share=0.5)
     for difference in order_of_qpos(matched):
-        orders = list(difference.values[0][1:])
+        order = difference.values[0]
         figure = Figure("further", "qpos", "order", effect=_READ_BY_NUMBER)
-        book.differ(figure, orders, share=0.5)
+        book.differ(figure, (_value(order.left), _value(order.right)), share=0.5)
     for difference in order_of_mocap(matched):
-        orders = list(difference.values[0][1:])
+        order = difference.values[0]
         figure = Figure("further", "mocap bodies", "order", effect=_MOVED_BY_NUMBER)
-        book.differ(figure, orders, share=0.5)
+        book.differ(figure, (_value(order.left), _value(order.right)), share=0.5)
 
 
 def _is_told(difference: ModelDifference) -> bool:
     """Tell whether a reading without it has said that it is the same, or that it says nothing."""
-    names = {name.partition("[")[0] for name, _, _ in difference.values}
+    names = {value.quantity for value in difference.values}
     if difference.subject in _UNTOLD or (names and names <= _UNTOLD_FIGURES):
         return False
     return difference.kind in _SETTINGS or difference.subject in _SUBJECTS.get(difference.kind, ())
@@ -176,17 +176,18 @@ def _is_told(difference: ModelDifference) -> bool:
 def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:
     """Enter the figures of a difference, as the compiled models name them."""
     subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, "further")
-    for name, left, right in difference.values or (("", "as it is", "another"),):
+    whole = (DifferingQuantity("", "as it is", "another"),)
+    for value in difference.values or whole:
+        name, unit = value.quantity, value.unit
         if name.endswith("limited") and len(difference.values) > 1:
             continue  # the range says so
-        unit = difference.unit_of(name)
         metres = unit == "m"
         scale = reach if metres else 0.0
         if name == TURNED:
             scale = math.pi
         book.enter(
             Figure(subject, difference.where, name, unit, keys=[key]),
-            (_value(left), _value(right)),
+            (_value(value.left), _value(value.right)),
             scale=scale,
             slack=4,
             against=reach,
@@ -194,7 +195,7 @@ def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) ->
         )
 
 
-def _value(value: object) -> Value:
+def _value(value: QuantityValue) -> Value:
     """Return a value of a compiled model as one of the list."""
     if value is None:
         return "nothing"
@@ -243,8 +244,8 @@ def _enter_data(book: Ledger, matched: Matched) -> None:
     """Enter what a function of the user's may read: user data of elements, numeric, text, tuple."""
     for difference in data_of(matched):
         figure = Figure("further", difference.title, "", effect=_READ)
-        for _, left, right in difference.values:
-            book.enter(figure, (_value(left), _value(right)), share=0.5)
+        for value in difference.values:
+            book.enter(figure, (_value(value.left), _value(value.right)), share=0.5)
 
 
 def _enter_sensors(book: Ledger, matched: Matched) -> None:
@@ -252,11 +253,12 @@ def _enter_sensors(book: Ledger, matched: Matched) -> None:
     only_left: list[str] = []
     only_right: list[str] = []
     for difference in sensors_of(matched):
-        for name, left, right in difference.values:
+        for value in difference.values:
             if difference.subject != "extra sensor":
                 where = f"sensor {difference.where}" if difference.where else "sensordata"
-                book.enter(_of_sensors(where, name), (_value(left), _value(right)), share=0.0)
-            elif left is None:
+                figure = _of_sensors(where, value.quantity)
+                book.enter(figure, (_value(value.left), _value(value.right)), share=0.0)
+            elif value.left is None:
                 only_right.append(difference.where)
             else:
                 only_left.append(difference.where)

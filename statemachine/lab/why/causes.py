@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...engines import room
-from ...engines.records import Edit, ModelDifference
+from ...engines.records import DifferingQuantity, Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
 from ...measures.text import few, listed
@@ -94,7 +94,7 @@ def _extra_joint(name: str, left: str | None, right: str | None) -> ModelDiffere
         subject="extra joint",
         kind="joint",
         where=name,
-        values=(("joint", left, right),),
+        values=(DifferingQuantity("joint", left, right),),
         refused="a joint cannot be added or taken away",
     )
 
@@ -203,7 +203,7 @@ def _change(row: ModelDifference) -> Hashable:
         return row.kind, scale
     if not row.where or row.subject.startswith("extra "):
         return row.title
-    return row.kind, row.subject, row.unit, repr(row.values)
+    return row.kind, row.subject, repr(row.values)
 
 
 def scale_of(row: ModelDifference) -> str:
@@ -213,7 +213,8 @@ def scale_of(row: ModelDifference) -> str:
     """
     if row.kind != "body" or row.subject not in ("mass", "inertia"):
         return ""
-    left, right = (np.ravel(value) for value in row.values[0][1:])
+    moments = row.values[0]
+    left, right = (np.atleast_1d(np.array(side, float)) for side in (moments.left, moments.right))
     if not left.all():
         return ""
     factors = {f"{number:.8g}" for number in right / left}

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...engines import room
-from ...engines.records import ModelDifference
+from ...engines.records import DifferingQuantity, ModelDifference
 from ...errors import BadInputError, EndedEarlyError
 from ...interface import JointType, Model
 from ...measures.text import milliseconds
@@ -30,7 +30,7 @@ from .run_differences import orders_of
 from .shapley import Division, shapley
 from .trials import Trials
 from .verdict import UNEXPLAINED
-from .written import FigureValues, WrittenCause, as_written
+from .written import WrittenCause, as_written
 
 _REDUNDANT = 0.1  # of the gap: so much a cause may leave that makes others needless
 _STILL = 1e-3  # [rad or m] over a whole run
@@ -243,8 +243,6 @@ def _share_of_cause(cause: Cause, written: WrittenCause, division: Division) -> 
     row = Share(
         name=written.name,
         values=written.values,
-        unit=written.unit,
-        units=written.units,
         place=written.place,
         kind=cause.kind,
         note=cause.refused,
@@ -266,14 +264,12 @@ def _share_of_cause(cause: Cause, written: WrittenCause, division: Division) -> 
 def _share_of_integrator(part: Localisation) -> Share:
     """Return the part of an integrator that one side alone can choose, as that of a cause."""
     assert part.side
-    values: tuple[FigureValues, ...] = ()
+    values: tuple[DifferingQuantity, ...] = ()
     if part.values:
-        values = (FigureValues(part.name, *part.values),)
+        values = (DifferingQuantity(part.name, *part.values),)
     return Share(
         name=part.name,
         values=values,
-        unit="",
-        units=("",) * len(values),
         place=None,
         kind="option",
         share=part.share,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from ...engines.records import DifferingQuantity
 from ...measures import Deviation
 from ..compare.matching import Only
 from ..runs.provenance import Provenance
@@ -13,7 +14,7 @@ from .gap import FirstTouch, Measure
 from .locate import Localisation
 from .shapley import Method
 from .verdict import CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
-from .written import FigureValues, Place
+from .written import Place
 
 
 @dataclass(frozen=True)
@@ -22,9 +23,7 @@ class Share:
 
     Attributes:
         name: What it is, and of what.
-        values: Each figure that differs; see `WrittenCause`.
-        unit: SI unit of the first figure.
-        units: SI unit of each figure.
+        values: Each quantity that differs; see `WrittenCause`.
         place: The one line of the right's file that says it; None where that was not found.
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
@@ -39,9 +38,7 @@ class Share:
     """
 
     name: str
-    values: tuple[FigureValues, ...]
-    unit: str
-    units: tuple[str, ...]
+    values: tuple[DifferingQuantity, ...]
     place: Place | None
     kind: str
     share: float | None = None

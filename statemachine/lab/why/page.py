@@ -314,9 +314,9 @@ def _changes(row: Share) -> list[str]:
     if not has_several_figures(row):
         return [f"{place}{row.name}{figure_of(row)}: {_change(row)}"]
     lines: list[str] = []
-    for values, unit in zip(row.values, row.units, strict=True):
-        single = replace(row, values=(values,), units=(unit,))
-        lines.append(f"{place}{row.name}, {values.name}: {_change(single)}")
+    for value in row.values:
+        single = replace(row, values=(value,))
+        lines.append(f"{place}{row.name}, {value.quantity}: {_change(single)}")
     return lines
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...engines.records import Edit, ModelDifference
+from ...engines.records import DifferingQuantity, Edit, ModelDifference
 from ...interface import Model
 from ..compare.matching import Matched
 from ..recordings import SideStart
@@ -48,14 +48,15 @@ def _of_positions(
 ) -> Iterator[ModelDifference]:
     """Yield the coordinate of the start that is farthest off, as the right numbers it."""
     left, right = starts
-    coordinates: list[tuple[str, float, float]] = []
+    apart: dict[float, DifferingQuantity] = {}
     for name, ours, theirs in (("qpos", left.qpos, right.qpos), ("qvel", left.qvel, right.qvel)):
         moved = matched.moved(name, ours, theirs)
         pairs = zip(moved.tolist(), theirs.tolist(), strict=True)
-        coordinates += [(f"{name}[{k}]", a, b) for k, (a, b) in enumerate(pairs)]
-    apart = [row for row in coordinates if abs(row[1] - row[2]) > _SAME]
+        for k, (a, b) in enumerate(pairs):
+            if abs(a - b) > _SAME:
+                apart[abs(a - b)] = DifferingQuantity(f"{name}[{k}]", a, b)
     if apart:
-        farthest = max(apart, key=lambda row: abs(row[1] - row[2]))
+        farthest = apart[max(apart)]
         yield ModelDifference(START, "run", "", (farthest,))
 
 
@@ -67,21 +68,20 @@ def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
     left_time, right_time = float(left.key_time[left_key]), float(right.key_time[right_key])
     if left_time != right_time:
         edits: tuple[Edit, ...] = (("key_time", (right_key,), left_time),)
-        yield ModelDifference(
-            "time of the start", "run", "", (("time", left_time, right_time),), "s", edits
-        )
+        time = DifferingQuantity("time", left_time, right_time, "s")
+        yield ModelDifference("time of the start", "run", "", (time,), edits)
     for subject, field, part in _OF_A_KEYFRAME:
         ours, theirs = getattr(left, field)[left_key], getattr(right, field)[right_key]
         pairs = zip(*matched.places[part], strict=True)
         off = [(a, b) for a, b in pairs if abs(ours[a] - theirs[b]) > _SAME]
         if off:
-            left_values = tuple(ours[a] for a, _ in off)
-            right_values = tuple(theirs[b] for _, b in off)
+            left_values = tuple(float(ours[a]) for a, _ in off)
+            right_values = tuple(float(theirs[b]) for _, b in off)
             yield ModelDifference(
                 subject=f"{subject} of the start",
                 kind="run",
                 where="",
-                values=((subject, left_values, right_values),),
+                values=(DifferingQuantity(subject, left_values, right_values),),
                 edits=tuple((field, (right_key, b), float(ours[a])) for a, b in off),
             )
 
@@ -143,4 +143,4 @@ def _mocap_bodies_in_order(model: Model) -> str:
 
 
 def _order(subject: str, left: str, right: str) -> ModelDifference:
-    return ModelDifference(subject, "run", "", (("order", left, right),))
+    return ModelDifference(subject, "run", "", (DifferingQuantity("order", left, right),))

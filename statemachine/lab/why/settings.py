@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.records import Dials, ModelDifference, Setting
+from ...engines.records import Dials, DifferingQuantity, ModelDifference, Setting
 from ...interface import JointType, Model
 from ...measures.text import milliseconds, rounded, significant
 
@@ -125,7 +125,8 @@ class OwnSettings:
             own, model = self._own_word(name), self._model_word(name)
             left, right = (model, own) if side else (own, model)
             title = TITLES[name]
-            rows.append(ModelDifference(title, "engine", "", ((title, left, right),)))
+            value = DifferingQuantity(title, left, right)
+            rows.append(ModelDifference(title, "engine", "", (value,)))
         return rows
 
     def _model_word(self, name: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...engines import room
-from ...engines.records import ModelDifference
+from ...engines.records import DifferingQuantity, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.alike import commands_alike, controller_for_right, translated
@@ -40,6 +40,8 @@ _OPTIONS = {
     "damping": {"damping": "dof_damping"},
     "dry friction": {"frictionloss": "dof_frictionloss"},
 }
+# SI unit of each option that has one.
+_OPTION_UNITS = {"timestep": "s", "gravity": "m/s²"}
 NONE = frozenset[str]()
 
 
@@ -165,14 +167,13 @@ class Setup:
         for name, options in _OPTIONS.items():
             if both_compiled and name != "timestep":
                 continue
-            values: list[tuple[str, Any, Any]] = []
+            values: list[DifferingQuantity] = []
             for option, attribute in options.items():
                 ours, theirs = getattr(left, attribute), getattr(right, attribute)
                 if not np.array_equal(ours, theirs):
-                    values.append((option, ours, theirs))
+                    values.append(_quantity_of_option(option, ours, theirs))
             if values and options.keys() <= set(right.capabilities.options):
-                unit = "s" if name == "timestep" else ""
-                yield ModelDifference(name, "option", "", tuple(values), unit)
+                yield ModelDifference(name, "option", "", tuple(values))
 
     @property
     def needs(self) -> dict[str, str]:
@@ -376,6 +377,13 @@ def _keyframes(
 
 def _start_of_trace(trace: Trace) -> SideStart:
     return SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
+
+
+def _quantity_of_option(option: str, left: Any, right: Any) -> DifferingQuantity:
+    """Return an option of `Model.replace` as a quantity: a number, or an array of some."""
+    if np.ndim(left):
+        left, right = tuple(np.asarray(left).tolist()), tuple(np.asarray(right).tolist())
+    return DifferingQuantity(option, left, right, _OPTION_UNITS.get(option, ""))
 
 
 def _has_extra_actuator(cause: Cause) -> bool:

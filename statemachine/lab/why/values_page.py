@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...engines.records import TURNED
+from ...engines.records import TURNED, DifferingQuantity
 from ...measures.text import NONE, quantity, reading, significant
 
 if TYPE_CHECKING:
     from . import Share
-    from .written import FigureValues
 
 _WIDE = 24  # characters of a value
 _OFF = ("place", "anchor", "com", "axis")  # figures of which only the distance is said
@@ -19,7 +18,7 @@ _OFF = ("place", "anchor", "com", "axis")  # figures of which only the distance 
 
 def figure_of(row: Share) -> str:
     """Say which figure of a cause it is, where its name does not say so; else ""."""
-    figure = row.values[0].name if row.values else ""
+    figure = row.values[0].quantity if row.values else ""
     if has_several_figures(row):
         return f" ({len(row.values)} figures)"
     is_entry = "[" in figure or figure == TURNED or row.kind == "option"
@@ -39,11 +38,10 @@ def values_of(row: Share) -> tuple[str, str]:
     """
     if not row.values:
         return NONE, NONE
-    figures = zip(row.values, row.units, strict=True)
-    figure, unit = max(figures, key=lambda pair: _relative(pair[0]))
-    left, right = figure.left, figure.right
+    figure = max(row.values, key=_relative)
+    left, right, unit = figure.left, figure.right, figure.unit
     if isinstance(left, tuple) and isinstance(right, tuple) and left and right:
-        if figure.name in _OFF:
+        if figure.quantity in _OFF:
             return _how_far_off(left, right, unit)
         texts = _of_arrays(left, right, unit)
     else:
@@ -80,14 +78,14 @@ def _cut(text: str) -> str:
     return text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…"
 
 
-def _first_that_differs(figure: FigureValues) -> tuple[str, str]:
+def _first_that_differs(figure: DifferingQuantity) -> tuple[str, str]:
     """Return the first numbers of two values that differ, with all their digits."""
     a, b = (np.array(value, dtype=float).ravel() for value in (figure.left, figure.right))
     first = np.argmax(a != b)
     return f"{a[first]:.12g}", f"{b[first]:.12g}"
 
 
-def _relative(figure: FigureValues) -> float:
+def _relative(figure: DifferingQuantity) -> float:
     """Return how far two values are apart, as a part of the larger.
 
     It is 0 where that is not a number.

@@ -5,34 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 from xml.parsers import expat
 
 import numpy as np
 
-from ...engines.records import ModelDifference
+from ...engines.records import DifferingQuantity, ModelDifference, QuantityValue
 from .causes import MASS_SUBJECTS, Cause, scale_of
 
 _DENSITY = 1000.0  # kg/m³, where an MJCF says none
 _SCALING = {"density": "kg/m³", "mass": "kg"}  # attributes of a geom, and their units
 # Attributes of an MJCF that are called otherwise than the array that they are compiled to.
 _ATTRIBUTES = {"ipos": "pos", "inertia": "diaginertia", "gainprm": "kp", "solref_limit": "solref"}
-
-Scalar = bool | int | float | str | None
-Value = Scalar | tuple[Scalar, ...]
-
-
-class FigureValues(NamedTuple):
-    """A figure in which two sides differ.
-
-    Attributes:
-        name: What it is called.
-        left, right: The value of each side; None: it has none.
-    """
-
-    name: str
-    left: Value
-    right: Value
 
 
 @dataclass(frozen=True)
@@ -54,18 +37,14 @@ class WrittenCause:
 
     Attributes:
         name: What it is, and of what.
-        values: Each figure that differs; of masses that are multiplied alike the density that says
-            so, or the factor.
-        unit: SI unit of the first figure.
-        units: SI unit of each figure.
+        values: Each quantity that differs; of masses that are multiplied alike the density that
+            says so, or the factor.
         place: The one line that says it, with the value that the side has: an element's own; of a
             change that several elements share, that of the default; None where that was not found.
     """
 
     name: str
-    values: tuple[FigureValues, ...]
-    unit: str
-    units: tuple[str, ...]
+    values: tuple[DifferingQuantity, ...]
     place: Place | None
 
 
@@ -154,8 +133,8 @@ def _written(cause: Cause, ours: Sequence[_Element], theirs: Sequence[_Element])
         if len(scalings) == 1:
             return _of_scaling(cause.name, scalings[0])
         if len({row.where for row in rows}) > 1:
-            factor = FigureValues("scale", 1.0, float(scale))
-            return WrittenCause(cause.name, (factor,), "×", ("×",), _only(places))
+            factor = DifferingQuantity("scale", 1.0, float(scale), "×")
+            return WrittenCause(cause.name, (factor,), _only(places))
     return _of_rows(cause.name, rows[:1], places)
 
 
@@ -165,23 +144,17 @@ def _is_moved_mass(cause: Cause) -> bool:
 
 
 def _of_rows(name: str, rows: Sequence[ModelDifference], places: set[Place]) -> WrittenCause:
-    """Return a cause with all figures of some differences."""
-    figures: list[FigureValues] = []
-    units: list[str] = []
-    for row in rows:
-        for figure, left, right in row.values:
-            figures.append(FigureValues(figure, left, right))
-            units.append(row.unit_of(figure))
-    unit = units[0] if units else ""
-    return WrittenCause(name, tuple(figures), unit, tuple(units), _only(places))
+    """Return a cause with all quantities of some differences."""
+    values = tuple(value for row in rows for value in row.values)
+    return WrittenCause(name, values, _only(places))
 
 
 def _of_scaling(name: str, scaling: _Scaling) -> WrittenCause:
     """Return a cause that is one density or one mass of the file."""
     unit = _SCALING[scaling.attribute]
-    figure = FigureValues(scaling.attribute, scaling.left, scaling.right)
+    value = DifferingQuantity(scaling.attribute, scaling.left, scaling.right, unit)
     name = name.replace("mass and inertia", scaling.attribute)
-    return WrittenCause(name, (figure,), unit, (unit,), scaling.place)
+    return WrittenCause(name, (value,), scaling.place)
 
 
 def _only(places: set[Place]) -> Place | None:
@@ -226,11 +199,11 @@ def _says(element: _Element, cause: Cause) -> bool:
     fields = {edit[0] for edit in cause.edits(1)}
     words = {field.rpartition(".")[2].partition("_")[2] or field[4:] for field in fields}
     written = {element.attributes.get(_ATTRIBUTES.get(word, word)) for word in words}
-    values = [value for row in cause.differences for _, _, value in row.values]
+    values = [value.right for row in cause.differences for value in row.values]
     return any(_same(text, value) for text in written if text for value in values)
 
 
-def _same(text: str, value: Value) -> bool:
+def _same(text: str, value: QuantityValue) -> bool:
     """Tell whether the numbers, or the word, of an attribute are those of a value."""
     try:
         numbers, wanted = np.array(text.split(), dtype=float), np.ravel(np.array(value, float))
