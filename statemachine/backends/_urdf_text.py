@@ -1,0 +1,113 @@
+"""A URDF's text as MuJoCo is to read it: with the mesh files that it would not find by itself.
+
+MuJoCo looks for a mesh in the folder of the URDF, or in the `meshdir` of its <compiler>, by the
+name as it is written. Two kinds of names it does not find there:
+
+- `package://robot/meshes/part.stl`: ROS knows where packages are, a file alone does not;
+- `meshes/part.stl` where `meshdir` is "meshes" already. Up to MuJoCo 3 the folders in the name of a
+  mesh of a URDF were stripped (`strippath`, whose default was "true"); since 4.0 they are not.
+
+A name that leads to no file is looked up in this order: in the packages' folders, then without its
+own folders in `meshdir`. What is there is named by its absolute path, with `strippath` off, which
+each release of MuJoCo reads alike.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from ..models import mesh_file, what_is_there
+
+_PACKAGE = "package://"
+
+
+def is_urdf(path: Path) -> bool:
+    """Return whether a file is a URDF, by its suffix."""
+    return path.suffix.lower() == ".urdf"
+
+
+def urdf_text(path: Path, visuals: bool = False) -> str | None:
+    """Return the text of a URDF in which every mesh that is there is named so that it is found.
+
+    Args:
+        path: The file.
+        visuals: Whether visual shapes are to be read, too, which MuJoCo leaves out unless the file
+            says `discardvisual="false"`.
+
+    Returns:
+        The text; None where MuJoCo can be given the file as it is, or the file is no URDF.
+    """
+    if not is_urdf(path):
+        return None
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError, ValueError, LookupError):
+        return None  # MuJoCo says what is wrong with it
+    if root.tag != "robot":
+        return None
+    compiler = _compiler_of(root)
+    is_changed = _name_meshes(root, compiler, path.parent)
+    if visuals and compiler.get("discardvisual") != "false":
+        compiler.set("discardvisual", "false")
+        is_changed = True
+    return ElementTree.tostring(root, encoding="unicode") if is_changed else None
+
+
+def _compiler_of(root: Element) -> Element:
+    """Return the <compiler> of a URDF, added where it has none."""
+    extension = root.find("mujoco")
+    if extension is None:
+        extension = ElementTree.Element("mujoco")
+        root.insert(0, extension)
+    compiler = extension.find("compiler")
+    return ElementTree.SubElement(extension, "compiler") if compiler is None else compiler
+
+
+def _name_meshes(root: Element, compiler: Element, folder: Path) -> bool:
+    """Write the absolute paths of meshes into a URDF that has one which MuJoCo does not find.
+
+    Args:
+        root: Of the URDF; its meshes and the `strippath` of its <compiler> are edited.
+        compiler: Its <compiler>.
+        folder: The folder of the file.
+
+    Returns:
+        Whether anything was edited.
+    """
+    meshdir = folder / compiler.get("meshdir", compiler.get("assetdir", ""))
+    strips = compiler.get("strippath") == "true"
+    places: dict[str, Path] = {}
+    is_needed = False
+    for mesh in root.iter("mesh"):
+        name = mesh.get("filename", "")
+        read_by_mujoco = meshdir / (_last_part(name) if strips else name)
+        if what_is_there(read_by_mujoco) == "a file":
+            places[name] = read_by_mujoco
+        elif (place := _mesh_elsewhere(name, folder, meshdir)) is not None:
+            places[name] = place
+            is_needed = True
+    if not is_needed:
+        return False
+    for mesh in root.iter("mesh"):
+        name = mesh.get("filename", "")
+        if name in places:
+            mesh.set("filename", str(places[name].resolve()))
+        elif strips:
+            mesh.set("filename", _last_part(name))
+    compiler.set("strippath", "false")
+    return True
+
+
+def _mesh_elsewhere(name: str, folder: Path, meshdir: Path) -> Path | None:
+    """Return the file of a mesh that MuJoCo does not find by its name; None where there is none."""
+    if name.startswith(_PACKAGE) and (place := mesh_file(name, folder)) is not None:
+        return place
+    stripped = meshdir / _last_part(name)
+    return stripped if _last_part(name) and what_is_there(stripped) == "a file" else None
+
+
+def _last_part(name: str) -> str:
+    """Return the name of a mesh without its folders, as `strippath` leaves it."""
+    return name.replace("\\", "/").rpartition("/")[2]
