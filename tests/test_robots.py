@@ -64,11 +64,11 @@ TENDON = (
     GOOD.replace("<geom name", "<site name='s'/><geom name")
     .replace(
         "</worldbody>",
-        "<body pos='1 0 0'><joint name='l'/><geom size='.05'/><site name='t'/></body></worldbody>",
+        "<body pos='1 0 0'><freejoint/><geom size='.05'/><site name='t'/></body></worldbody>",
     )
     .replace(
         "</mujoco>",
-        "<tendon><spatial><site site='s'/><site site='t'/></spatial></tendon></mujoco>",
+        "<tendon><spatial stiffness='1'><site site='s'/><site site='t'/></spatial></tendon></mujoco>",
     )
 )
 URDF = """<robot name='r'><link name='base'/><link name='tip'><inertial><mass value='1'/>

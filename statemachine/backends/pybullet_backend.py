@@ -34,7 +34,6 @@ from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
 from . import edits as _edits
-from .bullet import urdf
 from .bullet.client import MOST_CLIENTS
 from .bullet.driven import Act, DrivenWorld
 from .bullet.file import UrdfFile
@@ -248,7 +247,7 @@ def _urdf_texts(plan: Plan, kind: str) -> dict[str, str]:
     if plan.file is not None:
         return {plan.file.path.name: plan.file.content.decode(errors="replace")}
     texts: dict[str, str] = {}
-    for root in (0, *urdf.roots(plan.raw)):
+    for root in (0, *plan.roots):
         name = plan.raw.body(root).name or f"body {root}"
         texts[name], _ = plan.described(root, kind)
     return texts

@@ -17,8 +17,8 @@ import numpy as np
 from ...interface import Array
 from ...rotations import INVERSE, matrix_from_quat, times
 from .. import dense
-from .plan import PLACES, SITE, ends_of, linear_sum, movers
 from .soft import Soft, SoftRow, bounds_of, shortest_time, soft, soft_row
+from .ties import PLACES, SITE, ends_of, linear_sum, movers, moving
 from .world import Tree, World
 
 _EQ = mujoco.mjtEq
@@ -54,8 +54,11 @@ class Tendons:
         self, raw: mujoco.MjModel, world: World, tree: Tree, off: Mapping[str, bool]
     ) -> None:
         self._raw, self._world, self._tree = raw, world, tree
-        owners = [set(raw.body_rootid[movers(raw, tendon)]) for tendon in range(raw.ntendon)]
-        self.ids = ids = [tendon for tendon, roots in enumerate(owners) if roots == {tree.root}]
+        self.ids = ids = [
+            tendon
+            for tendon in range(raw.ntendon)
+            if (bodies := movers(raw, tendon)) and tree.links.keys() >= set(bodies)
+        ]
         self._moment = np.zeros((len(ids), len(tree.dofs)))
         self.moments = dict(zip(ids, self._moment, strict=True))
         self.bent = list[int]()
@@ -188,7 +191,7 @@ class Equalities:
         active = raw.eq_active0 & (not (off["equality"] or off["constraint"]))
         for eq in np.flatnonzero(active).tolist():
             bodies = ends_of(raw, eq)
-            if tree.root not in raw.body_rootid[bodies]:
+            if tree.links.keys().isdisjoint(moving(raw, bodies)):
                 continue
             kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
             style = raw.eq_solref[[eq]], raw.eq_solimp[[eq]]

@@ -24,16 +24,13 @@ from ..compiled import new_data
 from . import urdf
 from .contacts import Solid, Surfaces
 from .file import MOST_LINKS, UrdfFile
+from .ties import ends_of, mechanisms, movers
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
 _YIELDS = 0.02
-_WRAP = mujoco.mjtWrap
-_EQ, SITE = mujoco.mjtEq, int(mujoco.mjtObj.mjOBJ_SITE)
-_SUMS, PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
-
 
 Faces = NDArray[np.int64]  # (m, 3) numbers of vertices
 
@@ -54,8 +51,10 @@ class Plan:
         raw: The compiled model.
         surfaces: What can touch what; nothing where contacts are off.
         names: What everything is called in a URDF.
+        mechanism: (nbody,) the root of the mechanism that each body is of: see `mechanisms`.
+        roots: The roots of the mechanisms, each of which PyBullet has as one body.
         ghost: See `bullet_driven`; None until it is needed.
-        described: Gives the text and the files of a tree of bodies; see `_describe`.
+        described: Gives the text and the files of a mechanism; see `_describe`.
         file: The URDF that a world as it comes reads itself; None where one is written for it.
         weighed: Whether the links of a world as it comes get the inertias of `raw`, not those of
             their shapes. Its robot was a URDF of its own, in which no two links meet.
@@ -67,6 +66,8 @@ class Plan:
         self.raw, self.file, self.weighed = raw, file, weighed
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
+        self.mechanism = mechanisms(raw)
+        self.roots = [root for root in urdf.roots(raw) if self.mechanism[root] == root]
         self.ghost: Any = None
         # Weakly: a Plan in no circle is dropped at once, and with it its ghost, which is a world.
         self.described = cache(partial(Plan._describe, proxy(self)))
@@ -74,10 +75,18 @@ class Plan:
     def __reduce__(self) -> Any:
         return Plan, (self.raw, self.file, self.weighed)
 
+    def bodies(self, root: int) -> list[int]:
+        """Return the bodies of a mechanism, parents first; the world is one of its own."""
+        return np.flatnonzero(self.mechanism == root).tolist()
+
+    def _beside(self, root: int) -> tuple[int, ...]:
+        """Return the roots of the other trees of a mechanism."""
+        return tuple(r for r in urdf.roots(self.raw) if r != root and self.mechanism[r] == root)
+
     def driven(self, root: int) -> bool:
-        """Whether more than gravity and contact moves a tree: all but one free body by itself."""
+        """Whether more than gravity and contact moves it: all but one free body by itself."""
         raw = self.raw
-        bodies = urdf.tree(raw, root)
+        bodies = self.bodies(root)
         if not urdf.floats(raw, root) or len(bodies) > 1:
             return urdf.floats(raw, root) or any(urdf.axes(raw, body) for body in bodies)
         own = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
@@ -132,18 +141,18 @@ class Plan:
         return {g: hull_of(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
     def links(self, root: int) -> int:
-        """How many links a tree has in PyBullet, without those of sites: one a joint or a solid."""
-        bodies = urdf.tree(self.raw, root)
+        """How many links it has in PyBullet, without those of sites: one a joint or a solid."""
+        bodies = self.bodies(root)
         further = [s for s in self.surfaces.solids if s.part and s.body in bodies]
         return len(further) + sum(max(1, len(urdf.axes(self.raw, body))) for body in bodies)
 
     def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
-        """URDF of a tree of bodies as a world of that kind reads it.
+        """URDF of a mechanism as a world of that kind reads it.
 
         And the files that it names, by their names: the hulls of its geoms.
         """
         raw = self.raw
-        sites = int(np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root))
+        sites = int(np.count_nonzero(self.mechanism[raw.site_bodyid] == root))
         hulls = set(self.hulls if kind != "ghost" else ())
         if kind == "engine":  # as it comes, meshes come from their files
             meshes = {geom: int(raw.geom_dataid[geom]) for geom in hulls}
@@ -165,11 +174,12 @@ class Plan:
             tips=tips,
             hulls=frozenset(hulls),
             parts=_parts(solids),
+            beside=self._beside(root),
         )
         files = {
             urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
             for geom in hulls
-            if raw.body_rootid[raw.geom_bodyid[geom]] == root
+            if self.mechanism[raw.geom_bodyid[geom]] == root
         }
         return urdf.write(raw, root, dialect, self.names), files
 
@@ -233,40 +243,6 @@ def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array
         own = moving.T @ moving if slides else turning.T @ shape @ turning
         total += share[dof] * own
     return total
-
-
-def linear_sum(raw: mujoco.MjModel, tendon: int) -> tuple[Any, Array]:
-    """Joints and factors (k,) of a tendon's length; none of one that goes through space."""
-    part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
-    if (raw.wrap_type[part] != int(_WRAP.mjWRAP_JOINT)).any():
-        return [], np.zeros(0)
-    return raw.wrap_objid[part], raw.wrap_prm[part]
-
-
-def movers(raw: mujoco.MjModel, tendon: int) -> list[int]:
-    """The bodies whose joints change the length of a tendon."""
-    part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
-    by_kind = {
-        _WRAP.mjWRAP_JOINT: raw.jnt_bodyid,
-        _WRAP.mjWRAP_SITE: raw.site_bodyid,
-        _WRAP.mjWRAP_SPHERE: raw.geom_bodyid,
-        _WRAP.mjWRAP_CYLINDER: raw.geom_bodyid,
-    }
-    parts = zip(raw.wrap_type[part].tolist(), raw.wrap_objid[part], strict=True)
-    bodies = [int(by_kind[_WRAP(kind)][at]) for kind, at in parts if _WRAP(kind) in by_kind]
-    return [body for body in bodies if raw.body_treeid[body] >= 0]
-
-
-def ends_of(raw: mujoco.MjModel, eq: int) -> list[int]:
-    """The bodies that an equality constraint ties, of a kind that is known here; else none."""
-    kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
-    if kind in PLACES:
-        sites = raw.eq_objtype[eq] == SITE
-        return [int(raw.site_bodyid[end] if sites else end) for end in ends]
-    ends = [int(end) for end in ends if end >= 0]
-    if kind == _EQ.mjEQ_TENDON:
-        ends = [joint for end in ends for joint in linear_sum(raw, end)[0]]
-    return raw.jnt_bodyid[ends].tolist() if kind in _SUMS else []
 
 
 class Hull:

@@ -17,17 +17,9 @@ from ...measures.text import few
 from .contacts import NO_CONTACT, PLANE, damping_ratios
 from .drives import DYNAMICS, MUSCLE, in_force
 from .file import MOST_LINKS
-from .plan import (
-    ELLIPSOID,
-    HULLS,
-    MARGIN,
-    Plan,
-    ends_of,
-    linear_sum,
-    movers,
-    roughness,
-)
-from .urdf import roots
+from .plan import ELLIPSOID, HULLS, MARGIN, Plan, roughness
+from .ties import acting_tendons, ends_of, joints_of, linear_sum, movers, moving
+from .urdf import floats
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 # What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.
@@ -60,6 +52,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     if not plan.file:  # else it reads the file itself, and what it knows nothing of has no effect
         if as_it_comes:
             problems += _of_the_law(raw)
+        problems += _between_robots(plan)
         for found in (_of_bodies(plan), _of_actuators(raw), _of_ties(raw), _of_geoms(plan)):
             parts += found
     for part in parts:
@@ -128,7 +121,7 @@ def _of_joints(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
 
 def _of_bodies(plan: Plan) -> Iterator[UnsupportedPart]:
     large = np.zeros(plan.raw.nbody, dtype=bool)
-    for root in roots(plan.raw):
+    for root in plan.roots:
         large[root] = plan.links(root) > MOST_LINKS
     much = f"has more than {MOST_LINKS} joints and rigid parts"
     led = (plan.raw.body_mocapid[plan.raw.body_rootid] >= 0) & (plan.raw.body_jntnum > 0)
@@ -167,25 +160,65 @@ def _of_actuators(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
 
 
 def _of_ties(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
-    """Yield what of tendons goes through space, and what of equalities ties two trees."""
-    heavy, several = np.zeros((2, raw.ntendon), dtype=bool)
+    """Yield what tendons and equalities have, within one robot."""
+    heavy = np.zeros(raw.ntendon, dtype=bool)
     for tendon in range(raw.ntendon):
         heavy[tendon] = raw.tendon_armature[tendon] and not len(linear_sum(raw, tendon)[0])
-        several[tendon] = len(set(raw.body_rootid[movers(raw, tendon)])) > 1
     poly = raw.tendon_stiffnesspoly.any(axis=1) | raw.tendon_dampingpoly.any(axis=1)
-    strange, apart = np.zeros((2, raw.neq), dtype=bool)
+    strange = np.zeros(raw.neq, dtype=bool)
     for eq in np.flatnonzero(raw.eq_active0).tolist():
-        bodies = ends_of(raw, eq)
-        strange[eq] = not bodies
-        apart[eq] = len({int(raw.body_rootid[b]) for b in bodies if raw.body_treeid[b] >= 0}) > 1
+        strange[eq] = not ends_of(raw, eq)
     ranged = raw.tendon_actfrclimited.astype(bool)
     tendon, equality = partial(UnsupportedPart, "tendon"), partial(UnsupportedPart, "equality")
     yield tendon("armature of a spatial tendon", heavy, "has it")
-    yield tendon("tendon between trees", several, "is of joints of several trees")
     yield tendon("nonlinear tendon", poly, "has a spring or damper that is not linear")
     yield tendon("force range of a tendon", ranged, "has one")
     yield equality("equality constraint", strange, "is of a kind that is not known here")
-    yield equality("equality between trees", apart, "ties two trees of bodies")
+
+
+def _between_robots(plan: Plan) -> list[tuple[str, str]]:
+    """Return what ties two robots of which one floats, by the feature's name, in words."""
+    raw, problems = plan.raw, list[tuple[str, str]]()
+    for tendon in acting_tendons(raw):
+        bodies, (joints, _) = movers(raw, tendon), linear_sum(raw, tendon)
+        if len({int(plan.mechanism[body]) for body in bodies}) > 1:
+            ends = _ends_in_words(raw, joints.tolist(), bodies)
+            words = f"{_label(raw, 'tendon', tendon)} goes over {ends}, {_apart(plan, bodies)}; "
+            way_out = "let both stand on the world, leave it out, or run the file on MuJoCo"
+            problems.append(("tendon between trees", words + way_out))
+    for eq in np.flatnonzero(raw.eq_active0).tolist():
+        bodies = moving(raw, ends_of(raw, eq))
+        if len({int(plan.mechanism[body]) for body in bodies}) > 1:
+            ends = _ends_in_words(raw, joints_of(raw, eq), bodies)
+            words = f"{_label(raw, 'equality', eq)} ties {ends}, {_apart(plan, bodies)}; "
+            way_out = (
+                'let both stand on the world, switch it off (active="false"), or run the file on '
+                "MuJoCo"
+            )
+            problems.append(("equality between trees", words + way_out))
+    return problems
+
+
+def _ends_in_words(raw: mujoco.MjModel, joints: list[int], bodies: list[int]) -> str:
+    """Return the names of what a constraint ties: its joints, else its bodies."""
+    if joints:
+        return few([f"joint {_name(raw, 'joint', joint)}" for joint in joints], most=4)
+    return few([f"body {_name(raw, 'body', body)}" for body in dict.fromkeys(bodies)], most=4)
+
+
+def _apart(plan: Plan, bodies: list[int]) -> str:
+    """Say of which robots some bodies are, and which of these float."""
+    roots = dict.fromkeys(int(plan.mechanism[body]) for body in bodies)
+    robots = [str(_name(plan.raw, "body", root)) for root in roots]
+    afloat = [str(_name(plan.raw, "body", root)) for root in roots if floats(plan.raw, root)]
+    verb = "floats" if len(afloat) == 1 else "float"
+    return f"of the robots {few(robots, most=4)}, of which {few(afloat, most=4)} {verb}"
+
+
+def _label(raw: mujoco.MjModel, kind: str, number: int) -> str:
+    """Return "tendon sum" of one with a name, "a tendon without a name" of others."""
+    name = getattr(raw, kind)(number).name
+    return f"{kind} {name}" if name else f"the {kind} without a name"
 
 
 def _of_geoms(plan: Plan) -> Iterator[UnsupportedPart]:

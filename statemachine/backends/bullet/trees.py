@@ -17,10 +17,10 @@ _KINDS = {2: "spherical", 3: "planar"}
 
 
 class Tree:
-    """One tree of bodies in one world.
+    """One mechanism in one world: a tree of bodies, or several that stand on the world together.
 
     Attributes:
-        root: MuJoCo's id of its root.
+        root: MuJoCo's id of its root, of several trees that of the first.
         body: PyBullet's id of it.
         free: Whether it floats: its first joint is then the root's free joint.
         driven: Whether a law drives it, because it has joints, or more than gravity moves it.
@@ -39,16 +39,14 @@ class Tree:
         self.free = urdf.floats(raw, root)
         infos = joint_infos(client, body)
         indices = {info[12].decode(): info[0] for info in infos}
-        bodies = urdf.tree(raw, root)
+        bodies = plan.bodies(root)
         self.links = {b: indices.get(names.links[b], -1) for b in bodies}
         self.parts: dict[tuple[int, int], int] = {}
         for solid in plan.surfaces.solids:
             if solid.part and solid.body in self.links:
                 link, *_ = names.part(solid.body, solid.part)
                 self.parts[solid.body, solid.part] = indices.get(link, -1)
-        sites = [
-            s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
-        ]
+        sites = [s for s in range(raw.nsite) if root and raw.site_bodyid[s] in self.links]
         self.tips = {s: indices[names.tips[s]] for s in sites if names.tips[s] in indices}
         by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]

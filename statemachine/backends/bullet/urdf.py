@@ -57,6 +57,8 @@ class Dialect:
         padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
             J times `padding_shape` [kg m²] more inertia about its centre of mass, the
             link that a slide carries J [kg] more mass.
+        beside: Roots of other trees that stand on the same link "world", as the fingers of a
+            gripper whose palm is the world: one robot of a URDF.
     """
 
     capsules: bool = False
@@ -69,6 +71,7 @@ class Dialect:
     tips: bool = True
     hulls: frozenset[int] = frozenset()
     parts: Mapping[int, int] = field(default_factory=dict)
+    beside: tuple[int, ...] = ()
 
 
 def roots(raw: mujoco.MjModel) -> list[int]:
@@ -96,7 +99,7 @@ def floats(raw: mujoco.MjModel, root: int) -> bool:
 def write(
     raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect(), names: Names | None = None
 ) -> str:
-    """URDF of one tree of bodies.
+    """URDF of one tree of bodies, and of those that stand beside it.
 
     Args:
         raw: The compiled model.
@@ -112,10 +115,11 @@ def write(
     if on_world:
         light = floats(raw, root) * min(LIGHT, LIGHTEST * float(raw.body_subtreemass[root]))
         robot.append(_bare_link("world", light, 1e-3 * light * np.eye(3)))
-    for body in tree(raw, root):
+    bodies = [body for trunk in (root, *dialect.beside) for body in tree(raw, trunk)]
+    for body in bodies:
         robot.append(_link(raw, body, dialect, names))
         if body != root or on_world:
-            robot.extend(_joints(raw, body, root, dialect, names))
+            robot.extend(_joints(raw, body, dialect, names))
         geoms = range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body])
         for part in sorted({dialect.parts.get(geom, 0) for geom in geoms} - {0}):
             name, fixed = names.part(body, part)
@@ -124,7 +128,7 @@ def write(
             where = _origin(np.zeros(3), np.eye(3))
             robot.extend([link, _joint(fixed, "fixed", names.links[body], name, where)])
     for site in range(raw.nsite if dialect.tips else 0):
-        if raw.body_rootid[raw.site_bodyid[site]] == root and root:
+        if root and int(raw.site_bodyid[site]) in bodies:
             robot.extend(_tip(raw, site, names))
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
@@ -281,15 +285,13 @@ def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:
     return os.path.relpath(name, folder) if folder and os.path.isabs(name) else name
 
 
-def _joints(
-    raw: mujoco.MjModel, body: int, root: int, dialect: Dialect, names: Names
-) -> Iterator[Element]:
+def _joints(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[Element]:
     """The joints between a body and its parent, with massless links between them."""
     upper = int(raw.body_parentid[body])
-    parent = "world" if body == root else names.links[upper]
+    parent = names.links[upper] if upper else "world"
     turn = matrix_from_quat(raw.body_quat[body])
-    place = raw.body_pos[body] - (np.zeros(3) if body == root else anchor(raw, upper))
-    if body == root and floats(raw, root):
+    place = raw.body_pos[body] - anchor(raw, upper)  # of the world that is where it is
+    if not upper and floats(raw, body):
         turn, place = np.eye(3), np.zeros(3)
     joints = axes(raw, body)
     if not joints:

@@ -111,7 +111,7 @@ class World:
             self._of_file = FileTree(plan, plan.file.load(self.client), self.client)
             self.trees.append(self._of_file)
             return
-        for root in (0, *urdf.roots(self._raw)):
+        for root in (0, *plan.roots):
             if plan.driven(root) or kind != "ghost":
                 self._load(root, kind)
 

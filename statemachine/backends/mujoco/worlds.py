@@ -21,6 +21,7 @@ from ...interface.checks import check_vector, engine_steps, unsupported
 from ...interface.records import Errors, StateLayout
 from ...interface.worlds import WRITABLE, Worlds, check_memory, without
 from ..compiled import ENGINE_ERRORS
+from ..delays import hold, places_of, with_room_of
 from .alarms import (
     FATAL,
     AlarmError,
@@ -32,7 +33,6 @@ from .alarms import (
     pass_on,
     resets_itself,
 )
-from .delays import hold, places_of, with_room_of
 
 _STATE = mujoco.mjtState
 _NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
