@@ -92,7 +92,7 @@ def make_comparisons(folder: Path) -> list[Path]:
         print(f"comparing: {name} ...")
         run = run_sides(Request((name,)))
         left, right = run.traces
-        compared = compare(left, right)
+        compared = compare(left, right, robot=run.robot)
         page = comparison.page(compared, said=run.said, witness=witness(left, right))
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())

@@ -1,4 +1,4 @@
-"""What all comparisons share: contacts, moments, gaps, tolerances, numbers as text (`text`).
+"""What comparisons share: contacts, moments, gaps, floors, tolerances, numbers as text (`text`).
 
 Names are imported when they are first used: who asks what touches needs no tolerances.
 """
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .contacts import ContactNames, overlaps, same_pairs, together
+    from .floors import OF_A_RUN, RobotScale, places_of
     from .gaps import Deviation, Gap, JointPlaces, joint_gap
     from .moments import SAME, Common, at_moments, common_moments, nearest
     from .quantities import (
@@ -30,8 +31,10 @@ _HOMES = {
     "Deviation": "gaps",
     "Gap": "gaps",
     "JointPlaces": "gaps",
+    "OF_A_RUN": "floors",
     "QUANTITIES": "quantities",
     "Quantity": "quantities",
+    "RobotScale": "floors",
     "SAME": "moments",
     "Tolerance": "quantities",
     "amount": "quantities",
@@ -45,6 +48,7 @@ _HOMES = {
     "nearest": "moments",
     "overlaps": "contacts",
     "parse_tolerances": "quantities",
+    "places_of": "floors",
     "same_pairs": "contacts",
     "together": "contacts",
     "tolerance_of": "quantities",
@@ -53,6 +57,7 @@ _HOMES = {
 
 __all__ = [
     "COUNT",
+    "OF_A_RUN",
     "QUANTITIES",
     "SAME",
     "Common",
@@ -61,6 +66,7 @@ __all__ = [
     "Gap",
     "JointPlaces",
     "Quantity",
+    "RobotScale",
     "Tolerance",
     "amount",
     "at_moments",
@@ -73,6 +79,7 @@ __all__ = [
     "nearest",
     "overlaps",
     "parse_tolerances",
+    "places_of",
     "same_pairs",
     "together",
     "tolerance_of",

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import BadInputError, UnsupportedError, check_name
 from ..interface import DERIVED, Array, Contacts, Data
 from ..typed_numbers import typed_float
+from .floors import RobotScale
 from .text import milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
@@ -19,6 +20,8 @@ _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as small servos have"
 _LEVER = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
 _ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts
+# J, N; of a robot whose weight is not known, as of a recorded run whose file is not here
+_LEAST_ENERGY, _LEAST_FORCE = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,7 @@ def tolerance_of(
     reach: float,
     timestep: float,
     given: Mapping[str, float] | None = None,
+    scale: RobotScale | None = None,
 ) -> Tolerance:
     """Return the tolerance of a quantity in two runs.
 
@@ -128,6 +132,8 @@ def tolerance_of(
         reach: How far a fingertip gets from the foot of its arm [m].
         timestep: The longer of the two [s].
         given: Values by kind that win over ours [SI].
+        scale: Of the robot, below whose floors no energy and no force differs; None where that is
+            not known.
     """
     # A site that has hardly a lever arm goes where its foot goes, as a slide does.
     known = QUANTITIES["slide" if kind == "tip" and reach < _LEVER else kind]
@@ -141,22 +147,48 @@ def tolerance_of(
             f"what one count of a 12-bit encoder moves it, at a reach of {reach:.2f} m",
         )
     if kind == "energy":
-        change = max(_change(left), _change(right))
-        return Tolerance(
-            max(_ENERGY * change, 1e-9),
-            f"1 % of {rounded(change, 'J')}, by which the energy changes in the run",
-        )
+        return _of_energy(max(_change(left), _change(right)), scale)
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
-        acting = max(_mean_acting(left), _mean_acting(right))
-        return Tolerance(
-            max(_FORCE * acting, 1e-6),
-            "5 % of the mean force while they touch",
-        )
+        return _of_force(max(_mean_acting(left), _mean_acting(right)), scale)
     return Tolerance(
         timestep * (1 + 1e-9),
         f"one timestep, {milliseconds(timestep, 3)}: an engine looks at contacts once in a step",
     )
+
+
+def _of_energy(change: float, scale: RobotScale | None) -> Tolerance:
+    """Return the tolerance of an energy that changes by so much in a run [J]."""
+    share = Tolerance(
+        _ENERGY * change, f"1 % of {rounded(change, 'J')}, by which the energy changes in the run"
+    )
+    floor = _LEAST_ENERGY if scale is None else scale.energy
+    return _not_below(floor, share, "times its size", scale)
+
+
+def _of_force(acting: float, scale: RobotScale | None) -> Tolerance:
+    """Return the tolerance of a normal force that is so much on average while it acts [N]."""
+    share = Tolerance(_FORCE * acting, "5 % of the mean force while they touch")
+    return _not_below(_LEAST_FORCE if scale is None else scale.force, share, "", scale)
+
+
+def _not_below(floor: float, share: Tolerance, times: str, scale: RobotScale | None) -> Tolerance:
+    """Return a tolerance that is a share of a quantity, or the floor where that is higher.
+
+    Args:
+        floor: In the unit of the tolerance.
+        share: The tolerance.
+        times: What the weight is multiplied by in the floor, in words; "" for nothing.
+        scale: The robot; None where its weight is not known.
+    """
+    if share.value >= floor:
+        return share
+    if scale is None:
+        return Tolerance(floor, "rounding, whatever the robot weighs, which is not known")
+    of = f"the robot's weight, {rounded(scale.weight, 'N')}"
+    if times:
+        of += f", {times}, {rounded(scale.size, 'm')}"
+    return Tolerance(floor, f"a ten-millionth (2⁻²³) of {of}: less moves nothing")
 
 
 def _change(energies: Array) -> float:

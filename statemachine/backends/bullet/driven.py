@@ -195,7 +195,7 @@ class DrivenWorld(HiddenWorld):
                 values["qfrc_contact"][own] = dense.times(inertia, rate) + bias
             pushed = values["qfrc_contact"][own] - bias
             values["qacc"][own] = dense.solved(dense.factored(inertia), pushed)
-        for part in ("contact", "friction", "limit"):
+        for part in ("contact", "friction", "limit", "equality"):
             values["qfrc_constraint"] += values[f"qfrc_{part}"]
         return values
 

@@ -178,7 +178,7 @@ class Law:
             "qfrc_friction": friction,
             "qfrc_limit": limit,
             "qfrc_contact": self.contact,
-            "qfrc_constraint": equality,  # and what the others come to
+            "qfrc_equality": equality,
         }
 
     def command(self, ctrl: Array) -> None:

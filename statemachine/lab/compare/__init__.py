@@ -1,7 +1,7 @@
 """Where two runs part, and by how much: traces of any two engines, quantity by quantity.
 
     run = run_sides("hold")
-    comparison = compare(run.left, run.right)
+    comparison = compare(run.left, run.right, robot=run.robot)
     comparison.agrees, comparison.agreements
 
 A side is a file, an engine and options, typed or from Python:

@@ -19,6 +19,7 @@ from ...kinematics import Kinematics, shared_joints
 from ...measures import (
     QUANTITIES,
     Deviation,
+    RobotScale,
     Tolerance,
     common_moments,
     distances,
@@ -186,6 +187,7 @@ def compare(
     *,
     tolerances: Mapping[str, float] | None = None,
     tip: str | None = None,
+    robot: RobotScale | None = None,
 ) -> Comparison:
     """Compare two traces of models with the same names.
 
@@ -194,6 +196,8 @@ def compare(
         right: Another, of any engine; timesteps may differ.
         tolerances: By kind of quantity [SI], instead of ours.
         tip: The site to compare; by default gripperframe, else the last one.
+        robot: How heavy and how large the robot is, below whose floors no energy and no force
+            differs, as `SidesRun.robot` tells; None where that is not known.
 
     Raises:
         TraceError: They share no joint, or too few moments.
@@ -208,7 +212,9 @@ def compare(
         reach = 0.0
         if curve.kind == "tip":
             reach = max(_reach(left, curve), _reach(right, curve))
-        allowed = tolerance_of(curve.kind, curve.left, curve.right, reach, longest, tolerances)
+        allowed = tolerance_of(
+            curve.kind, curve.left, curve.right, reach, longest, tolerances, robot
+        )
         agreements.append(_agreement_of(curve, allowed))
     common = common_moments(left.time, right.time, (left.timestep, right.timestep))
     labels = labels_of(left.header, right.header)

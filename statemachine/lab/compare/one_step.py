@@ -28,6 +28,8 @@ from ...interface import (
     set_state,
     step,
 )
+from ...measures import RobotScale
+from ...measures.floors import moving_bodies
 from ..recordings import Rerun
 from ..recordings.recorder import put_row
 from ..runs.drive import Progress, silent
@@ -52,12 +54,13 @@ class StageGap:
         unit: Of the figures; "" where there are none.
         scale: Its usual size on the two sides [unit]: the median of its largest entry over the
             moments at which that is at least a thousandth of what it ever is.
-        tolerance: What does not count [unit].
+        tolerance: What does not count of the scale [unit].
+        floor: What does not count whatever the scale is, of the element that differs most [unit].
         null: How far the left side, put back to its own states, gets from its own run [unit].
         worst: The largest difference [unit].
         at: When that is [s from the start]; None where there is no difference.
         where: The joint, body or pair to look at then.
-        beyond: At how many moments it is beyond the tolerance and beyond the null.
+        beyond: At how many moments it is beyond the tolerance, the floor and the null.
         first: The first of them [s]; None if there is none.
         leads: At how many of them no earlier stage is, so that it has a cause of its own.
     """
@@ -68,6 +71,7 @@ class StageGap:
     unit: str = ""
     scale: float = 0.0
     tolerance: float = 0.0
+    floor: float = 0.0
     null: float = 0.0
     worst: float = 0.0
     at: float | None = None
@@ -109,6 +113,7 @@ class OneStep:
         every: Each so many-th row of the run.
         until: The time of the last of them [s].
         relative: The tolerance, relative to the scale of a stage.
+        robot: How heavy and how large the robot is, for what does not count whatever a scale is.
         stages: In the order in which a step computes them.
         first: The first of them that differs at any moment; None if none does.
         spikes: The moments that stand out, the largest first.
@@ -120,6 +125,7 @@ class OneStep:
     every: int
     until: float
     relative: float
+    robot: RobotScale
     stages: tuple[StageGap, ...]
     first: StageGap | None
     spikes: tuple[Spike, ...]
@@ -184,7 +190,8 @@ def one_step(
             times.append(float(inputs["time"][k] - inputs["time"][0]))
             progress(k / rows)
     progress(1.0)
-    measured = measures(reader, readings, relative)
+    robot = _scale_of(matched, [reading for reading, _, _ in readings])
+    measured = measures(reader, readings, relative, robot)
     leading = _leading(measured, len(times))
     stages = _gaps(measured, times, Counter(stage for stage, _ in leading))
     first = next((gap for gap in stages if gap.beyond), None)
@@ -193,12 +200,30 @@ def one_step(
         every=every,
         until=times[-1] if times else 0.0,
         relative=relative,
+        robot=robot,
         stages=stages,
         first=first,
         spikes=_spikes(measured, times, leading),
         primed=primed,
         notes=_notes(matched, failed),
     )
+
+
+def _scale_of(matched: Matched, readings: Sequence[StepReading]) -> RobotScale:
+    """Return how heavy and how large the robot is: the lighter side, where the left starts.
+
+    Args:
+        matched: Both sides.
+        readings: Of the left side; without any it has no size.
+    """
+    positions = np.zeros((0, 3))
+    if readings:
+        moving = moving_bodies(matched.left)
+        bodies = [solid.left for solid in matched.solids[1:]]
+        sites = [int(matched.left.site_bodyid[site]) for site, _ in matched.sites]
+        positions = readings[0].values[0][np.isin([*bodies, *sites], sorted(moving))]
+    left, right = (RobotScale.of(model, positions) for model in (matched.left, matched.right))
+    return left.smaller(right)
 
 
 def _states(
@@ -270,30 +295,34 @@ def _weight(gap: StageGap) -> tuple[bool, float]:
     """Return what the units of one stage are ranked by."""
     if not gap.worst or gap.stage == FORCE:
         return gap.beyond > 0, float(gap.worst > 0)
-    return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
+    limit = max(gap.tolerance, gap.floor)
+    return gap.beyond > 0, gap.worst / limit if limit else np.inf
 
 
 def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
     """Return how far apart the sides are in one unit of a stage; no leads are counted yet."""
-    place = np.unravel_index(int(np.argmax(measure.apart)), measure.apart.shape)
-    row, worst = int(place[0]), float(measure.apart[place])
+    row, element = measure.worst
+    worst = float(measure.apart[row, element])
     at, where = None, ""
     if worst:
         at, where = times[row], measure.culprit(row)
     null = float(measure.null.max())
+    floor = float(measure.floors[element])
     hits = np.flatnonzero(measure.beyond.any(axis=1)).tolist()
+    first = times[hits[0]] if hits else None
     return StageGap(
         stage=measure.stage,
         told=True,
         unit=measure.unit,
         scale=measure.scale,
         tolerance=measure.tolerance,
+        floor=floor,
         null=null,
         worst=worst,
         at=at,
         where=where,
         beyond=len(hits),
-        first=times[hits[0]] if hits else None,
+        first=first,
     )
 
 

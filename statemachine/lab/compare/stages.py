@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ...engines import room
 from ...interface import Array, Data, Ints, JointType, Model, forward, step
-from ...measures import ContactNames
+from ...measures import ContactNames, RobotScale
+from ...measures.floors import SHARE
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings.header import labels_of_joints
 from ..recordings.recorder import array_or_nan, is_stale
@@ -33,6 +34,7 @@ FORCES = ("bias", "actuator", "passive", FORCE, "other constraints")
 _WORDS = {"qfrc_friction": "dry friction", "qfrc_limit": "limit", "qfrc_equality": "equality"}
 _UNITS = ("m", "rad", "kg·m²", "kg·m", "kg", "N·m", "N", "rad/s²", "m/s²")
 _LEAST = 1e-3  # of the largest: a size that is less is not usual
+_MASS_COLUMN = 2  # among those of a StageReader, behind positions and rotations
 
 
 class StageColumn(NamedTuple):
@@ -74,6 +76,14 @@ class StageReader:
         self.columns = [positions, rotations, _mass_column(names, turns)]
         self.columns += [_force_column(stage, names, turns) for stage in (*ARRAYS, AFTER)]
         self._contact_names = _contact_names(matched)
+
+    def inertias(self, reading: StepReading) -> Array:
+        """Return the inertia (n,) of each degree of freedom in a step, as it was read [kg, kg·m²].
+
+        It is the diagonal of the mass matrix; NaN where an engine does not tell it.
+        """
+        diagonal = self._upper[0] == self._upper[1]
+        return reading.values[_MASS_COLUMN][diagonal, 0]
 
     def prime(self, side: int, data: Data, before: dict[str, Array]) -> str:
         """Let a Data know of the step before, and say what of it its engine takes; "" for nothing.
@@ -239,7 +249,8 @@ class StageMeasure:
         apart: (n, k) how far the two sides are apart.
         null: (n, k) how far the left side is from itself.
         scale: Its usual size, on either side.
-        tolerance: What does not count.
+        floors: (k,) what counts of no element, whatever the scale is: see `RobotScale`.
+        tolerance: What does not count of the scale.
     """
 
     stage: str
@@ -248,12 +259,21 @@ class StageMeasure:
     apart: Array
     null: Array
     scale: float
+    floors: Array
     tolerance: float = 0.0
 
     @property
     def beyond(self) -> NDArray[np.bool_]:
-        """(n, k) what is beyond the tolerance, and beyond the null."""
-        return self.apart > np.maximum(self.tolerance, self.null)
+        """(n, k) what is beyond the tolerance, beyond its floor, and beyond the null."""
+        return self.apart > np.maximum(np.maximum(self.tolerance, self.floors), self.null)
+
+    @property
+    def worst(self) -> tuple[int, int]:
+        """The moment and the element that differ most: of those that are beyond, if any are."""
+        beyond = self.beyond
+        apart = np.where(beyond, self.apart, 0.0) if beyond.any() else self.apart
+        row, element = np.unravel_index(int(np.argmax(apart)), apart.shape)
+        return int(row), int(element)
 
     def culprit(self, row: int) -> str:
         """What to look at in a moment: the element that differs most, or where that comes from.
@@ -275,13 +295,15 @@ def measures(
     reader: StageReader,
     readings: Sequence[tuple[StepReading, StepReading, StepReading]],
     relative: float,
+    robot: RobotScale,
 ) -> list[StageMeasure]:
-    """What both sides tell, by stage and unit.
+    """Return what both sides tell, by stage and unit.
 
     Args:
         reader: That read them.
         readings: Of each moment: the left side as it runs, put back to its State, and the right.
         relative: What does not count, of the scale.
+        robot: How heavy and how large the robot is.
     """
     if not readings:
         return []
@@ -289,19 +311,23 @@ def measures(
     running = [as_it_runs for as_it_runs, _, _ in readings]
     left = [put_back for _, put_back, _ in readings]
     right = [on_the_right for _, _, on_the_right in readings]
+    inertias = _least_inertias(reader, [*left, *right])
     by_unit: list[StageMeasure] = []
     for number, column in enumerate(reader.columns):
         sides = [_values(side, number) for side in (running, left, right)]
-        by_unit += _by_unit(column, *sides)
+        by_unit += _by_unit(column, _floors(column, robot, inertias), *sides)
     pairs = _pairs(readings)
     if pairs:
         contacts = [_contacts_of(side, pairs) for side in (running, left, right)]
         depths = [side[:, :, :1] for side in contacts]
         forces = [side[:, :, 1:] for side in contacts]
-        by_unit += _by_unit(StageColumn(FOUND, pairs, ["m"] * len(pairs)), *depths)
-        by_unit += _by_unit(StageColumn(FORCE, pairs, ["N"] * len(pairs)), *forces)
-    # What is nothing but rounding, as the contact force of a run in which nothing touches,
-    # is held against the other forces, and accelerations against what forces give.
+        count = len(pairs)
+        found = StageColumn(FOUND, pairs, ["m"] * count)
+        force = StageColumn(FORCE, pairs, ["N"] * count)
+        by_unit += _by_unit(found, np.full(count, robot.length), *depths)
+        by_unit += _by_unit(force, np.full(count, robot.force), *forces)
+    # What is small beside the other forces, as the contact force of a run in which next to nothing
+    # touches, is held against these, and accelerations against what forces give.
     least = {unit: _largest_scale(by_unit, FORCES, unit) for unit in ("N·m", "N")}
     for unit, force, mass in (("rad/s²", "N·m", "kg·m²"), ("m/s²", "N", "kg")):
         largest = _largest_scale(by_unit, (MASS,), mass)
@@ -311,6 +337,42 @@ def measures(
             measure.scale = max(measure.scale, _LEAST * least[measure.unit])
         measure.tolerance = relative * measure.scale
     return by_unit
+
+
+def _least_inertias(reader: StageReader, readings: Sequence[StepReading]) -> Array:
+    """Return the smallest inertia (n,) of each degree of freedom; 0 where none is told."""
+    inertias = np.array([reader.inertias(reading) for reading in readings])
+    return np.nan_to_num(inertias.min(axis=0))
+
+
+def _floors(column: StageColumn, robot: RobotScale, inertias: Array) -> Array:
+    """Return what counts of no element (k,) of a column.
+
+    A force has that of an acceleration, times the inertia of its degree of freedom: so a light
+    wrist has a lower one than the shoulder. An entry of the mass matrix has a share of both of its
+    degrees of freedom.
+
+    Args:
+        column: Not one of contacts.
+        robot: How heavy and how large the robot is.
+        inertias: (n,) of its degrees of freedom.
+    """
+    if column.stage == MASS:
+        rows, columns = np.triu_indices(len(inertias))
+        return SHARE * np.sqrt(inertias[rows] * inertias[columns])
+    by_unit = {
+        "m": robot.length,
+        "rad": robot.angle,
+        "m/s²": robot.acceleration,
+        "N": robot.acceleration,
+        "rad/s²": robot.angular_acceleration,
+        "N·m": robot.angular_acceleration,
+    }
+    floors = np.array([by_unit[unit] for unit in column.units])
+    if column.stage in FORCES:
+        arrays = len(ARRAYS[column.stage])
+        floors *= np.tile(inertias, arrays)
+    return floors
 
 
 def _values(side: Sequence[StepReading], number: int) -> Array:
@@ -338,9 +400,17 @@ def _contacts_of(side: Sequence[StepReading], pairs: Sequence[str]) -> Array:
 
 
 def _by_unit(
-    column: StageColumn, running: Array, left: Array, right: Array
+    column: StageColumn, floors: Array, running: Array, left: Array, right: Array
 ) -> Iterator[StageMeasure]:
-    """The elements (n, k, size) of each unit, those of them that both sides tell."""
+    """Yield the elements (n, k, size) of each unit, those of them that both sides tell.
+
+    Args:
+        column: What they are.
+        floors: (k,) what counts of none of them.
+        running: Of the left side as it runs.
+        left: Of the left side, put back to its states.
+        right: Of the right side.
+    """
     for unit in _UNITS:
         places = [k for k, of in enumerate(column.units) if of == unit]
         apart = _distances(left[:, places], right[:, places])
@@ -348,13 +418,15 @@ def _by_unit(
         if len(known):
             null = np.nan_to_num(_distances(running[:, places], left[:, places]))
             names = [column.names[places[k]] for k in known.tolist()]
+            sizes = _sizes(column.stage, left[:, places], right[:, places])
             yield StageMeasure(
                 column.stage,
                 unit,
                 names,
                 apart[:, known],
                 null[:, known],
-                _usual_size(_sizes(column.stage, left[:, places], right[:, places])),
+                scale=_usual_size(sizes),
+                floors=floors[places][known],
             )
 
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ...backends import BackendChoice, parse_backend
+from ...backends import BackendChoice, load, parse_backend
 from ...engines import room
 from ...errors import BadInputError, MissingEngineError, StateMachineError, TraceError
 from ...installed import DEFAULT
 from ...interface import Model
-from ...measures import common_moments
+from ...measures import RobotScale, common_moments, places_of
 from ...measures.text import command, milliseconds
 from ...release_names import engine_of
 from ..recordings import (
+    Header,
     Rerun,
     SideStart,
     Trace,
@@ -84,6 +86,21 @@ class SidesRun:
         """The runs of the left and the right."""
         return self.left, self.right
 
+    @cached_property
+    def robot(self) -> RobotScale | None:
+        """How heavy and how large the robot is, of two sides the smaller; None if not known.
+
+        Of a recorded run the file is read again, if it is here.
+        """
+        scales: list[RobotScale] = []
+        for trace, rerun in zip(self.traces, self.reruns, strict=True):
+            model = _recorded_model(trace.header) if rerun is None else rerun.model
+            if model is None or "xpos" not in trace or "site_xpos" not in trace:
+                return None
+            places = places_of(model, trace["xpos"][0], trace["site_xpos"][0])
+            scales.append(RobotScale.of(model, places))
+        return scales[0].smaller(scales[1])
+
     @property
     def unmatched(self) -> tuple[str, ...]:
         """What could not be matched, and what was matched by more than its name."""
@@ -93,6 +110,15 @@ class SidesRun:
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
+
+
+def _recorded_model(header: Header) -> Model | None:
+    """Return the model that a trace was recorded of; None where its file is not here."""
+    try:
+        file, is_the_same = model_file(header)
+        return load(file) if is_the_same else None
+    except StateMachineError:
+        return None
 
 
 def prepare_sides(

@@ -305,6 +305,8 @@ class _Moments:
         until: The last of them [s].
         primed: What of the step before the right side was given.
         relative: The tolerance, relative to the scale of a stage.
+        weight: Of the robot, whose share is no difference either.
+        size: Of the robot.
     """
 
     moments: int
@@ -312,6 +314,8 @@ class _Moments:
     until: float
     primed: str
     relative: str
+    weight: str
+    size: str
 
 
 def _moments_of(result: OneStep) -> _Moments:
@@ -321,6 +325,8 @@ def _moments_of(result: OneStep) -> _Moments:
         until=result.until,
         primed=result.primed if result.primed else "nothing",
         relative=figure(result.relative),
+        weight=quantity(result.robot.weight, "N"),
+        size=quantity(result.robot.size, "m"),
     )
 
 
@@ -407,7 +413,8 @@ def _stage_cells(gap: StageGap) -> tuple[str, ...]:
             at = moment(gap.at)
     elif gap.worst:
         largest = "≈ 0"
-    null, tolerance = quantity(gap.null, gap.unit), quantity(gap.tolerance, gap.unit)
+    null = quantity(gap.null, gap.unit)
+    tolerance = quantity(max(gap.tolerance, gap.floor), gap.unit)
     return (
         str(gap.beyond),
         str(gap.leads),

@@ -7,17 +7,13 @@ from dataclasses import dataclass
 
 from ...errors import unknown_name
 from ...interface import Model
-from ...measures import Deviation
+from ...measures import OF_A_RUN, Deviation
 from ..compare.perturbed import against_floor
 from ..runs.robot import moved_by_actuators
 from .gap import Measure, size_of, touched_at_start
 from .request import WhyRequest
 from .trials import Trials
 from .verdict import gap_state
-
-# What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
-# 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
-ROUNDING = {"rad": 1e-8, "m": 1e-9}
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,7 @@ def explained_gap(
         first=first,
         size=size_of(first[quantity], measure),
         floor=floors.get(quantity, 0.0),
-        negligible=ROUNDING[trials.ruler.units[quantity]],
+        negligible=OF_A_RUN[trials.ruler.units[quantity]],
         tolerance=trials.ruler.tolerance(quantity),
     )
 
@@ -113,7 +109,7 @@ def _quantity(
     above = {
         name: size / ruler.tolerance(name)
         for name, size in sizes.items()
-        if size > ROUNDING[ruler.units[name]]
+        if size > OF_A_RUN[ruler.units[name]]
     }
     beyond = above
     for chance in ("beyond", "cannot be told"):

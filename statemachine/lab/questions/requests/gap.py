@@ -98,10 +98,10 @@ def answer(request: CompareRequest, reporter: Reporter = QUIET) -> CompareResult
     """
     with reporter.stage("compare") as progress:
         run = run_sides(request.run, progress)
-    comparison = compare(*run.traces, tolerances=request.tolerances)
+    comparison = compare(*run.traces, tolerances=request.tolerances, robot=run.robot)
     played = None
     if run.played is not run.right:
-        played = compare(run.left, run.played, tolerances=request.tolerances)
+        played = compare(run.left, run.played, tolerances=request.tolerances, robot=run.robot)
     fingertips = witness(*run.traces, run.file)
     floor = _floor(request, run, comparison, reporter)
     return CompareResult(request, run, comparison, played, fingertips, floor)

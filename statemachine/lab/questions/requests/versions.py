@@ -54,7 +54,7 @@ def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> list[Compari
 
     def compared(pair: tuple[str, str], progress: Progress = silent) -> Comparison:
         run = run_sides(replace(request.run, backends=pair), progress)
-        return compare(*run.traces, tolerances=request.tolerances)
+        return compare(*run.traces, tolerances=request.tolerances, robot=run.robot)
 
     if request.bisect:
         backends = releases.around_a_change(

@@ -1,0 +1,133 @@
+"""What two figures of a robot may differ by and still be the same: floors that are absolute.
+
+A tolerance that is a share of the quantity itself says nothing where that quantity is rounding: of
+8e-34 N·m a millionth is less still. So nothing is called a difference that is below a share of the
+robot's own weight and size. The share of a force is 2⁻²³, a ten-millionth: what a number in single
+precision keeps, in which many simulators hold their state. A force of that share of its weight
+moves a robot by 2 µm in 2 s, whatever the weight is; a mass of 0.1 g more on an arm of 6 N weighs
+a thousand times as much.
+
+A place has another share, 1e-9, for a depth makes a force: a contact with MuJoCo's default solref
+answers a depth d with an acceleration of d/(0.95 · 0.02 s)² = 2770 s⁻² · d (its manual,
+"Computation", solver parameters), so that g · 2⁻²³ is that of 4e-10 m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..interface import Array, Model
+
+SHARE = 2.0**-23  # of a weight, of g, of an inertia: the precision of a float32
+PLACES = 1e-9  # of a size; of a radian
+GRAVITY = 9.81  # m/s², whatever that of the model is: a robot in orbit is as heavy to move
+# What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
+# 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
+OF_A_RUN = {"rad": 1e-8, "m": 1e-9}
+_UNKNOWN_SIZE = 1.0  # m; of one point that moves
+
+
+@dataclass(frozen=True)
+class RobotScale:
+    """How heavy and how large a robot is, and the floors that follow.
+
+    Attributes:
+        mass: Of all that can move [kg].
+        size: The diagonal of the box around it [m], above zero.
+    """
+
+    mass: float
+    size: float
+
+    @classmethod
+    def of(cls, model: Model, positions: Array) -> RobotScale:
+        """Return the scale of a Model.
+
+        Args:
+            model: Whose masses they are.
+            positions: (n, 3) where what moves is at one moment, its bodies and sites [m]. Of one
+                point alone the shapes count, where the Model was compiled.
+        """
+        moving = moving_bodies(model)
+        mass = float(model.body_mass[sorted(moving)].sum())
+        size = 0.0
+        if len(positions):
+            size = float(np.linalg.norm(np.ptp(positions, axis=0)))
+        if model.compiled is not None and moving:
+            geoms = np.isin(model.geom_bodyid, sorted(moving))
+            size = max(size, 2 * float(model.compiled.geom_rbound[geoms].max(initial=0.0)))
+        return cls(mass, size if size > 0 else _UNKNOWN_SIZE)
+
+    def smaller(self, other: RobotScale) -> RobotScale:
+        """Return the scale of two robots that are compared: floors are those of the smaller one."""
+        return RobotScale(min(self.mass, other.mass), min(self.size, other.size))
+
+    @property
+    def weight(self) -> float:
+        """Its weight [N]."""
+        return self.mass * GRAVITY
+
+    @property
+    def force(self) -> float:
+        """Floor of a contact's force [N]; what it does to a joint has a floor of its own."""
+        return SHARE * self.weight
+
+    @property
+    def energy(self) -> float:
+        """Floor of a change of energy [J]: what lifts the whole robot by a share of its size."""
+        return SHARE * self.weight * self.size
+
+    @property
+    def acceleration(self) -> float:
+        """Floor of the acceleration of what slides [m/s²].
+
+        The floor of a force on it is that, times the inertia of its degree of freedom.
+        """
+        return SHARE * GRAVITY
+
+    @property
+    def angular_acceleration(self) -> float:
+        """Floor of the acceleration of what turns [rad/s²].
+
+        It is that of a pendulum as long as the robot. The floor of a torque is that, times the
+        inertia of its degree of freedom: a light wrist has a lower one than the shoulder.
+        """
+        return SHARE * GRAVITY / self.size
+
+    @property
+    def length(self) -> float:
+        """Floor of a place, or of a depth [m]."""
+        return PLACES * self.size
+
+    @property
+    def angle(self) -> float:
+        """Floor of a rotation [rad]."""
+        return PLACES
+
+
+def moving_bodies(model: Model) -> frozenset[int]:
+    """Return the ids of the bodies that a joint moves, by itself or with what carries them."""
+    moving = set(model.jnt_bodyid.tolist())
+    for body in range(1, model.nbody):  # parents come before children
+        if int(model.body_parentid[body]) in moving:
+            moving.add(body)
+    return frozenset(moving)
+
+
+def places_of(model: Model, xpos: Array, site_xpos: Array) -> Array:
+    """Return where what moves is (n, 3) [m]: the origins of its bodies, and its sites.
+
+    The body that carries the first joint counts, too: it is the robot's foot.
+
+    Args:
+        model: Whose bodies and sites they are.
+        xpos: (nbody, 3) of all bodies.
+        site_xpos: (nsite, 3) of all sites.
+    """
+    moving = moving_bodies(model)
+    feet = {int(model.body_parentid[body]) for body in moving} - {0}
+    bodies = sorted(moving | feet)
+    sites = np.isin(model.site_bodyid, bodies)
+    return np.concatenate([xpos[bodies].reshape(-1, 3), site_xpos[sites].reshape(-1, 3)])
