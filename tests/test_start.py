@@ -13,7 +13,7 @@ from unittest.mock import Mock
 import pytest
 
 import statemachine as sm
-from statemachine.cli.main import main as command_line
+from statemachine.cli import main as command_line
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.installed import ENGINES, require
 
