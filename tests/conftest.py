@@ -25,8 +25,8 @@ import pytest
 
 from statemachine import backends, load, releases
 from statemachine.backends import backend_engine, backend_names
+from statemachine.cli import main
 from statemachine.cli.common import FAULT
-from statemachine.cli.main import main
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.session import take
 from statemachine.errors import EngineWarning, MissingEngineError, StateMachineError

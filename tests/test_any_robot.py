@@ -17,7 +17,7 @@ import pytest
 
 import statemachine as sm
 from statemachine import errors, models, robot_packages
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.session import page_of_lesson, take
 from statemachine.lab.compare import compare

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from statemachine.atomic_files import csv_text, replace_csv
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.course.grading import classroom
 from statemachine.course.grading.class_table import ClassEntry, few_words, read, rows_of
 from statemachine.course.grading.classroom import (

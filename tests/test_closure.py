@@ -25,7 +25,7 @@ sm.forward(model, data)
 state = sm.get_state(model, data)
 sm.set_state(model, data, state)
 """
-LESSON = "from statemachine.cli.main import main\nmain(['lesson', 'gravity'])\n"
+LESSON = "from statemachine.cli import main\nmain(['lesson', 'gravity'])\n"
 
 
 def _statements(file: Path) -> int:

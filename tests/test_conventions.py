@@ -13,7 +13,7 @@ import pytest
 from rich.cells import cell_len
 
 from statemachine import engines
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.engines import room, samples
 from statemachine.engines.mujoco import conventions as mujoco_conventions
 from statemachine.engines.samples import TREE
@@ -541,7 +541,7 @@ def test_all_engines_are_missing(cli: Cli, without: Any) -> None:
 
 def test_a_call_that_fails_is_the_exit_code() -> None:
     done = in_its_own_python(
-        "import mujoco, sys\nfrom statemachine.cli.main import main\n"
+        "import mujoco, sys\nfrom statemachine.cli import main\n"
         "mujoco.mj_forward = lambda m, d: None\n"
         "sys.exit(main(('conventions', '--calls', '--backend', 'mujoco')))",
         ROOT,

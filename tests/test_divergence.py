@@ -12,7 +12,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends import pybullet_backend
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
 from statemachine.lab.compare import Request, run_sides

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.lab.recordings import RunMetadata, RunStart, read, record, write
 
 from .conftest import assert_has, written, written_all

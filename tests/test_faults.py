@@ -14,7 +14,7 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
-from statemachine.cli import main as command_line
+from statemachine import cli as command_line
 from statemachine.course.grading.faults import FAULTS, Fault, run
 from statemachine.course.grading.faults.patches import PATCHES
 from statemachine.course.grading.faults.run import Examination, FailedTest, FaultTrial, examine

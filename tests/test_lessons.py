@@ -32,7 +32,7 @@ from rich.cells import cell_len
 
 import statemachine as sm
 from statemachine.cli import lesson as lesson_command
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.course import asking, quiz
 from statemachine.course.lessons import LESSONS, PATH, module, worlds
 from statemachine.course.lessons.request import LessonRequest

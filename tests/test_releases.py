@@ -25,7 +25,7 @@ import pytest
 import statemachine as sm
 from statemachine import conformance, releases
 from statemachine.backends.served.release_backend import ServedEngine, Server, served
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.errors import (
     BadInputError,
     DivergedError,

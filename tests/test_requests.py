@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main as cli
+from statemachine import cli
 from statemachine.course.grading.request import CheckRequest, FaultsRequest
 from statemachine.course.lessons.request import LessonRequest
 from statemachine.errors import StateMachineError

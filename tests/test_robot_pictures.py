@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main as cli
+from statemachine import cli
 from statemachine.course import notebook as md
 from statemachine.course import site
 from statemachine.course.lessons import LESSONS, PATH

@@ -13,7 +13,7 @@ from unittest.mock import Mock
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main as command_line
+from statemachine import cli as command_line
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.installed import ENGINES, require
 
@@ -36,13 +36,13 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "vise
     [
         ("import statemachine", set()),
         ("import statemachine as sm; dir(sm)", set()),
-        ("from statemachine.cli.main import main; main([])", set()),
-        ("from statemachine.cli.main import main; main(['--help'])", set()),
-        ("from statemachine.cli.main import main; main(['lesson', 'gravity', '--help'])", set()),
-        ("from statemachine.cli.main import main; main(['fingertip', '--help'])", set()),
-        ("from statemachine.cli.main import main; main(['conventions', '--help'])", set()),
-        ("from statemachine.cli.main import main; main(['check', '--help'])", set()),
-        ("from statemachine.cli.main import main; main(['view', '--help'])", set()),
+        ("from statemachine.cli import main; main([])", set()),
+        ("from statemachine.cli import main; main(['--help'])", set()),
+        ("from statemachine.cli import main; main(['lesson', 'gravity', '--help'])", set()),
+        ("from statemachine.cli import main; main(['fingertip', '--help'])", set()),
+        ("from statemachine.cli import main; main(['conventions', '--help'])", set()),
+        ("from statemachine.cli import main; main(['check', '--help'])", set()),
+        ("from statemachine.cli import main; main(['view', '--help'])", set()),
         ("import statemachine.interface", {"numpy"}),
         ("import statemachine.freshness", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
@@ -95,7 +95,7 @@ THEIRS = {
         (THEIRS, ("statemachine_sim.py",), ("-m", "statemachine_sim"), 2),
         (
             THEIRS,
-            ("statemachine_sim.py", "statemachine/cli/main.py"),
+            ("statemachine_sim.py", "statemachine/cli/__init__.py"),
             ("-m", "statemachine_sim"),
             2,
         ),

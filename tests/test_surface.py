@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main as cli
+from statemachine import cli
 from statemachine.interface import OPTIONS
 
 from .conftest import ROOT

@@ -566,7 +566,7 @@ def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> Non
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")
 def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> None:
     code = (
-        "import resource, sys; from statemachine.cli.main import main\n"
+        "import resource, sys; from statemachine.cli import main\n"
         "from statemachine.lab.sweep import rows\n"
         "flush = rows.RowWriter.flush\n"
         "def full(self):\n"
@@ -742,7 +742,7 @@ def test_cells_that_failed_are_run_again_if_asked(
     # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
     code = (
         "import os, signal, sys; from statemachine import sweep\n"
-        "from statemachine.cli.main import main\n"
+        "from statemachine.cli import main\n"
         "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "main(sys.argv[1:])"
     )

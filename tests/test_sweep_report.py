@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.lab.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.lab.sweep.analysis import SweepEffects, effects

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.errors import BadInputError
 from statemachine.lab.compare.sides import parse_sides
 from statemachine.lab.sweep.design import parse_vary, with_kinds

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.cli.main import main
+from statemachine.cli import main
 from statemachine.errors import ModelError
 from statemachine.kinematics import Kinematics
 from statemachine.lab.model_differences import read

@@ -1,25 +1,226 @@
-"""The commands of the command line, a file or a folder each; importing them loads no engine.
-
-A command is a module of this package, imported when it is typed, with two functions: `add(parser)`
-gives the parser its options, and `run(options)` takes the parsed ones and returns the exit code.
-What was typed becomes a Request in one place, `request_of(options)`; the room that the Request is
-of answers it, and the command shows the answer.
-"""
+"""The command line. Nothing heavy is imported before a command needs it."""
 
 from __future__ import annotations
 
-# What --help says of each, in its order.
-COMMANDS = {
-    "lesson": "the guided path, or one lesson alone",
-    "check": "judge an exercise by what it does",
-    "compare": "where two engines part, by how much, and why",
-    "doctor": "what this machine has, and what to do",
-    "view": "a running simulation in the browser, with sliders",
-    "trace": "record a run, play it on another engine, look into it, draw it",
-    "sweep": "an experiment at many settings, on every engine, as a dataset",
-    "robots": "any folder of models: what each does on every engine",
-    "fingertip": "the engine's fingertip against an independent witness",
-    "conventions": "what each engine takes for granted, asked of the engines",
-    "engines": "other releases of an engine, to run and to compare",
-}
-FIRST = ("lesson", "check", "compare", "doctor")  # the others are under "more"
+import argparse
+import codecs
+import importlib
+import io
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from typing import Any, NoReturn
+
+from .. import __version__
+from ..errors import EngineWarning, MissingEngineError, StateMachineError, did_you_mean
+from ..installed import raise_if_interrupted
+from ..show.terminal import spelled
+from .commands import COMMANDS, FIRST
+from .common import (
+    BAD_INPUT,
+    FAULT,
+    MISSING,
+    NO_OUTPUT,
+    PROGRAM,
+    complain,
+)
+
+_MORE = f"""\
+more commands:
+{{commands}}
+
+`{PROGRAM}` alone lists the lessons.
+`{PROGRAM} COMMAND --help` shows the options of a command."""
+_SAID: set[str] = set()
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose every complaint is one line, with the nearest spelling."""
+
+    def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, args: Any = None, namespace: Any = None
+    ) -> Any:
+        """Parse as argparse does, but take words behind an option where words are wanted.
+
+        What argparse leaves over goes to the positionals that take several words, or have none yet.
+        What still is over is refused here, by the parser that knows its options.
+        """
+        found, rest = super().parse_known_args(args, namespace)
+        if not any(word.startswith("-") for word in rest):
+            for action in self._get_positional_actions():
+                given: Any = getattr(found, action.dest, None)
+                if action.nargs == "*":
+                    setattr(found, action.dest, [*given, *rest])
+                    rest = []
+                elif rest and action.nargs == "?" and given is action.default:
+                    setattr(found, action.dest, rest.pop(0))
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}")
+        return found, rest
+
+    def error(self, message: str) -> NoReturn:
+        message = " ".join(message.replace("'", "").splitlines())  # as typed words may have
+        wrong, _, rest = message.partition("invalid choice: ")
+        if rest:
+            given, _, choices = rest.partition(" (choose from ")
+            known = [choice.strip() for choice in choices.rstrip(")").split(",")]
+            hint = did_you_mean(given, known) or f"; known: {', '.join(known)}"
+            from ..course.lessons import LESSONS
+
+            if given in LESSONS:
+                hint = f". Did you mean {PROGRAM} lesson {given}?"
+            elif given in COMMANDS:
+                hint = f". Did you mean {PROGRAM} {given}?"
+            message = f"{wrong}no {given!r}{hint}"
+        if "expected one argument" in message:
+            flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
+            named = {name: each for each in self._actions for name in each.option_strings}
+            behind = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
+            if behind and behind[0] and behind[0] not in named:
+                message += f" (one that begins with a minus: {flag}={behind[0]})"
+            elif flag in named and isinstance(metavar := named[flag].metavar, str):
+                message += f": {flag} {metavar}"
+        if message.startswith("unrecognized arguments: -"):
+            given = message.split()[2].partition("=")[0]
+            known = self._option_string_actions
+            from ..course.lessons import LESSONS
+
+            others = [x.name for x in LESSONS.values() if given.removeprefix("--") in x.defaults]
+            if "lesson" in sys.argv and others:
+                message += f"; it is an option of {PROGRAM} lesson {' and '.join(others)}"
+            else:
+                plain = given == "--model" and "; type the model without it"
+                message += plain or did_you_mean(given, known, 0.6)
+        elif message.startswith("unrecognized arguments: "):
+            option = "--model" in self._option_string_actions
+            message += "; a model is --model FILE" if option else "; this takes no more words"
+        print(f"{self.prog}: {message}", file=sys.stderr)
+        raise SystemExit(BAD_INPUT)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code.
+
+    0: well. 1: the result says no. 2: bad input. 3: an engine is missing. 70: a fault of this
+    program, with a traceback. 74: nowhere to write. 130: interrupted. 141: the reader of a pipe
+    left.
+    """
+    _prepare_streams()
+    warnings.showwarning = _show_warning
+    try:
+        options = _options(list(sys.argv[1:] if arguments is None else arguments))
+        code = options.run(options)
+        sys.stdout.flush()
+        return code
+    except MissingEngineError as error:
+        return complain(error, MISSING)
+    except StateMachineError as error:
+        return complain(error, BAD_INPUT)
+    except KeyboardInterrupt:
+        with suppress(KeyboardInterrupt):  # a second one
+            print(file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader of a pipe left (`| head`)
+        _let_go_of_output()
+        return 141
+    except OSError as error:
+        return _report_file(error)
+    except MemoryError:
+        return complain("this takes more memory than there is", BAD_INPUT)
+    except UnicodeError as error:  # a name in a file, or of one
+        return complain(f"this holds text that is not UTF-8: {error}", BAD_INPUT)
+    except Exception as error:
+        try:
+            raise_if_interrupted(error)
+        except KeyboardInterrupt:  # while something was imported, which made that fail
+            return 130
+        return _report_fault(error)
+
+
+def _prepare_streams() -> None:
+    """Let both streams be there, and take letters that their encoding lacks."""
+    # Closed by the caller, as by >&- or 2>&-.
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    codecs.register_error("spelled", spelled)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
+            stream.reconfigure(errors="spelled")
+
+
+def _report_file(error: OSError) -> int:
+    """Say which file cannot be read or written, or that the output cannot be."""
+    if error.filename is not None:
+        return complain(f"{error.filename}: {error.strerror or error}", BAD_INPUT)
+    _let_go_of_output()
+    return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+
+
+def _report_fault(error: Exception) -> int:
+    """Print an exception that nobody meant to raise, with its traceback, for a report.
+
+    Its exit code is one of its own: 1 is an answer, such as that two sides differ.
+    """
+    traceback.print_exception(error, file=sys.stderr)
+    text = (
+        f"this is a fault of {PROGRAM}, and no answer; please report it, with the lines above and "
+        "the files that you gave"
+    )
+    return complain(text, FAULT)
+
+
+def _options(words: list[str]) -> argparse.Namespace:
+    """Parse the words of a command line."""
+    named = next((word for word in words if word in COMMANDS), "lesson")
+    parser = _parser([named])
+    if named == "lesson":
+        from . import lesson
+
+        parser.set_defaults(run=lesson.overview)
+    options = parser.parse_args(words)
+    if getattr(options, "trust_binary", False):
+        from ..backends.binary import TRUST
+
+        os.environ[TRUST] = "1"  # which workers inherit
+    return options
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
+    """Print what an engine warns of in one line; where in our code it came up is no help."""
+    if issubclass(category, EngineWarning):
+        if str(message) not in _SAID:  # a lesson may load a model more than once
+            _SAID.add(str(message))
+            complain(message, 0)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
+
+
+def _let_go_of_output() -> None:
+    """Write no more there; without this, Python would try once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
+    """Return a parser that knows all commands, and the options of some."""
+    more = [name for name in COMMANDS if name not in FIRST]
+    parser = _Parser(
+        prog=PROGRAM,
+        description="A physics simulator is a state machine that you advance.",
+        epilog=_MORE.format(commands="\n".join(f"  {n:<12} {COMMANDS[n]}" for n in more)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    commands = parser.add_subparsers(metavar="command", title="commands")
+    for name, says in COMMANDS.items():
+        shown: dict[str, Any] = {"help": says} if name in FIRST else {}
+        command = commands.add_parser(name, **shown)
+        if name in wanted:
+            module = importlib.import_module(f".{name}", __package__)
+            command.set_defaults(run=module.run)
+            module.add(command)
+    return parser

@@ -177,7 +177,7 @@ def typed_words(draw: random.Random, words: Sequence[str], left: Path, right: Pa
 
 def ended_badly(words: list[str]) -> str:
     """Run a command in this process; what is wrong with its end, or ""."""
-    from statemachine.cli import main as cli
+    from statemachine import cli
 
     out, said = io.StringIO(), io.StringIO()
     sys.argv = ["statemachine", *words]

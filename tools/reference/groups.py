@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from statemachine.cli.main import main as statemachine
+from statemachine.cli import main as statemachine
 from statemachine.installed import ENGINES, engine_version
 
 from . import questions
