@@ -8,6 +8,7 @@ from a compiled model's numbers: other code, and the same reading of the file.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from .errors import BadInputError, ModelError, check_name
 from .installed import require
-from .interface import Array, Model
+from .interface import Array, JointType, Model
 from .interface.checks import as_numbers, as_vector
 from .model_files import checked_file
 from .models import AnyPath
@@ -25,6 +26,7 @@ from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
 from .witness import RobotReading, Segment, read_file, read_numbers
 
 Kind = Literal["site", "body"]
+_TYPES = {"free": JointType.FREE, "ball": JointType.BALL, "slide": JointType.SLIDE}
 
 
 class FrameDefinition(NamedTuple):
@@ -49,6 +51,7 @@ class Kinematics:
 
     Attributes:
         joint_names: That order; "" for a joint without a name.
+        joint_types: What each of these joints is.
         body_names, site_names: What `pose` knows. One without a name is called "body 7" or
             "site 3", by its place in MuJoCo's order; of a URDF, bodies are links.
         nq, nv: Lengths of qpos and qvel, in MuJoCo's layout.
@@ -100,8 +103,32 @@ class Kinematics:
         in_file = [segment.name for segment in read.joints]
         self.joint_names: tuple[str, ...] = _names(in_file if joint_names is None else joint_names)
         self._segments = _in_order(read, self.joint_names, path)
+        self.joint_types: tuple[JointType, ...] = tuple(
+            _TYPES.get(segment.kind, JointType.HINGE) for segment in self._segments
+        )
         self.nq: int = sum(segment.nq for segment in self._segments)
         self.nv: int = sum(segment.nv for segment in self._segments)
+
+    @property
+    def zero_qpos(self) -> Array:
+        """Return qpos (nq,) with every joint at zero; quaternions are the identity."""
+        qpos = np.zeros(self.nq)
+        for joint, start in zip(self.joint_types, self.qpos_starts, strict=True):
+            if joint in (JointType.FREE, JointType.BALL):
+                qpos[start + joint.nq - 4] = 1.0
+        return qpos
+
+    @property
+    def qpos_starts(self) -> tuple[int, ...]:
+        """Return where in qpos each joint starts, as `jnt_qposadr` of a Model."""
+        ends = itertools.accumulate((joint.nq for joint in self.joint_types), initial=0)
+        return tuple(ends)[:-1]
+
+    @property
+    def qvel_starts(self) -> tuple[int, ...]:
+        """Return where in qvel each joint starts, as `jnt_dofadr` of a Model."""
+        ends = itertools.accumulate((joint.nv for joint in self.joint_types), initial=0)
+        return tuple(ends)[:-1]
 
     def pose(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Placement:
         """World pose of a site or body: `pos` (3,), `mat` (3, 3).

@@ -29,7 +29,7 @@ def certificate() -> FingertipResult:
         ({"position_worst": 1e-9}, "own reading", "disagrees"),
         ({"rotation_worst": 1e-9}, "same reading", "disagrees"),
         ({"rotation_worst": float("nan")}, "own reading", "disagrees"),
-        ({"frames": None}, "own reading", "agrees"),
+        ({"frames": None}, "own reading", "no common body"),
         ({"frames": FrameOffset(1e-3, 0.0)}, "own reading", "different frames"),
         ({"frames": FrameOffset(0.0, 1e-3)}, "same reading", "different frames"),
     ],

@@ -99,7 +99,8 @@ RENAMED = ('body name="gripper"', 'body name="hand"')
         ((LONGER,), ("DISAGREE", "1.0e-05")),
         ((RENAMED,), ()),
         ((RENAMED, MOVED), ("19.90 mm, 0.00°",)),
-        ((RENAMED, MOVED, LONGER), ("not comparable", "DISAGREE")),
+        ((RENAMED, MOVED, LONGER), ("19.90 mm, 0.00°", "refused")),
+        ((RENAMED, LONGER), ("DISAGREE", "1.0e-05")),
     ],
 )
 def test_fingertip_against_another_arm(

@@ -178,7 +178,7 @@ def _off(
 ) -> None:
     """A fault: what the engine says of a part of positions and rotations is a little off."""
 
-    @around(fingertip, "_engine_poses")
+    @around(fingertip, "engine_poses")
     def wrong(right: Any, *arguments: object) -> fingertip.Placement:
         pos, mat = right(*arguments)
         part(pos, mat)[...] += 1e-9

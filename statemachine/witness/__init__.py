@@ -255,8 +255,19 @@ def _segments(pin: Any, model: Any, body: WrittenBody, frame: int, path: Path) -
     return segments
 
 
-# By how many numbers it has in q and v; a hinge or a slide: to these vectors it is one number.
+# By how many numbers it has in q and v; a hinge or a slide is one number.
 _KINDS_BY_SIZE = {(2, 1): "unbounded", (1, 1): "hinge"}
+_SLIDING = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned")
+
+
+def _kind_of(joint: Any) -> str:
+    """Return what a joint of Pinocchio's URDF reader is called here; "" for another."""
+    name = joint.shortname()
+    if name.endswith("FreeFlyer"):
+        return "free"
+    if name in _SLIDING:
+        return "slide"
+    return _KINDS_BY_SIZE.get((joint.nq, joint.nv), "")
 
 
 def _read_urdf(pin: Any, path: Path) -> RobotReading:
@@ -264,12 +275,13 @@ def _read_urdf(pin: Any, path: Path) -> RobotReading:
     joints: list[Segment] = []
     changed = 0
     for number, name in list(enumerate(model.names))[1:]:
-        joint, theirs = model.joints[number], model.joints[number].shortname()
-        free = theirs.endswith("FreeFlyer")
-        kind = "free" if free else _KINDS_BY_SIZE.get((joint.nq, joint.nv))
-        if kind is None:
-            raise ModelError(f"{path.name}: a joint of Pinocchio's kind {theirs} is not handled")
-        if free:
+        joint = model.joints[number]
+        kind = _kind_of(joint)
+        if not kind:
+            raise ModelError(
+                f"{path.name}: a joint of Pinocchio's kind {joint.shortname()} is not handled"
+            )
+        if kind == "free":
             changed += not model.jointPlacements[number].isIdentity()
             model.jointPlacements[number] = pin.SE3.Identity()  # as of an MJCF
         joints.append(Segment(name, kind, joint.idx_q, joint.idx_v))

@@ -143,7 +143,7 @@ def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matc
 def _bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
     """Return the roots; a base that floats in one file and stands still in the other is one too."""
     roots = left.groups[0], right.groups[0]
-    above = roots
+    above = _floating_bases(left, right)
     for name, group in left.by_joint.items():
         other = right.by_joint.get(name)
         if other is not None and group.parent >= 0 and other.parent >= 0:
@@ -153,6 +153,26 @@ def _bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
     if is_floating[0] == is_floating[1]:
         return roots
     return above if above[is_floating[0]].parent < 0 else roots
+
+
+def _floating_bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
+    """Return the one base of a robot that floats on either side; the root where there is none."""
+    ours, theirs = _floating_robots(left), _floating_robots(right)
+    base = ours[0] if len(ours) == 1 else left.groups[0]
+    other = theirs[0] if len(theirs) == 1 else right.groups[0]
+    return base, other
+
+
+def _floating_robots(tree: GroupTree) -> list[Group]:
+    """Return the groups that float and carry joints; none where the root carries some itself."""
+    carrying = [
+        tree.groups[group.parent]
+        for group in tree.groups
+        if group.parent >= 0 and group.joint is not None and group.joint.kind in SCALAR
+    ]
+    if tree.groups[0] in carrying:
+        return []
+    return [group for group in tree.groups if _floats(group) and group in carrying]
 
 
 def _floats(group: Group) -> bool:
@@ -176,9 +196,14 @@ def _placed(
             apart = _apart(at, there, along)
             if apart < nearest and abs(axis @ along) > np.cos(_TILT):
                 place, nearest = other, apart
-        elif group.name == other.name:
+        elif group.name == other.name or _are_only_robots(left, group, right, other):
             return other
     return place
+
+
+def _are_only_robots(left: GroupTree, group: Group, right: GroupTree, other: Group) -> bool:
+    """Tell whether two groups are the bases of the one robot that floats in either file."""
+    return _floating_robots(left) == [group] and _floating_robots(right) == [other]
 
 
 def _line(group: Group, align: Placement) -> tuple[Array, Array]:

@@ -12,9 +12,10 @@ from ...show import lesson_template as template
 from ...show.blocks import Page, Table
 from ...show.lesson_template import by_engine, differences
 from ...show.templates import PageContent, render
-from .fingertip import FingertipResult, FrameOffset, TipGap
+from .fingertip_result import SAME_FRAME, FingertipResult, FrameOffset, TipGap
 
 _SHOWN = 12  # rows of a table of tips
+_TINY = 5e-6  # [m or rad] that two decimals of a millimetre or a degree do not show
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,17 @@ class _OfEngines:
     def seed(self) -> str:
         """Seed of the random poses."""
         return str(self.result.provenance.seed)
+
+    @property
+    def renamed_tip(self) -> bool:
+        """Whether the one site or body goes by another name for the witness."""
+        return self.result.has_one_tip and self.result.has_other_names
+
+    @property
+    def renamed_joints(self) -> tuple[str, ...]:
+        """Joints of other names for the witness, each with that name."""
+        pairs = self.result.renamed_joints
+        return tuple(f"{pair.joint} is {pair.witness_joint}" for pair in pairs)
 
     @property
     def offset(self) -> str:
@@ -96,14 +108,16 @@ def _reading_of(result: FingertipResult) -> Hashable:
     """Return all that the page says of what the witness read."""
     tips = result.site if result.has_one_tip else len(result.tips)
     read = (result.grade, result.reason, result.witness_file, result.prepared)
-    return tips, read, result.left_out, result.poses, result.provenance.seed
+    pairs = (result.relative_to, result.renamed_joints, result.left_out)
+    return tips, read, pairs, result.poses, result.provenance.seed
 
 
 def _finding_of(result: FingertipResult) -> Hashable:
     """Return all that the page says of what the certificate found."""
-    frames = (result.site, result.witness_frame, _offset(result.frames))
-    is_refused = result.verdict == "different frames"
-    return result.verdict, result.grade, result.tolerance, frames if is_refused else None
+    frames: Hashable = None
+    if result.verdict in ("different frames", "no common body"):
+        frames = (result.site, result.witness_frame, _offset(result.frames))
+    return result.verdict, result.grade, result.tolerance, frames
 
 
 def tables_of_gaps(results: Mapping[str, FingertipResult]) -> list[Table]:
@@ -158,17 +172,26 @@ def _rotation_median(result: FingertipResult) -> str:
 
 def table_of_tips(engine: str, result: FingertipResult) -> Table:
     """Return the worst gaps of an engine; those that are not shown are no larger."""
+    columns: dict[str, Callable[[TipGap], str]] = {"tip": _site}
+    if result.has_other_names:
+        columns["for the witness"] = _witness_frame
+    columns["position, worst [m]"] = _position_worst
+    columns["rotation matrix, worst"] = _rotation_worst
+    columns["distance of the two frames"] = _frames
     return Table.of(
         result.tips[:_SHOWN],
-        {
-            "tip": lambda gap: gap.site,
-            "position, worst [m]": _position_worst,
-            "rotation matrix, worst": _rotation_worst,
-            "distance of the two frames": _frames,
-        },
+        columns,
         title=f"{engine} against the witness, the worst of {len(result.tips)} ({result.grade})",
         wide=("distance of the two frames",),
     )
+
+
+def _site(gap: TipGap) -> str:
+    return gap.site
+
+
+def _witness_frame(gap: TipGap) -> str:
+    return gap.witness_frame
 
 
 def tables_of_differences(results: Mapping[str, FingertipResult]) -> list[Table]:
@@ -188,7 +211,21 @@ def _offset(offset: FrameOffset | None) -> str:
         return "no common body: not comparable"
     if offset.same:
         return "0 mm, 0°"
-    return f"{millimetres(offset.distance)}, {degrees(offset.angle)}"
+    return f"{_length(offset.distance)}, {_angle(offset.angle)}"
+
+
+def _length(metres: float) -> str:
+    """Write a length in millimetres; a tiny one, which would read as none, in metres."""
+    if SAME_FRAME < metres < _TINY:
+        return f"{metres:.1e} m"
+    return millimetres(metres)
+
+
+def _angle(radians: float) -> str:
+    """Write an angle in degrees; a tiny one, which would read as none, in radians."""
+    if SAME_FRAME < radians < _TINY:
+        return f"{radians:.1e} rad"
+    return degrees(radians)
 
 
 def _figure(value: float | None) -> str:

@@ -12,7 +12,9 @@ from ...models import AnyPath
 from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
-from .fingertip import FingertipResult, certify, checked_poses
+from .fingertip import certify
+from .fingertip_poses import checked_poses
+from .fingertip_result import FingertipResult
 
 
 @dataclass(frozen=True)
