@@ -68,7 +68,8 @@ TENDON = (
     )
     .replace(
         "</mujoco>",
-        "<tendon><spatial stiffness='1'><site site='s'/><site site='t'/></spatial></tendon></mujoco>",
+        "<tendon><spatial stiffness='1'><site site='s'/><site site='t'/></spatial>"
+        "</tendon></mujoco>",
     )
 )
 URDF = """<robot name='r'><link name='base'/><link name='tip'><inertial><mass value='1'/>

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...course.lessons.witness_parts import WitnessFrame, WitnessParts
-from ...course.lessons.witness_places import witness_parts
 from ...errors import BadInputError, ModelError, UnknownNameError
 from ...installed import WITNESS
 from ...interface import Array, Model
@@ -25,6 +23,8 @@ from ..runs.provenance import provenance
 from ..runs.readings import Tip, tips_of
 from .fingertip_poses import checked_poses, engine_poses, random_qpos, relative
 from .fingertip_result import SAME_FRAME, TOLERANCE, FingertipResult, FrameOffset, TipGap
+from .witness_parts import WitnessFrame, WitnessParts
+from .witness_places import witness_parts
 
 __all__ = [
     "FingertipResult",

@@ -16,10 +16,10 @@ from ...engines.description.tree import Group, GroupTree
 from ...errors import BadInputError
 from ...interface import Model
 from ...kinematics import Kinematics
-from ...lab.runs.readings import Tip
-from ...lab.validate.fingertip_result import CommonBody, FrameOffset
 from ...rotations import HERE, Placement
 from ...witness import labels
+from ..runs.readings import Tip
+from .fingertip_result import CommonBody, FrameOffset
 from .witness_parts import JointPair, PartsByName, WitnessFrame, WitnessParts, frame_kind
 
 _ONE_PLACE = 1e-6  # [m] and [rad] within which two frames without a common name are one

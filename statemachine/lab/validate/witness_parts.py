@@ -11,11 +11,11 @@ import numpy as np
 from ...errors import BadInputError, check_name
 from ...interface import Array, Model
 from ...kinematics import Kind, Kinematics, shared_joints
-from ...lab.runs.readings import Tip
-from ...lab.runs.robot import carried_by
-from ...lab.validate.fingertip_result import CommonBody, FrameOffset, RenamedJoint
 from ...rotations import angle_between, matrix_from_quat
 from ...witness import labels
+from ..runs.readings import Tip
+from ..runs.robot import carried_by
+from .fingertip_result import CommonBody, FrameOffset, RenamedJoint
 
 
 @dataclass(frozen=True)
