@@ -261,7 +261,7 @@ def around_a_change(
         for name in (rows[0], rows[k]):
             if is_release(name) and not is_here(name):
                 add(name, say=report)
-        return not compared((rows[0], rows[k])).agrees
+        return compared((rows[0], rows[k])).outcome in ("differs", "ended")
 
     left, right = 0, len(rows) - 1
     if not differs(right):

@@ -236,7 +236,9 @@ def test_bisection_leaves_out_what_cannot_be_added(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(releases, "add", add)
     rows, said = [*(f"mujoco==3.0.{k}" for k in range(9)), "mujoco"], list[str]()
     found = releases.around_a_change(
-        rows, lambda pair: SimpleNamespace(agrees=pair[1] not in rows[5:]), said.append
+        rows,
+        lambda pair: SimpleNamespace(outcome="differs" if pair[1] in rows[5:] else "agrees"),
+        said.append,
     )
     assert found == [rows[0], rows[3], rows[6], "mujoco"]
     assert said == [f"{rows[k]} cannot be installed; it is left out" for k in (4, 5)]

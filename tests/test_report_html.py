@@ -315,7 +315,7 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
         "tolerance": 1e-3, "draws": 8, "one_engine": False,
         "redundant": (), "impossible": (), "unread": (), "unmatched": ({}, {}), "missing": (),
         "notes": (), "still": (), "touch": None, "moments": 401, "between": False, "runs": 9,
-        "took": 1.0,
+        "took": 1.0, "motion": comparison.motion, "instead": None,
         "provenance": (one.header.provenance, two.header.provenance),
     }  # fmt: skip
     return Explanation(**{**fields, **more})

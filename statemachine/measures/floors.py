@@ -27,6 +27,8 @@ GRAVITY = 9.81  # m/s², whatever that of the model is: a robot in orbit is as h
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
 OF_A_RUN = {"rad": 1e-8, "m": 1e-9}
 _UNKNOWN_SIZE = 1.0  # m; of one point that moves
+# J, N; of a robot whose weight is not known, as of a recorded run whose file is not here
+_LEAST_ENERGY, _LEAST_FORCE = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,16 @@ class RobotScale:
     def angle(self) -> float:
         """Floor of a rotation [rad]."""
         return PLACES
+
+
+def force_floor(robot: RobotScale | None) -> float:
+    """Return the floor of a contact's force [N], of a robot whose weight may be unknown."""
+    return _LEAST_FORCE if robot is None else robot.force
+
+
+def energy_floor(robot: RobotScale | None) -> float:
+    """Return the floor of a change of energy [J], of a robot whose weight may be unknown."""
+    return _LEAST_ENERGY if robot is None else robot.energy
 
 
 def moving_bodies(model: Model) -> frozenset[int]:

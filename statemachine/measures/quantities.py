@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import BadInputError, UnsupportedError, check_name
 from ..interface import DERIVED, Array, Contacts, Data
 from ..typed_numbers import typed_float
-from .floors import RobotScale
+from .floors import RobotScale, energy_floor, force_floor
 from .text import milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
@@ -20,8 +20,6 @@ _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as small servos have"
 _LEVER = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
 _ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts
-# J, N; of a robot whose weight is not known, as of a recorded run whose file is not here
-_LEAST_ENERGY, _LEAST_FORCE = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -162,14 +160,13 @@ def _of_energy(change: float, scale: RobotScale | None) -> Tolerance:
     share = Tolerance(
         _ENERGY * change, f"1 % of {rounded(change, 'J')}, by which the energy changes in the run"
     )
-    floor = _LEAST_ENERGY if scale is None else scale.energy
-    return _not_below(floor, share, "times its size", scale)
+    return _not_below(energy_floor(scale), share, "times its size", scale)
 
 
 def _of_force(acting: float, scale: RobotScale | None) -> Tolerance:
     """Return the tolerance of a normal force that is so much on average while it acts [N]."""
     share = Tolerance(_FORCE * acting, "5 % of the mean force while they touch")
-    return _not_below(_LEAST_FORCE if scale is None else scale.force, share, "", scale)
+    return _not_below(force_floor(scale), share, "", scale)
 
 
 def _not_below(floor: float, share: Tolerance, times: str, scale: RobotScale | None) -> Tolerance:

@@ -30,9 +30,11 @@ from ...measures.text import on
 from ..recordings import Header, Trace, model_file
 from ..runs.provenance import Provenance, model_files
 from .labels import labels_of, notes_on
+from .motion import Motion, Motions, least_motions, motion_of, with_efforts
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
+Outcome = Literal["agrees", "differs", "ended", "nothing moved"]
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,7 @@ class Comparison:
         until: The last of them [s].
         agreements: One for each quantity.
         notes: What makes the comparison less than one of two engines.
+        motion: How far both sides move: where neither does, nothing was compared.
         touches: One for each pair of bodies that touches on either side.
         curves: The quantities over time; first touches have none.
     """
@@ -160,15 +163,30 @@ class Comparison:
     until: float
     agreements: tuple[Agreement, ...]
     notes: tuple[str, ...]
+    motion: Motion
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 
     @property
+    def outcome(self) -> Outcome:
+        """What came of it.
+
+        "ended" where a side ended before its time; "differs" where a quantity does not agree at
+        every moment; "nothing moved" where all agree, but there was nothing to compare.
+        """
+        if self.ended:
+            return "ended"
+        if any(agreement.verdict != "agrees" for agreement in self.agreements):
+            return "differs"
+        return "agrees" if self.motion.is_compared else "nothing moved"
+
+    @property
     def agrees(self) -> bool:
-        """Whether every quantity agrees at every moment, and both runs came to their end."""
-        return not self.ended and all(
-            agreement.verdict == "agrees" for agreement in self.agreements
-        )
+        """Whether something moved, every quantity agrees always, and both runs came to their end.
+
+        Forces of contacts and changes of energy count as motion, see `Motion`.
+        """
+        return self.outcome == "agrees"
 
     @property
     def ended(self) -> bool:
@@ -229,6 +247,7 @@ def compare(
         if agreement.note.startswith("no number")
     ]
     notes = notes_on(left, right, common, strange)
+    motion = _motion(left, right, least_motions(tolerances), until)
     left_side = SideRun(labels.long[0], labels.short[0], left)
     right_side = SideRun(labels.long[1], labels.short[1], right)
     return Comparison(
@@ -239,9 +258,29 @@ def compare(
         until=until,
         agreements=tuple(agreements),
         notes=tuple(notes),
+        motion=with_efforts(motion, curves, robot),
         touches=pairs,
         curves=curves,
     )
+
+
+def _motion(left: Trace, right: Trace, least: Motions, until: float) -> Motion:
+    """Return how far the joints move that both runs have.
+
+    Args:
+        left: A run.
+        right: The other.
+        least: By kind of quantity, what is no motion.
+        until: The last moment that counts [s from the start].
+    """
+    theirs = right.header.joint_labels
+    names = [
+        name
+        for name in left.header.joint_labels
+        if name in theirs
+        and joint_columns(left.header, name).kind is joint_columns(right.header, name).kind
+    ]
+    return motion_of([(left, names), (right, names)], least, until)
 
 
 def _settled(curve: Series) -> float:

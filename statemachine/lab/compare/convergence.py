@@ -21,6 +21,7 @@ from ...measures import common_moments
 from ..recordings import Trace
 from ..runs.drive import Progress, silent
 from .labels import labels_of
+from .motion import SEEN, Motion, motion_of
 from .series import Series, default_tip, series
 
 FINER = (1, 2, 4, 8, 16)  # engine steps to one of the first runs; from 8 on, where it is unclear
@@ -76,6 +77,7 @@ class Convergence:
         touch: When something touches first in any of the runs [s]; None if nothing does.
         before: Each quantity until then; of a run that begins with a touch there is none.
         whole: Each quantity over all of the run; the same as `before` if nothing touches.
+        motion: How far both sides move with the steps as given.
     """
 
     labels: tuple[str, str]
@@ -86,6 +88,12 @@ class Convergence:
     touch: float | None
     before: tuple[GapLimit, ...]
     whole: tuple[GapLimit, ...]
+    motion: Motion
+
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing moves and there is no gap: then nothing was compared."""
+        return not self.motion.moved and all(limit.verdict == "rounding" for limit in self.whole)
 
     @property
     def vanishes(self) -> bool:
@@ -159,6 +167,7 @@ def _result(runs: Sequence[tuple[Trace, Trace]]) -> Convergence:
         before = tuple(_limit(quantity, early) for quantity in quantities if early.any())
     labels = labels_of(left.header, right.header)
     engines = frozenset(trace.header.backend for trace in runs[0])
+    sides = [(trace, trace.header.joint_labels) for trace in runs[0]]
     return Convergence(
         labels=labels.long,
         steps=(_engine_step(left), _engine_step(right)),
@@ -168,6 +177,7 @@ def _result(runs: Sequence[tuple[Trace, Trace]]) -> Convergence:
         touch=touch,
         before=before,
         whole=whole,
+        motion=motion_of(sides, SEEN, until),
     )
 
 

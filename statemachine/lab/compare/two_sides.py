@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...backends import BackendChoice, load, parse_backend
+from ...backends import BackendChoice, parse_backend
 from ...engines import room
 from ...errors import BadInputError, MissingEngineError, StateMachineError, TraceError
 from ...installed import DEFAULT
@@ -19,7 +19,6 @@ from ...measures import RobotScale, common_moments, places_of
 from ...measures.text import command, milliseconds
 from ...release_names import engine_of
 from ..recordings import (
-    Header,
     Rerun,
     SideStart,
     Trace,
@@ -47,6 +46,7 @@ from .alike import (
 )
 from .labels import files_apart, labels_of, lacking
 from .matching import Matched, missing_parts
+from .recorded import recorded_model
 from .sides import Request, Side
 
 Loop = Literal["the same", "its own", "recorded", "more than ctrl"]
@@ -94,7 +94,7 @@ class SidesRun:
         """
         scales: list[RobotScale] = []
         for trace, rerun in zip(self.traces, self.reruns, strict=True):
-            model = _recorded_model(trace.header) if rerun is None else rerun.model
+            model = recorded_model(trace.header) if rerun is None else rerun.model
             if model is None or "xpos" not in trace or "site_xpos" not in trace:
                 return None
             places = places_of(model, trace["xpos"][0], trace["site_xpos"][0])
@@ -110,15 +110,6 @@ class SidesRun:
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
-
-
-def _recorded_model(header: Header) -> Model | None:
-    """Return the model that a trace was recorded of; None where its file is not here."""
-    try:
-        file, is_the_same = model_file(header)
-        return load(file) if is_the_same else None
-    except StateMachineError:
-        return None
 
 
 def prepare_sides(

@@ -15,6 +15,7 @@ from ...show.report_template import if_true, slots_of
 from ...witness import SAME_READING
 from ..compare import Agreement, Comparison, SidesRun
 from ..compare.agreement import WitnessResult
+from ..compare.instead import Instead
 from ..compare.perturbed import ChaosFloor
 from ..why import page as why
 from .finding import (
@@ -44,6 +45,7 @@ from .sides_page import (
     provenance,
     unmatched,
 )
+from .stillness import nothing_moved
 
 if TYPE_CHECKING:
     from ..why import Explanation
@@ -65,12 +67,14 @@ class PageParts:
         models: The differences between what the engines make of the model; None if that was not
             asked, or there are none.
         command: What makes the page again; "" where that is not said.
+        instead: What to run where nothing moved; None where that was not looked for.
     """
 
     explanation: Explanation | None = None
     why_not: str = ""
     models: Page | None = None
     command: str = ""
+    instead: Instead | None = None
 
 
 _NO_PARTS = PageParts()
@@ -106,11 +110,12 @@ def page(
     blocks += [section for section in sections if section.blocks]
     if parts.why_not and not parts.command:
         blocks.append(Text(parts.why_not))
+    answer = headline(comparison, events, parts.explanation, floor, parts.instead)
     return Page(
         f"{both.title}: {' and '.join(long_labels(comparison))}",
         _origin(comparison),
         blocks,
-        also_open(headline(comparison, events, parts.explanation, floor), played),
+        also_open(answer, played),
     )
 
 
@@ -503,6 +508,8 @@ def _failures(comparison: Comparison) -> dict[str, str]:
                 tolerance=quantity(agreement.tolerance, agreement.unit),
                 reason=agreement.reason,
             )
+    if comparison.outcome == "nothing moved":
+        failures["motion"] = nothing_moved(comparison.motion)
     for side in (comparison.left, comparison.right):
         ended = side.trace.header.ended
         if ended:

@@ -57,7 +57,7 @@ def whole_page(
     """
     traces = result.run.traces
     explanation, why_not = None, ""
-    if ask_why is not None and not result.comparison.ended:
+    if ask_why is not None and result.comparison.outcome not in ("ended", "nothing moved"):
         if any(trace.header.recorded for trace in traces):
             why_not = _RECORDED
         else:
@@ -80,6 +80,7 @@ def _page(
     typed: str = "",
 ) -> Page:
     """Return the page of a comparison, and what it says besides."""
+    parts = compare.PageParts(explanation, why_not, models_page, typed, result.instead)
     return compare.page(
         result.comparison,
         said=result.run.said,
@@ -87,14 +88,14 @@ def _page(
         played=result.played,
         witness=result.witness,
         floor=result.floor,
-        parts=compare.PageParts(explanation, why_not, models_page, typed),
+        parts=parts,
     )
 
 
 def _what_next(result: CompareResult, no_cause: str) -> str:
     """Return what to ask next, or why no cause is named; "" where the page says all of it."""
     comparison = result.comparison
-    if comparison.ended or comparison.agrees:
+    if comparison.outcome != "differs":
         return ""
     moving = [gap for gap in comparison.agreements if QUANTITIES[gap.kind].moves]
     if all(gap.verdict == "agrees" for gap in moving):

@@ -15,10 +15,12 @@ from ...show import report_template as template
 from ...show.blocks import Block, Headline, Table, TableCell
 from ...show.report_template import if_true, slots_of
 from ..compare import Agreement, Comparison, Series
+from ..compare.instead import Instead
 from ..compare.perturbed import CLEAR, Chance, ChaosFloor
 from ..compare.series import SETTLED, at_the_end
 from ..recordings import Trace
 from ..why.answer_page import answer, proofs
+from .stillness import extent_of, nothing_moved
 
 if TYPE_CHECKING:
     from ..why import Explanation
@@ -58,8 +60,19 @@ def headline(
     events: Sequence[Event],
     explanation: Explanation | None = None,
     floor: ChaosFloor | None = None,
+    instead: Instead | None = None,
 ) -> Headline:
-    """Return the largest difference, what explains it, and what is left of it in the end."""
+    """Return the largest difference, what explains it, and what is left of it in the end.
+
+    Args:
+        comparison: The figures.
+        events: What happens when.
+        explanation: What explains the largest difference; None if that was not asked.
+        floor: The chaos floor; None if it was not looked for.
+        instead: What to run where nothing moved; None where that was not looked for.
+    """
+    if comparison.outcome == "nothing moved":
+        return Headline(nothing_moved(comparison.motion, instead), holds=False)
     if comparison.agrees:
         same = all(agreement.max == 0 for agreement in comparison.agreements)
         return Headline(LEADS["same" if same else "agree"].format(until=comparison.until))
@@ -285,6 +298,7 @@ class _Verdicts:
         within: "" where all agree.
         cut: "" where a run ended before its time.
         unlike: "" where neither is so.
+        unmoved: How far the sides move where they agree in forces and energy alone; else None.
     """
 
     total: int
@@ -295,20 +309,27 @@ class _Verdicts:
     within: str | None
     cut: str | None
     unlike: str | None
+    unmoved: str | None
 
 
 def _verdicts_of(comparison: Comparison) -> _Verdicts:
     counts = Counter(agreement.verdict for agreement in comparison.agreements)
-    unlike = not comparison.agrees and not comparison.ended
+    outcome = comparison.outcome
+    all_agree = outcome in ("agrees", "nothing moved")
+    unmoved = None
+    if outcome == "agrees" and not comparison.motion.moved:
+        unmoved = extent_of(comparison.motion)
+    total = len(comparison.agreements)
     return _Verdicts(
-        total=len(comparison.agreements),
+        total=total,
         moments=comparison.moments,
         agrees=counts["agrees"],
         settles=counts["settles"],
         differs=counts["differs"],
-        within=if_true(comparison.agrees),
-        cut=if_true(comparison.ended),
-        unlike=if_true(unlike),
+        within=if_true(all_agree),
+        cut=if_true(outcome == "ended"),
+        unlike=if_true(outcome == "differs"),
+        unmoved=unmoved,
     )
 
 
@@ -334,9 +355,9 @@ class _Worst:
 def _worst_of(comparison: Comparison) -> _Worst:
     worst = leading(comparison)
     nearest = farthest = None
-    if comparison.agrees and worst.max:
+    if comparison.outcome in ("agrees", "nothing moved") and worst.max:
         nearest = name_of(worst.name)
-    if not comparison.agrees and not comparison.ended and worst.kind != "contact":
+    if comparison.outcome == "differs" and worst.kind != "contact":
         farthest = named(worst)
     far, tolerance = (quantity(value, worst.unit) for value in (worst.max, worst.tolerance))
     return _Worst(far, tolerance, short_time(worst.at), nearest, farthest)

@@ -27,6 +27,7 @@ from ..compare.convergence import FINER, Convergence, GapLimit, LimitVerdict
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
 from .finding import leading, moment, name_of
+from .stillness import nothing_moved
 
 LEADS = {
     "rounding": "There is no gap beyond rounding, whatever the timestep",
@@ -231,6 +232,8 @@ def _advice_of(result: Convergence) -> _Advice:
 
 def _of_the_limit(result: Convergence, by_verdict: ByVerdict) -> Headline:
     """Return the headline: whether the gap vanishes with the timestep."""
+    if result.is_still:
+        return Headline(nothing_moved(result.motion), holds=False)
     if result.vanishes:
         return Headline(LEADS["vanishes" if by_verdict.keys() - {"rounding"} else "rounding"])
     gap = _leading(by_verdict)
@@ -551,7 +554,8 @@ class _NextRelease:
     def cells(self) -> tuple[str, ...]:
         """Return the row of the two."""
         worst = leading(self.comparison)
-        verdict = "agrees" if self.comparison.agrees else "DIFFERS"
+        outcome = self.comparison.outcome
+        verdict = outcome if outcome in ("agrees", "nothing moved") else "DIFFERS"
         if not worst.max:
             return (self.release, self.next, "nothing differs", NONE, NONE, NONE, verdict)
         largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
@@ -634,23 +638,30 @@ class _Changes:
         same: True where it does nowhere; else None.
         differs: False where it does; else None.
         pairs: Between which; None for none.
+        still: False where nothing moves on some of them, and the rest agrees; else None.
+        nothing: What is said of that; "" else.
     """
 
     why: list[Block]
-    same: bool | None
-    differs: bool | None
-    pairs: str | None
+    same: bool | None = None
+    differs: bool | None = None
+    pairs: str | None = None
+    still: bool | None = None
+    nothing: str = ""
 
 
 def _changes_of(pairs: Sequence[_NextRelease], request: Request) -> _Changes:
     what = request.what[0]
     model = request.model if request.model else request.scenario().model
-    changed = [pair for pair in pairs if not pair.comparison.agrees]
+    changed = [pair for pair in pairs if pair.comparison.outcome in ("differs", "ended")]
+    still = [pair for pair in pairs if pair.comparison.outcome == "nothing moved"]
+    if not changed and still:
+        return _Changes([], still=False, nothing=nothing_moved(still[0].comparison.motion))
     if not changed:
-        return _Changes([], same=True, differs=None, pairs=None)
+        return _Changes([], same=True)
     why: list[Block] = []
     for pair in changed:
         sides = [f"{model}@{backend}" for backend in pair.backends]
         why.append(Code([command(["statemachine", "compare", what, *sides, "--why"])]))
     releases = [f"MuJoCo {pair.release} and {pair.next}" for pair in changed]
-    return _Changes(why, same=None, differs=False, pairs=listed(releases))
+    return _Changes(why, differs=False, pairs=listed(releases))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...measures.text import NONE, capital, percent, quantity, short_time
+from ..questions.stillness import nothing_moved
 from .values_page import values_of
 
 if TYPE_CHECKING:
@@ -72,6 +73,8 @@ def answer(result: Explanation) -> str:
     """Say what the gap comes from, in a sentence without its end."""
     gap = amount(result, result.gap)
     match result.verdict.answer:
+        case "nothing moved":
+            return nothing_moved(result.motion, result.instead)
         case "rounding" | "alike" as kind:
             size = f"{gap} is rounding" if result.gap else "the gap is 0"
             return ANSWERS[kind].format(gap=size)

@@ -15,8 +15,10 @@ from ...interface import JointType, Model
 from ...measures.text import milliseconds
 from ...release_names import engine_of
 from ..compare import perturbed
+from ..compare.instead import instead_of
 from ..compare.labels import files_apart
 from ..compare.matching import Matched, match_alike, match_models, missing_parts
+from ..compare.motion import SEEN, Motion, motion_of
 from ..recordings import Trace
 from ..runs.drive import Progress, silent
 from ..runs.provenance import provenance
@@ -97,6 +99,7 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
     counter.expected = counter.runs + 3 * len(able) + 10
     division, brought = _divide(trials, request, gap, able)
     found = _locate(trials, gap, able, brought)
+    motion = _motion(trials, matched)
     shares = _shares(causes, division, found, left, right)
     explained, located, unexplained = _parts(gap, brought, found)
     progress(1.0)
@@ -130,6 +133,8 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
         notes=_notes(matched, left, right),
         unread=_unread(matched, request, gap),
         still=_still(causes, left, trials.traces[0]),
+        motion=motion,
+        instead=None if motion.moved else instead_of(left, scenario.name, request.seed),
         touch=trials.touch(gap.quantity) if gap.is_divided else None,
         moments=len(trials.ruler.time),
         between=trials.ruler.between,
@@ -137,6 +142,15 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
         took=time.perf_counter() - began,
         provenance=(provenance(left), provenance(right)),
     )
+
+
+def _motion(trials: Trials, matched: Matched) -> Motion:
+    """Return how far the joints move that both sides have, as they come."""
+    sides: list[tuple[Trace, list[str]]] = []
+    for side, trace in enumerate(trials.traces):
+        labels = trace.header.joint_labels
+        sides.append((trace, [labels[pair[side]] for pair in matched.joints]))
+    return motion_of(sides, SEEN, float(trials.ruler.time[-1]))
 
 
 def _match(request: WhyRequest) -> Matched:

@@ -8,7 +8,9 @@ from typing import Literal
 
 from ...engines.records import DifferingQuantity
 from ...measures import Deviation
+from ..compare.instead import Instead
 from ..compare.matching import Only
+from ..compare.motion import Motion
 from ..runs.provenance import Provenance
 from .gap import FirstTouch, Measure
 from .locate import Localisation
@@ -89,6 +91,8 @@ class Explanation:
         unread: What differs, too, and nothing depends on but a function that reads it, where there
             is none, or no gap.
         still: Joints with a difference that the left hardly moves: it cannot show.
+        motion: How far both sides move as they come.
+        instead: What to run where nothing moves; None where something does.
         touch: The first contact; None without one.
         moments: How many moments the runs are compared at.
         between: Whether rows had to be interpolated there.
@@ -126,6 +130,8 @@ class Explanation:
     notes: tuple[str, ...]
     unread: tuple[str, ...]
     still: tuple[str, ...]
+    motion: Motion
+    instead: Instead | None
     touch: FirstTouch | None
     moments: int
     between: bool
@@ -148,6 +154,7 @@ class Explanation:
             unexplained=self.unexplained,
             cause=self._largest_cause(),
             places=self._places(),
+            moved=self.motion.moved,
         )
         return verdict_of(facts)
 

@@ -15,7 +15,7 @@ _MASKED = 2.0  # of the gap: a cause that takes away more has others against it
 
 GapState = Literal["rounding", "within", "inside", "cannot be told", "beyond"]
 Answer = Literal[
-    "rounding", "alike", "within", "inside", "cannot be told",
+    "nothing moved", "rounding", "alike", "within", "inside", "cannot be told",
     "cause", "together", "masked", "hidden",
     "located", "switched", "one engine", "refused", "still", "unexplained",
 ]  # fmt: skip
@@ -86,6 +86,7 @@ class Facts:
         explained, located, unexplained: Parts of the gap; they add up to 1.
         cause: The cause with the largest share; None without one.
         places: What was left out on both sides, each on top of those before.
+        moved: Whether a side moves at all.
     """
 
     state: GapState
@@ -97,6 +98,7 @@ class Facts:
     unexplained: float = 1.0
     cause: CausePart | None = None
     places: tuple[LocatedPart, ...] = ()
+    moved: bool = True
 
     @property
     def place(self) -> LocatedPart | None:
@@ -111,6 +113,8 @@ class GapVerdict:
     Attributes:
         answer: Which answer is given first.
 
+            - "nothing moved": there is no gap, for nothing moves on either side: nothing was
+              compared.
             - "rounding": there is no gap, and nothing differs; "alike": there is none, although
               something differs; "within": it is within its tolerance, and may be chance.
             - "inside": rounding alone makes as large a gap, so that nothing can be concluded;
@@ -136,6 +140,8 @@ class GapVerdict:
 
 def verdict_of(facts: Facts) -> GapVerdict:
     """Make the verdict on a gap."""
+    if facts.state == "rounding" and not facts.moved:
+        return GapVerdict("nothing moved", holds=False, divides=False)
     if facts.state == "rounding":
         answer: Answer = "alike" if facts.differs else "rounding"
         return GapVerdict(answer, holds=not facts.refused, divides=False)

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from ....errors import BadInputError, check_name
 from ....measures import QUANTITIES
 from ...compare.agreement import Comparison, WitnessResult, compare, witness
+from ...compare.instead import Instead, instead_of
 from ...compare.perturbed import EXACT, ChaosFloor, Uncertainty, chaos_floor
+from ...compare.recorded import recorded_model
 from ...compare.sides import Request
 from ...compare.two_sides import SidesRun, run_sides
 from ...runs.controllers import is_function
@@ -56,6 +58,8 @@ class CompareResult:
             it cannot.
         floor: How far apart runs get that differ by rounding alone; None where it was not asked
             for, or both runs are recorded.
+        instead: What to run where nothing moved; None where something did, or where the model of a
+            recorded run is not here.
     """
 
     request: CompareRequest
@@ -64,6 +68,7 @@ class CompareResult:
     played: Comparison | None
     witness: WitnessResult | None
     floor: ChaosFloor | None
+    instead: Instead | None
 
     def figures(self) -> dict[str, object]:
         """Return what JSON shows of it."""
@@ -72,6 +77,7 @@ class CompareResult:
             "touches": self.comparison.touches,
             "witness": self.witness,
             "floor": self.floor,
+            "instead": self.instead,
         }
         if self.request.names_sides:
             figures |= self._figures_of_sides()
@@ -104,7 +110,22 @@ def answer(request: CompareRequest, reporter: Reporter = QUIET) -> CompareResult
         played = compare(run.left, run.played, tolerances=request.tolerances, robot=run.robot)
     fingertips = witness(*run.traces, run.file)
     floor = _floor(request, run, comparison, reporter)
-    return CompareResult(request, run, comparison, played, fingertips, floor)
+    instead = _instead(request.run, run, comparison)
+    return CompareResult(request, run, comparison, played, fingertips, floor, instead)
+
+
+def _instead(request: Request, run: SidesRun, comparison: Comparison) -> Instead | None:
+    """Return what to run instead, where nothing moved and the left's model is here."""
+    if comparison.outcome != "nothing moved":
+        return None
+    rerun = run.reruns[0]
+    asked = run.left.header.experiment
+    if request.is_traces or rerun is None:
+        model = recorded_model(run.left.header, request.menagerie)
+    else:
+        # As it is loaded, without the options of the experiment, such as that it has no servos.
+        model = request.both_sides(str(rerun.model.path))[0].load()
+    return None if model is None else instead_of(model, asked, request.seed)
 
 
 def _floor(
