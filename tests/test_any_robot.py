@@ -29,18 +29,11 @@ from statemachine.lab.runs.robot import hold_ctrl, is_servo
 from statemachine.lab.runs.scenarios import SCENARIOS, fitting
 from statemachine.show.blocks import Code, Page, Question, Table, Text
 
-from .conftest import (
-    Cli,
-    assert_has,
-    assert_not_in,
-    blocks,
-    one_line,
-    opened,
-    refused,
-    shown,
-    written,
-    written_all,
-)
+from .support.claims import assert_has, assert_not_in, refused
+from .support.files import written, written_all
+from .support.motions import opened
+from .support.pages import blocks, shown
+from .support.processes import Cli, one_line
 
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.

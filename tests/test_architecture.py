@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import tomllib
 
-from .conftest import ROOT, assert_in, of_python
+from .support.claims import assert_in
+from .support.processes import of_python
+from .support.requirements import ROOT
 
 PACKAGE = ROOT / "statemachine"
 MAP = (ROOT / "docs" / "architecture.md").read_text("utf-8")

@@ -18,7 +18,10 @@ from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import assert_has, need_engine, opened, written
+from .support.claims import assert_has
+from .support.files import written
+from .support.motions import opened
+from .support.requirements import need_engine
 
 ARM = models_dir() / "so101" / "so101.xml"
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")

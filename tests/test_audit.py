@@ -15,8 +15,11 @@ from statemachine.errors import BadInputError, EngineWarning
 from statemachine.lab.probes import Audit, audit
 from statemachine.show.as_json import plain
 
-from .conftest import followed_by, need_engine, refused, registered
-from .small_models import loaded, model_of
+from .support.backends import registered
+from .support.claims import refused
+from .support.patches import followed_by
+from .support.requirements import need_engine
+from .support.small_models import loaded, model_of
 
 SCENE = "so101/scene_box"
 
@@ -74,7 +77,7 @@ def test_where_nothing_touches_pybullet_forgets_nothing() -> None:
 
 
 def test_another_backend_is_audited() -> None:
-    with registered("hidden", "tests.hidden_world:load") as name:
+    with registered("hidden", "tests.support.hidden_world:load") as name:
         found = audit(sm.load(SCENE, backend=name), steps=20)
     assert found.whole.exact
     assert "warmstart" in found.decides

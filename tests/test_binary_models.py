@@ -14,7 +14,10 @@ import statemachine as sm
 from statemachine.backends import binary
 from statemachine.errors import BadInputError, EngineWarning, ModelError
 
-from .conftest import Cli, after, in_its_own_python, need_engine, one_line, refused
+from .support.claims import refused
+from .support.motions import after
+from .support.processes import Cli, in_its_own_python, one_line
+from .support.requirements import need_engine
 
 LOAD = "import statemachine as sm; print(sm.load('arm.mjb').nq)"
 REFUSED = "if you trust who made it"

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from .browser import browser
-from .conftest import refused, written
+from .support.browser import browser
+from .support.claims import refused
+from .support.files import written
 
 pytestmark = pytest.mark.slow  # a browser or a renderer at work
 

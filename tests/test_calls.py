@@ -34,17 +34,10 @@ from statemachine.lab.probes.calls import (
 from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Page, Table
 
-from .conftest import (
-    Patch,
-    around,
-    assert_has,
-    assert_in,
-    assert_not_in,
-    blocks,
-    need_engine,
-    refused,
-    shown,
-)
+from .support.claims import assert_has, assert_in, assert_not_in, refused
+from .support.pages import blocks, shown
+from .support.patches import Patch, around
+from .support.requirements import need_engine
 
 # A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
 # derived array, a State, a variant of the model, two Data.

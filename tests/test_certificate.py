@@ -11,7 +11,7 @@ import statemachine as sm
 from statemachine.lab.validate.fingertip import FingertipResult, FrameOffset, certify
 from statemachine.show.as_json import plain
 
-from .conftest import need_engine
+from .support.requirements import need_engine
 
 
 @pytest.fixture(scope="module")

@@ -29,20 +29,11 @@ from statemachine.course.grading.judges import JUDGES, Judgement, judge_of, judg
 from statemachine.errors import MissingEngineError
 from statemachine.processes import sandbox
 
-from .conftest import (
-    ROOT,
-    Cli,
-    assert_in,
-    in_its_own_python,
-    need_engine,
-    processes_with,
-    refused,
-    soon,
-    without_estimates,
-    written,
-    written_all,
-)
-from .exercises import RIGHT, SOLUTION, TEMPLATE, WRONG, Attempt
+from .support.claims import assert_in, refused
+from .support.exercises import RIGHT, SOLUTION, TEMPLATE, WRONG, Attempt
+from .support.files import written, written_all
+from .support.processes import Cli, in_its_own_python, processes_with, soon, without_estimates
+from .support.requirements import ROOT, need_engine
 
 Prepared = tuple[Sequence[AnyWorld], list[Any]]
 

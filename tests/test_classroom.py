@@ -34,18 +34,12 @@ from statemachine.course.grading.page import class_page, gradescope_results
 from statemachine.errors import BadInputError
 from statemachine.show.blocks import Text
 
-from .conftest import (
-    ROOT,
-    Cli,
-    assert_has,
-    assert_in,
-    blocks,
-    one_line,
-    refused,
-    written,
-    written_all,
-)
-from .exercises import SOLUTION, TEMPLATE
+from .support.claims import assert_has, assert_in, refused
+from .support.exercises import SOLUTION, TEMPLATE
+from .support.files import written, written_all
+from .support.pages import blocks
+from .support.processes import Cli, one_line
+from .support.requirements import ROOT
 
 
 def _table(entries: Sequence[ClassEntry]) -> list[dict[str, str]]:

@@ -17,18 +17,13 @@ from rich.cells import cell_len
 from statemachine.course.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import (
-    QUICK,
-    ROOT,
-    Cli,
-    assert_has,
-    assert_in,
-    assert_not_in,
-    without_estimates,
-    written,
-)
-from .explained import with_changes
-from .small_models import mjcf
+from .support.claims import assert_has, assert_in, assert_not_in
+from .support.explained import with_changes
+from .support.files import written
+from .support.pages import QUICK
+from .support.processes import Cli, without_estimates
+from .support.requirements import ROOT
+from .support.small_models import mjcf
 
 
 def _json(cli: Cli, *arguments: str) -> Any:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import of_python
+from .support.processes import of_python
 
 PRINT_FILES = """
 import sys

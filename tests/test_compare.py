@@ -29,11 +29,13 @@ from statemachine.lab.recordings import Trace, record, write
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.measures import COUNT, QUANTITIES, parse_tolerances, tolerance_of
 
-from .conftest import Cli, assert_has, assert_in, one_line, opened, refused, written
-from .small_models import NAMELESS_JOINTS, STILL, model_of
-from .test_strange_traces import added, changed
-from .test_strange_traces import named as by_name
-from .test_traces import traced
+from .support.claims import assert_has, assert_in, refused
+from .support.files import written
+from .support.motions import opened
+from .support.processes import Cli, one_line
+from .support.small_models import NAMELESS_JOINTS, STILL, model_of
+from .support.traces import added, changed, traced
+from .support.traces import named as by_name
 
 
 @pytest.fixture(scope="module")

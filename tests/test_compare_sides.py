@@ -27,9 +27,12 @@ from statemachine.lab.questions import compare_page as report
 from statemachine.lab.recordings import RunStart, record, write
 from statemachine.lab.runs.controllers import function_scenario
 
-from .conftest import ROOT, Cli, assert_has, need_engine, one_line, refused, written, written_all
-from .explained import with_changes
-from .small_models import BENT, TWO_LINKS, TWO_SERVOS
+from .support.claims import assert_has, refused
+from .support.explained import with_changes
+from .support.files import written, written_all
+from .support.processes import Cli, one_line
+from .support.requirements import ROOT, need_engine
+from .support.small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
 calls = 0

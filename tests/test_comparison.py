@@ -24,11 +24,9 @@ from statemachine.measures import (
     together,
 )
 
-from .conftest import (
-    Cli,
-    overlapping,
-)
-from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
+from .support.claims import overlapping
+from .support.processes import Cli
+from .support.small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
 def test_a_recorded_trace_has_the_same_names(mujoco_scene: sm.Model) -> None:

@@ -18,9 +18,12 @@ from statemachine.backends import backend_names
 from statemachine.errors import DivergedError, EngineError, UnknownNameError, UnsupportedError
 from statemachine.interface import Behaviour
 
-from .conftest import assert_has, need_engine, opened, refused, registered
-from .hidden_world import ExampleModel, ExampleWorld
-from .hidden_world import load as load_hidden
+from .support.backends import registered
+from .support.claims import assert_has, refused
+from .support.hidden_world import ExampleModel, ExampleWorld
+from .support.hidden_world import load as load_hidden
+from .support.motions import opened
+from .support.requirements import need_engine
 
 
 @pytest.fixture
@@ -28,7 +31,10 @@ def lab(request: pytest.FixtureRequest) -> Iterator[conformance.Lab]:
     """Each backend, and an engine that hides its world."""
     if request.param != "hidden":
         need_engine(request.param)
-    with registered("hidden", "tests.hidden_world:load"), conformance.Lab(request.param) as lab:
+    with (
+        registered("hidden", "tests.support.hidden_world:load"),
+        conformance.Lab(request.param) as lab,
+    ):
         yield lab
 
 
@@ -115,7 +121,7 @@ def test_an_unknown_backend_is_one_error() -> None:
 
 @pytest.fixture
 def model() -> Iterator[sm.Model]:
-    with registered("hidden", "tests.hidden_world:load") as name:
+    with registered("hidden", "tests.support.hidden_world:load") as name:
         yield sm.load("so101/scene_box", backend=name)
 
 

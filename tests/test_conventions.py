@@ -36,22 +36,12 @@ from statemachine.lab.probes.conventions.answers import (
 )
 from statemachine.lab.probes.conventions.frames import FIXED, ORDERS
 
-from .conftest import (
-    ROOT,
-    Cli,
-    Patch,
-    around,
-    assert_has,
-    assert_in,
-    assert_not_in,
-    bullet_clients,
-    followed_by,
-    in_its_own_python,
-    need_engine,
-    of_python,
-    refused,
-    written,
-)
+from .support.backends import bullet_clients
+from .support.claims import assert_has, assert_in, assert_not_in, refused
+from .support.files import written
+from .support.patches import Patch, around, followed_by
+from .support.processes import Cli, in_its_own_python, of_python
+from .support.requirements import ROOT, need_engine
 
 DEPTH, ALPHABET = "depth first, children as listed", "depth first, children by alphabet"
 # What each engine answers, by part of the question; measured by others and by hand before.

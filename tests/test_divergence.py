@@ -19,15 +19,11 @@ from statemachine.lab.compare import Request, run_sides
 from statemachine.lab.compare import compare as compare_traces
 from statemachine.lab.questions import compare_page as report
 
-from .conftest import (
-    after,
-    need_engine,
-    opened,
-    overlapping,
-    refused,
-    written,
-)
-from .small_models import ROTOR, STUCK_POST
+from .support.claims import overlapping, refused
+from .support.files import written
+from .support.motions import after, opened
+from .support.requirements import need_engine
+from .support.small_models import ROTOR, STUCK_POST
 
 
 def loaded(folder: Path, text: str, **options: Any) -> sm.Model:

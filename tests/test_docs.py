@@ -34,7 +34,10 @@ from statemachine.show.blocks import (
 )
 from statemachine.show.charts import drawn
 
-from .conftest import ROOT, assert_in, blocks, of_python, refused
+from .support.claims import assert_in, refused
+from .support.pages import blocks
+from .support.processes import of_python
+from .support.requirements import ROOT
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,23 +15,16 @@ from statemachine.show.drawing import Drawing, Part, Surface, drawing_of
 from statemachine.show.drawing import _drawing as shapes
 from statemachine.show.drawing.scene import Camera
 
-from .conftest import (
-    overlapping,
-    refused,
-    written,
-)
-from .small_models import CLOTH, EVERY_SHAPE, TOUCHING_ONLY, model_of
+from .support.claims import overlapping, refused
+from .support.files import written
+from .support.shapes import area_of
+from .support.small_models import CLOTH, EVERY_SHAPE, TOUCHING_ONLY, model_of
 
 
 def _volume(shape: Surface | Part) -> float:
     """By the divergence theorem: positive if every normal points outward."""
     a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
-
-
-def area_of(shape: Any) -> float:
-    a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 def _is_closed(shape: Surface | Part) -> bool:

@@ -13,7 +13,9 @@ from examples import held_box, reach
 from examples.arm import TIP, Episodes, play
 from statemachine.gym import make_env, make_vec
 
-from .conftest import assert_has, need_engine, of_python
+from .support.claims import assert_has
+from .support.processes import of_python
+from .support.requirements import need_engine
 
 EXAMPLES = {"reach": reach, "held_box": held_box}
 # Episodes that end within 1 cm, steps and reward of 16, by policy.

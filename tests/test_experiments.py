@@ -27,18 +27,12 @@ from statemachine.lab.validate.fingertip import random_qpos
 from statemachine.models import models_dir
 from statemachine.show.blocks import Verdict
 
-from .conftest import (
-    around,
-    assert_has,
-    blocks,
-    lesson_result,
-    opened,
-    overlapping,
-    refused,
-    started,
-    written,
-)
-from .small_models import BALL_AND_SLIDE, loaded, model_of
+from .support.claims import assert_has, overlapping, refused
+from .support.files import written
+from .support.motions import opened, started
+from .support.pages import blocks, lesson_result
+from .support.patches import around
+from .support.small_models import BALL_AND_SLIDE, loaded, model_of
 
 
 def test_provenance_covers_included_files(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ import statemachine as sm
 from statemachine.cli import main
 from statemachine.lab.recordings import RunMetadata, RunStart, read, record, write
 
-from .conftest import assert_has, written, written_all
+from .support.claims import assert_has
+from .support.files import written, written_all
 
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>

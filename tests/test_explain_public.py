@@ -17,7 +17,8 @@ from statemachine.lab.runs.scenarios import SCENARIOS, fitting
 from statemachine.lab.why import WhyRequest, explain
 from statemachine.lab.why.causes import differences_of
 
-from .conftest import SHARED, assert_has, shared
+from .support.claims import assert_has
+from .support.requirements import SHARED, shared
 
 pytestmark = pytest.mark.slow
 MODELS = SHARED / "robots" / "models"

@@ -17,9 +17,11 @@ from statemachine.measures.text import capital, percent
 from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Table
 
-from . import test_explain as known
-from .conftest import assert_in, need_engine, written
-from .explained import ALONE, ARM, FLOOR, changed, with_changes
+from .support import known_causes as known
+from .support.claims import assert_in
+from .support.explained import ALONE, ARM, FLOOR, changed, with_changes
+from .support.files import written
+from .support.requirements import need_engine
 
 MOVES = """
 def swing(model, data):
@@ -40,7 +42,7 @@ def zero(model, data):
 
 @dataclass(frozen=True)
 class Pair:
-    """Two sides, and what they do; `test_explain` says what is to be found.
+    """Two sides, and what they do; `known_causes` says what is to be found.
 
     Attributes:
         left, right: Texts of the models.

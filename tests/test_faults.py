@@ -21,15 +21,12 @@ from statemachine.course.grading.faults.run import Examination, FailedTest, Faul
 from statemachine.course.grading.page import faults_page
 from statemachine.errors import BadInputError, EngineError
 
-from .conftest import (
-    ROOT,
-    assert_has,
-    of_python,
-    opened,
-    refused,
-    shown,
-    written_all,
-)
+from .support.claims import assert_has, refused
+from .support.files import written_all
+from .support.motions import opened
+from .support.pages import shown
+from .support.processes import of_python
+from .support.requirements import ROOT
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"

@@ -23,8 +23,18 @@ from statemachine.lab.questions.steps import convergence as page
 from statemachine.lab.recordings import Rerun, Trace, record
 from statemachine.lab.why.gap import Ruler
 
-from .conftest import Cli, refused, shown, written
-from .small_models import BAR_OUTSIDE, DOUBLE_PENDULUM, FALLING_BAR, PENDULUM, TILTED_BOX, model_of
+from .support.claims import refused
+from .support.files import written
+from .support.pages import shown
+from .support.processes import Cli
+from .support.small_models import (
+    BAR_OUTSIDE,
+    DOUBLE_PENDULUM,
+    FALLING_BAR,
+    PENDULUM,
+    TILTED_BOX,
+    model_of,
+)
 
 
 def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:

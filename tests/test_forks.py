@@ -22,8 +22,11 @@ from statemachine.lab.why import Explanation
 from statemachine.processes.parallel import forks_for, in_forks
 from statemachine.show.as_json import dumps
 
-from .conftest import ROOT, lives, refused, soon, without_estimates, written, written_all
-from .explained import ALONE, ARM, SWING, changed, explained
+from .support.claims import refused
+from .support.explained import ALONE, ARM, SWING, changed, explained
+from .support.files import written, written_all
+from .support.processes import lives, soon, without_estimates
+from .support.requirements import ROOT
 
 forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
 FEW = ("mass", "gains", "gravity", "damping")

@@ -27,18 +27,11 @@ from statemachine.measures import Gap
 from statemachine.rotations import matrix_from_quat
 from statemachine.show.as_json import plain
 
-from .conftest import (
-    ROOT,
-    assert_has,
-    assert_in,
-    bits,
-    opened,
-    overlapping,
-    refused,
-    runs_in_silence,
-    started,
-)
-from .small_models import loaded, model_of
+from .support.claims import assert_has, assert_in, overlapping, refused
+from .support.motions import bits, opened, started
+from .support.processes import runs_in_silence
+from .support.requirements import ROOT
+from .support.small_models import loaded, model_of
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 BODY = """<mujoco><option timestep="0.005" integrator="{integrator}"/>

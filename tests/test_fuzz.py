@@ -18,7 +18,9 @@ from statemachine.lab.recordings import formats
 from tools.fuzz import command_lines, kills, models, threads, traces
 from tools.fuzz.__main__ import run_apart, targets
 
-from .conftest import ROOT, assert_has, in_its_own_python, of_python
+from .support.claims import assert_has
+from .support.processes import in_its_own_python, of_python
+from .support.requirements import ROOT
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are POSIX's")
 

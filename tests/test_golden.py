@@ -11,26 +11,19 @@ import pytest
 import statemachine as sm
 from statemachine.lab.runs.robot import TARGET
 
-from .conftest import opened, path
-from .rendering import overlaps_of_silhouettes
+from .support.golden import angles, columns
+from .support.motions import opened, path
+from .support.rendering import overlaps_of_silhouettes
 
 Golden = Callable[[str], np.ndarray]
-
-
-def _columns(table: np.ndarray, *names: str) -> np.ndarray:
-    return np.stack([table[name] for name in names], axis=1)
-
-
-def angles(table: np.ndarray) -> np.ndarray:
-    return _columns(table, *(f"q{i}_rad" for i in range(6)))
 
 
 def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
     table = golden("golden_fk")
     assert len(table) == 200
     tip = mujoco_arm.site_id("gripperframe")
-    positions = _columns(table, "x_m", "y_m", "z_m")
-    matrices = _columns(table, *(f"R{i}{j}" for i in range(3) for j in range(3)))
+    positions = columns(table, "x_m", "y_m", "z_m")
+    matrices = columns(table, *(f"R{i}{j}" for i in range(3) for j in range(3)))
     for qpos, position, matrix in zip(angles(table), positions, matrices, strict=True):
         with opened(mujoco_arm, qpos=qpos, derived=True) as (_, data):
             assert np.abs(data.site_xpos[tip] - position).max() < 1e-12
@@ -40,7 +33,7 @@ def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
 def test_fingertip_by_the_witness(golden: Golden, pinocchio: None) -> None:
     table = golden("golden_fk")
     tips = sm.Kinematics("so101").poses(angles(table), "gripperframe").pos
-    assert np.abs(tips - _columns(table, "x_m", "y_m", "z_m")).max() < 1e-12
+    assert np.abs(tips - columns(table, "x_m", "y_m", "z_m")).max() < 1e-12
 
 
 def test_servos_on(mujoco_scene: sm.Model, golden: Golden) -> None:

@@ -29,8 +29,11 @@ from statemachine.errors import (
 from statemachine.gym import RobotVectorEnv, Start, WorldView, joint_state, make_env, make_vec
 from statemachine.show.drawing.scene import Camera
 
-from .conftest import ROOT, assert_has, refused, runs_in_silence, written
-from .small_models import loaded, mjcf
+from .support.claims import assert_has, refused
+from .support.files import written
+from .support.processes import runs_in_silence
+from .support.requirements import ROOT
+from .support.small_models import loaded, mjcf
 
 pytestmark = pytest.mark.filterwarnings("error")
 

@@ -18,14 +18,9 @@ from statemachine.errors import BusyDataError
 from statemachine.interface import data as data_module
 from statemachine.interface import turns, verbs
 
-from .conftest import ROOT, runs_in_silence
-
-USES: dict[str, Callable[[sm.Model, sm.Data], object]] = {
-    "step": lambda model, data: verbs.step(model, data),
-    "bulk": lambda model, data: verbs.step(model, data, 2),
-    "contacts": lambda _, data: data.contacts,
-    "reset": sm.reset,
-}
+from .support.processes import runs_in_silence
+from .support.requirements import ROOT
+from .support.turns import USES
 
 
 class Other:
@@ -165,7 +160,7 @@ def test_threads_that_take_turns_all_the_time_are_never_inside_together() -> Non
         """
 import sys, threading, time
 import statemachine as sm
-from tests.test_hand_over import USES
+from tests.support.turns import USES
 
 model = sm.load("so101")
 data, end, inside, entered = sm.make_data(model), time.time() + 2.5, [], set()
@@ -215,7 +210,7 @@ def test_an_interrupt_leaves_nothing_taken() -> None:
         """
 import random, signal, threading, time
 import statemachine as sm
-from tests.test_hand_over import USES
+from tests.support.turns import USES
 
 model = sm.load("so101")
 data, end, interrupts, delay = sm.make_data(model), time.time() + 3, 0, random.Random(0)

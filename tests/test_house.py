@@ -13,7 +13,7 @@ import pytest
 
 from statemachine.installed import ENGINES
 
-from .conftest import ROOT
+from .support.requirements import ROOT
 
 PACKAGE = ROOT / "statemachine"
 # Rooms and files that may name an engine: its backend, its room, the table, the witness.
@@ -100,3 +100,40 @@ def test_no_public_class_has_the_name_of_another() -> None:
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     assert [name for name, count in names.items() if count > 1] == []
+
+
+# A test imports no other test.
+
+TESTS = ROOT / "tests"
+_OF_A_TEST = re.compile(
+    r"^\s*(?:from|import) [\w.]*\btest_\w+|^\s*from [\w.]+ import .*\btest_", re.M
+)
+
+
+def test_what_several_tests_need_stands_in_support() -> None:
+    """Code that a test hands to another process included."""
+    files = [*TESTS.rglob("*.py")]
+    assert len(files) > 100
+    importing = {file.name for file in files if _OF_A_TEST.search(file.read_text("utf-8"))}
+    assert importing == set()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from .test_arm import near",
+        "from tests.test_arm import near",
+        "    import tests.test_arm as arm",
+        "from . import test_arm",
+    ],
+)
+def test_an_import_of_a_test_is_seen(line: str) -> None:
+    assert _OF_A_TEST.search(f"import re\n{line}\n")
+
+
+def test_no_private_name_of_support_is_imported() -> None:
+    for file in TESTS.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                private = [alias.name for alias in node.names if alias.name.startswith("_")]
+                assert private == [], f"{file.name} imports {private} of {node.module}"

@@ -16,7 +16,9 @@ import pytest
 
 from statemachine.course.lessons import LESSONS
 
-from .conftest import QUICK, ROOT, need_engine, of_python
+from .support.pages import QUICK
+from .support.processes import of_python
+from .support.requirements import ROOT, need_engine
 
 TABLE = Path(__file__).with_suffix(".json")
 MAY_BE_NULL = {"data_bytes", "world_bytes"}  # memory grows by pages, and freed ones are used again

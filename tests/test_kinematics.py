@@ -19,8 +19,10 @@ from statemachine.errors import BadInputError, ModelError, ModelFileError, Unkno
 from statemachine.lab.runs.provenance import model_digest
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import assert_has, opened, refused, written_all
-from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND
+from .support.claims import assert_has, refused
+from .support.files import written_all
+from .support.motions import opened
+from .support.small_models import ATTACHED, BODY, EVERY_JOINT, STAND
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 

@@ -56,19 +56,11 @@ from statemachine.show.blocks import (
     Verdict,
 )
 
-from .conftest import (
-    ROOT,
-    Cli,
-    assert_has,
-    assert_in,
-    blocks,
-    lesson_result,
-    of_python,
-    refused,
-    with_figures,
-    without_estimates,
-    written,
-)
+from .support.claims import assert_has, assert_in, refused
+from .support.files import written
+from .support.pages import blocks, lesson_result, with_figures
+from .support.processes import Cli, of_python, without_estimates
+from .support.requirements import ROOT
 
 _TIMED = {"time", "speed", "worlds", "objects", "questions"}  # print wall times
 _QUICK = {

@@ -10,7 +10,7 @@ import pytest
 from statemachine.show.blocks import Traces
 from statemachine.show.charts import draw_picture
 
-from .conftest import assert_has
+from .support.claims import assert_has
 
 pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure

@@ -17,7 +17,9 @@ import pytest
 from statemachine import backends, engines
 from statemachine.installed import ENGINES
 
-from .conftest import ROOT, Cli, distribution, one_line
+from .support.files import distribution
+from .support.processes import Cli, one_line
+from .support.requirements import ROOT
 
 NAME = "hidden"
 ON = ("--backend", NAME)
@@ -30,7 +32,7 @@ SAYS_NO, BAD_INPUT = 1, 2
 @pytest.fixture
 def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder to work in, in which the engine is known; to the processes that are started too."""
-    entries = f"[statemachine.backends]\n{NAME} = tests.hidden_world:load\n"
+    entries = f"[statemachine.backends]\n{NAME} = tests.support.hidden_world:load\n"
     packages = distribution(tmp_path / "packages", "made-up", "1.0", entries).parent
     monkeypatch.syspath_prepend(str(packages))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(packages), str(ROOT))))
@@ -45,7 +47,7 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def room(engine: Path) -> None:
     """It has a room, in which some methods are."""
     with (engine / "made_up-1.0.dist-info" / "entry_points.txt").open("a") as file:
-        file.write(f"[statemachine.engines]\n{NAME} = tests.made_up:MyEngine\n")
+        file.write(f"[statemachine.engines]\n{NAME} = tests.support.made_up:MyEngine\n")
 
 
 Said = Callable[..., str]

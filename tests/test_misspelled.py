@@ -20,7 +20,7 @@ from statemachine.show.check_templates import faults_of, members_of
 from statemachine.show.templates import environment
 from tools.check_templates import contents
 
-from .conftest import ROOT
+from .support.requirements import ROOT
 
 SEED = 46
 ROOMS = ("cli", "course", "lab", "view")

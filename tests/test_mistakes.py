@@ -10,8 +10,10 @@ import pytest
 from statemachine import load
 from statemachine.lab.recordings import record, write
 
-from .conftest import ROOT, Cli, one_line, written_all
-from .small_models import BENT, TWO_LINKS, TWO_SERVOS
+from .support.files import written_all
+from .support.processes import Cli, one_line
+from .support.requirements import ROOT
+from .support.small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 CONTROLLERS = """
 def controller(model, data):

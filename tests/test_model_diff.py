@@ -22,9 +22,11 @@ from statemachine.lab.model_differences.ledger import ReadingDifference, digits_
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 
-from .conftest import assert_has, opened, refused, written, written_all
-from .explained import with_changes
-from .two_arms import mjcf, urdf
+from .support.claims import assert_has, refused
+from .support.explained import with_changes
+from .support.files import written, written_all
+from .support.motions import opened
+from .support.two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
 

@@ -26,7 +26,10 @@ from statemachine.lab.runs import controllers
 from statemachine.lab.sweep import read_manifest
 from statemachine.model_files import check_model_file, checked_file
 
-from .conftest import ROOT, Cli, of_python, refused, written
+from .support.claims import refused
+from .support.files import written
+from .support.processes import Cli, of_python
+from .support.requirements import ROOT
 
 pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
 

@@ -24,8 +24,11 @@ from statemachine.lab.robots import find
 from statemachine.models import models_dir, resolve
 from statemachine.show.as_json import dumps
 
-from .conftest import assert_has, opened, refused, registered, written, written_all
-from .small_models import MOTORS, PACKAGED_URDF, model_of
+from .support.backends import registered
+from .support.claims import assert_has, refused
+from .support.files import written, written_all
+from .support.motions import opened
+from .support.small_models import MOTORS, PACKAGED_URDF, model_of
 
 ONE_JOINT = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 

@@ -20,14 +20,10 @@ from statemachine.backends import compiled, mujoco_backend
 from statemachine.backends.mujoco import alarms as mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import (
-    assert_has,
-    opened,
-    overlapping,
-    refused,
-    runs_in_silence,
-)
-from .small_models import SLIDE, TWO_SLIDES, crowded, loaded, model_of
+from .support.claims import assert_has, overlapping, refused
+from .support.motions import opened
+from .support.processes import runs_in_silence
+from .support.small_models import SLIDE, TWO_SLIDES, crowded, loaded, model_of
 
 
 @pytest.fixture(autouse=True)

@@ -17,15 +17,11 @@ from statemachine.errors import (
     UnknownNameError,
 )
 
-from .conftest import (
-    ROOT,
-    after,
-    in_its_own_python,
-    opened,
-    overlapping,
-    refused,
-)
-from .small_models import GEOM, loaded
+from .support.claims import overlapping, refused
+from .support.motions import after, opened
+from .support.processes import in_its_own_python
+from .support.requirements import ROOT
+from .support.small_models import GEOM, loaded
 
 
 def test_options_go_off_and_on_again(mujoco_scene: sm.Model) -> None:

@@ -12,9 +12,12 @@ from coverage import CoverageData
 
 from tools.mutants import __main__ as run
 from tools.mutants.covered import Covered
-from tools.mutants.draw import Mutant, Site, all_sites, find, sites
+from tools.mutants.draw import Site, all_sites, by_code, find, sites
+from tools.mutants.renew import NOT_TRIED, Row, renewed
 
-from .conftest import ROOT, assert_in, written, written_all
+from .support.claims import assert_in
+from .support.files import written, written_all
+from .support.requirements import ROOT
 
 SOURCE = '''"""A module."""
 LIMIT = 3
@@ -54,24 +57,91 @@ def test_a_fault_is_found_where_its_code_went(tmp_path: Path) -> None:
     mutants = [site.mutant for site in sites(_module(tmp_path), tmp_path)]
     (tmp_path / "statemachine" / "arm.py").unlink()
     _module(tmp_path, "moved.py", SOURCE.replace("LIMIT:", "LIMIT + 1:"))
-    standing = {site.mutant.code: [site] for site in all_sites(tmp_path)}
+    standing = by_code(all_sites(tmp_path))
     found = [(mutant.statement, find(mutant, standing)) for mutant in mutants]
     gone = {statement for statement, site in found if site is None}
     assert gone == {"LIMIT = 3", "if x + 1 < LIMIT:"}  # short, without a function; and changed
     assert {site.mutant.file for _, site in found if site} == {"statemachine/moved.py"}
 
 
-def test_every_fault_of_the_list_still_compiles() -> None:
-    rows = json.loads(run.RESULTS.read_text("utf-8"))
-    assert len(rows) == 300
-    standing: dict[tuple[str, str, int, str], list[Site]] = {}
-    for site in all_sites(ROOT):
-        standing.setdefault(site.mutant.code, []).append(site)
-    mutants = [Mutant(**{n: row[n] for n in Mutant.__dataclass_fields__}) for row in rows]
-    found = [site for mutant in mutants if (site := find(mutant, standing))]
-    assert found
-    for site in found:
-        compile(site.source(ROOT), site.mutant.file, "exec")
+@pytest.fixture(scope="module")
+def sites_of_list() -> list[Site]:
+    """Every fault that the modules of the list allow."""
+    files = {ROOT / row.mutant.file for row in run.read()}
+    return [site for file in files if file.exists() for site in sites(file, ROOT)]
+
+
+def test_every_fault_of_the_list_stands_in_its_file_in_one_place(
+    sites_of_list: list[Site],
+) -> None:
+    mutants = [row.mutant for row in run.read()]
+    assert len(set(mutants)) == len(mutants) == 300
+    places = Counter(site.mutant for site in sites_of_list)
+    elsewhere = [str(mutant) for mutant in mutants if places[mutant] != 1]
+    assert elsewhere == [], "python -m tools.mutants --renew brings the list up to date"
+
+
+def test_every_fault_of_the_list_makes_another_module(sites_of_list: list[Site]) -> None:
+    mutants = {row.mutant for row in run.read()}
+    for site in sites_of_list:
+        if site.mutant in mutants:
+            faulty = compile(site.source(ROOT), "module", "exec")
+            assert faulty != compile((ROOT / site.mutant.file).read_bytes(), "module", "exec")
+
+
+# The list is brought up to date
+
+
+def _rows(folder: Path) -> list[Row]:
+    return [Row(site.mutant, "killed", "tests/test_arm.py::near") for site in all_sites(folder)]
+
+
+def test_a_list_that_is_up_to_date_stays_as_it_is(tmp_path: Path) -> None:
+    _module(tmp_path)
+    rows = _rows(tmp_path)
+    assert set(renewed(rows, all_sites(tmp_path), 0)) == set(rows)
+
+
+def test_a_fault_keeps_its_result_where_its_module_went(tmp_path: Path) -> None:
+    file = _module(tmp_path)
+    rows = [row for row in _rows(tmp_path) if row.mutant.function == "near"]
+    file.rename(file.with_name("moved.py"))
+    now = renewed(rows, all_sites(tmp_path), 0)
+    assert {row.mutant.file for row in now} == {"statemachine/moved.py"}
+    assert {row.result for row in now} == {"killed"}
+    assert {row.mutant.code for row in now} == {row.mutant.code for row in rows}
+
+
+def test_a_fault_is_the_same_in_what_its_statement_has_become_and_is_not_tried(
+    tmp_path: Path,
+) -> None:
+    _module(tmp_path)
+    [row] = [row for row in _rows(tmp_path) if row.mutant.becomes == "(x + 1 <= LIMIT)"]
+    _module(tmp_path, source=SOURCE.replace("if x + 1 < LIMIT:", "if near or x + 1 < LIMIT:"))
+    [now] = renewed([row], all_sites(tmp_path), 0)
+    statement = "if near or x + 1 < LIMIT:"
+    assert (now.mutant.statement, now.mutant.becomes) == (statement, "(x + 1 <= LIMIT)")
+    assert (now.result, now.test) == (NOT_TRIED, "")
+
+
+def test_another_fault_is_drawn_where_the_code_is_gone(tmp_path: Path) -> None:
+    _module(tmp_path)
+    rows = [row for row in _rows(tmp_path) if row.mutant.kind == "comparison"]
+    _module(tmp_path, source="def far(y: int) -> int:\n    note(y)\n    return y - 7 + 3\n")
+    standing = {site.mutant for site in all_sites(tmp_path)}
+    drawn = [renewed(rows, all_sites(tmp_path), seed) for seed in (0, 0, 1)]
+    assert drawn[0] == drawn[1]
+    for now in drawn:
+        assert len({row.mutant for row in now} & standing) == len(rows) == 3
+        assert {row.result for row in now} == {NOT_TRIED}
+
+
+def test_a_fault_that_stands_twice_is_not_in_the_list(tmp_path: Path) -> None:
+    _module(tmp_path)
+    [row] = [row for row in _rows(tmp_path) if row.mutant.kind == "dropped call"]
+    _module(tmp_path, source=SOURCE.replace("self.log(x)", "self.log(x)\n        self.log(x)"))
+    [now] = renewed([row], all_sites(tmp_path), 0)
+    assert now.mutant.kind != "dropped call"
 
 
 def test_tests_are_chosen_by_line_room_and_time(tmp_path: Path) -> None:

@@ -23,8 +23,9 @@ from statemachine.lab.why import Explanation
 from statemachine.lab.why import page as why
 from statemachine.lab.why.verdict import Facts, GapVerdict, verdict_of
 
-from .conftest import Cli, written
-from .small_models import model_of
+from .support.files import written
+from .support.processes import Cli
+from .support.small_models import model_of
 
 # Balanced about its axis, along which no gravity acts. It is made of what `TURNED` is made of,
 # turned about its middle.

@@ -11,8 +11,9 @@ import statemachine as sm
 from statemachine.engines.mujoco.description import read
 from tools.fuzz import random_models
 
-from .conftest import Cli, written
-from .small_models import mjcf
+from .support.files import written
+from .support.processes import Cli
+from .support.small_models import mjcf
 
 # A mocap body leads a free one by a weld; the file has no keyframe.
 LED = mjcf(

@@ -10,8 +10,10 @@ import pytest
 from statemachine.lab.model_differences import compare
 from statemachine.lab.model_differences.ledger import ReadingDifference
 
-from .conftest import Cli, assert_has, written_all
-from .explained import ALONE, ARM, Case, changed
+from .support.claims import assert_has
+from .support.explained import ALONE, ARM, Case, changed
+from .support.files import written_all
+from .support.processes import Cli
 
 
 def _listed(folder: Path, right: str, left: str = ARM) -> list[ReadingDifference]:

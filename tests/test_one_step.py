@@ -19,8 +19,8 @@ from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
 from statemachine.show.blocks import Verdict
 
-from .conftest import assert_has, assert_in, refused
-from .small_models import LINKS_AND_BALL, TWO_LINKS, model_of
+from .support.claims import assert_has, assert_in, refused
+from .support.small_models import LINKS_AND_BALL, TWO_LINKS, model_of
 
 CHANGES = {
     "kinematics": ('pos="0.3 0 0"><joint', 'pos="0.303 0 0"><joint', "lower"),

@@ -19,8 +19,9 @@ import statemachine as sm
 from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 
-from .conftest import opened, path, refused
-from .small_models import CART, model_of, on_both
+from .support.claims import refused
+from .support.motions import opened, path
+from .support.small_models import CART, model_of, on_both
 
 SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
 MOTOR = '<motor name="motor" joint="other"/>'

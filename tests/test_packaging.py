@@ -14,7 +14,8 @@ import pytest
 
 from statemachine import __version__
 
-from .conftest import ROOT, assert_in
+from .support.claims import assert_in
+from .support.requirements import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 

@@ -46,20 +46,13 @@ from statemachine.lab.recordings import RunMetadata, Trace, record, shipped, wri
 from statemachine.lab.recordings.header import INPUTS
 from statemachine.show.drawing.scene import Camera, Shot, compose, framed, smaller
 
-from .conftest import (
-    ROOT,
-    Cli,
-    assert_has,
-    assert_in,
-    need_engine,
-    processes_with,
-    refused,
-    soon,
-    written,
-)
-from .rendering import rendering_environment, seen_by, silhouettes
-from .small_models import mjcf
-from .test_strange_traces import changed as edited
+from .support.claims import assert_has, assert_in, refused
+from .support.files import written
+from .support.processes import Cli, processes_with, soon
+from .support.rendering import rendering_environment, seen_by, silhouettes
+from .support.requirements import ROOT, need_engine
+from .support.small_models import mjcf
+from .support.traces import changed as edited
 
 pytestmark = pytest.mark.slow  # a browser or a renderer at work
 

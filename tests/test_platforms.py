@@ -23,7 +23,10 @@ from statemachine import installed
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, engine_version
 
-from .conftest import ROOT, Cli, assert_in, distribution, of_python, refused
+from .support.claims import assert_in, refused
+from .support.files import distribution
+from .support.processes import Cli, of_python
+from .support.requirements import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] != "#"]

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from .conftest import ROOT, of_python
+from .support.processes import of_python
+from .support.requirements import ROOT
 
 _RUN = """
 import hashlib, json, sys

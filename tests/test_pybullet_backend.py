@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import mmap
 import os
 import shlex
 import subprocess
@@ -24,22 +23,16 @@ from statemachine.errors import (
     UnsupportedError,
 )
 
-from .conftest import (
-    ROOT,
-    after,
-    around,
-    assert_has,
-    assert_in,
-    bullet_clients,
-    opened,
-    overlapping,
-    path,
-    refused,
-    runs_in_silence,
-    written,
-)
-from .small_models import TWO_ROOTS, on_both
-from .test_golden import angles
+from .support.backends import bullet_clients
+from .support.claims import assert_has, assert_in, overlapping, refused
+from .support.files import written
+from .support.golden import angles
+from .support.motions import after, opened, path
+from .support.patches import around
+from .support.processes import memory_of, runs_in_silence
+from .support.pybullet_claims import two_free_bodies_are_two
+from .support.requirements import ROOT
+from .support.small_models import TWO_ROOTS, on_both
 
 Golden = Callable[[str], np.ndarray]
 HOLD = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
@@ -122,22 +115,7 @@ def test_a_fast_ball_has_the_signs_of_mujoco(tmp_path: Path) -> None:
 
 def test_two_free_bodies_are_two(tmp_path: Path) -> None:
     """Each is loaded from a text of its own, under a name that may be the other's again."""
-    from statemachine.backends.bullet.client import pb
-
-    balls = "".join(
-        f"<body name='b{k}' pos='{k} 0 {radius}'><freejoint/>"
-        f"<geom size='{radius}' mass='{mass}'/></body>"
-        for k, (radius, mass) in enumerate(((0.1, 1.0), (0.2, 3.0)))
-    )
-    with opened(load(mjcf(tmp_path, _world(f"<geom type='plane' size='5 5 1'/>{balls}")))) as (
-        model,
-        data,
-    ):
-        free = [tree.body for tree in data.raw.trees if tree.free]
-        assert [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free] == [1.0, 3.0]
-        sm.step(model, data, 200)
-        # A millimetre into the floor is more than either sinks.
-        assert np.abs(data.qpos[[2, 9]] - (0.1, 0.2)).max() < 0.001
+    two_free_bodies_are_two(tmp_path)
 
 
 # Noise.
@@ -348,11 +326,6 @@ def test_engine_does_not_tell_forces_by_part() -> None:
 
 
 # What a Data costs, and gives back.
-
-
-def memory_of(pid: int | str = "self") -> float:
-    """Resident memory of a process [MB]."""
-    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * mmap.PAGESIZE / 1e6
 
 
 @linux

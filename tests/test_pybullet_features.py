@@ -15,8 +15,9 @@ import statemachine as sm
 from statemachine.errors import UnsupportedError
 from statemachine.models import resolve
 
-from .conftest import refused, warnings_of, written
-from .small_models import ARM_URDF, BOX_URDF, FEATURED, largest_gap, on_both
+from .support.claims import refused, warnings_of
+from .support.files import written
+from .support.small_models import ARM_URDF, BOX_URDF, FEATURED, largest_gap, on_both
 
 pytestmark = pytest.mark.usefixtures("bullet")
 FLOOR = '<geom name="floor" type="plane" size="2 2 .1"/>'

@@ -12,8 +12,10 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnsupportedError
 
-from .conftest import opened, path, refused, written
-from .small_models import both, forward_at_one_state, largest_gap, loaded, on_both
+from .support.claims import refused
+from .support.files import written
+from .support.motions import opened, path
+from .support.small_models import both, forward_at_one_state, largest_gap, loaded, on_both
 
 pytestmark = pytest.mark.usefixtures("bullet")
 

@@ -12,17 +12,9 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnsupportedError
 
-from .conftest import (
-    after,
-    assert_in,
-    opened,
-    overlapping,
-    path,
-    refused,
-    started,
-    warnings_of,
-)
-from .small_models import both, on_both
+from .support.claims import assert_in, overlapping, refused, warnings_of
+from .support.motions import after, opened, path, started
+from .support.small_models import both, on_both
 
 FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
 pytestmark = pytest.mark.usefixtures("bullet")

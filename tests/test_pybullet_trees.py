@@ -18,8 +18,15 @@ from statemachine.lab.recordings import files, play, replayed
 from statemachine.lab.recordings.recorder import record
 from statemachine.worlds import make_worlds
 
-from .conftest import after, opened, refused, warnings_of, written
-from .small_models import REFS, TREES, both, forward_at_one_state, largest_gap, loaded, on_both
+from .support.claims import refused, warnings_of
+from .support.motions import after, opened
+from .support.pybullet_claims import gap, moves_as_on_mujoco
+from .support.small_models import (
+    REFS,
+    TREES,
+    both,
+    loaded,
+)
 
 pytestmark = pytest.mark.usefixtures("bullet")
 
@@ -93,22 +100,6 @@ MEDIA = ('density="1000"', 'viscosity="2"', 'density="1000" viscosity="1" wind="
 
 def option(integrator: str, more: str = "") -> str:
     return f'<option timestep="0.002" integrator="{integrator}" {more}/>'
-
-
-def gap(models: list[sm.Model], close: float = 1e-5) -> float:
-    """The largest gap of qpos under random commands; `forward` agrees at the end.
-
-    Closed forms are as close as is asked for; accelerations are sums over sweeps.
-    """
-    with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
-        assert right.qpos == pytest.approx(left.qpos)
-        gap = largest_gap(models, (left, right), steps=300, every=20)
-        forward_at_one_state(models, (left, right))
-        closed = "xpos", "site_xpos", "site_xmat", "qfrc_bias", "qfrc_passive", "qfrc_actuator"
-        for name, most in {**dict.fromkeys(closed, close), "qacc": 1e-5}.items():
-            ours, theirs = getattr(right, name), getattr(left, name)
-            assert np.abs(ours - theirs).max() < most * max(1.0, np.abs(theirs).max()), name
-    return gap
 
 
 @pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
@@ -196,7 +187,7 @@ def test_what_a_mocap_body_carries_meets_others(tmp_path: Path, kind: str) -> No
 @pytest.mark.parametrize(("text", "most"), [(REFS, 1e-9), (TREES, 2e-5)], ids=["zeros", "zoo"])
 def test_a_file_moves_as_on_mujoco(tmp_path: Path, text: str, most: float) -> None:
     """One with a bit of everything; and one whose joints are not at 0 in the file's pose."""
-    assert gap(on_both(written(tmp_path / "m.xml", f"<mujoco>{text}</mujoco>")), 1e-10) < most
+    moves_as_on_mujoco(tmp_path, text, most)
 
 
 @pytest.mark.parametrize("base", BASES)

@@ -16,8 +16,8 @@ from statemachine.lab.questions.requests.gap import CompareRequest, CompareResul
 from statemachine.lab.recordings import Rerun
 from statemachine.measures import RobotScale, places_of, tolerance_of
 
-from .conftest import written
-from .small_models import model_of
+from .support.files import written
+from .support.small_models import model_of
 
 # 0.612 kg, 6.0 N, 0.4 m; the wrist is five hundred times lighter than the upper arm. No armature.
 ARM = """<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>

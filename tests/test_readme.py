@@ -16,7 +16,11 @@ from statemachine.course.lessons.questions import ASKED
 from statemachine.interface import Model
 from statemachine.lab.probes.conventions import QUESTIONS
 
-from .conftest import ROOT, Cli, assert_in, need_engine, of_python, opened, written_all
+from .support.claims import assert_in
+from .support.files import written_all
+from .support.motions import opened
+from .support.processes import Cli, of_python
+from .support.requirements import ROOT, need_engine
 
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text("utf-8")

@@ -10,7 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, assert_in, distribution, need_engine, of_python, written_all
+from .support.claims import assert_in
+from .support.files import distribution, written_all
+from .support.processes import of_python
+from .support.requirements import ROOT, need_engine
 
 RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in _KINDS": how the line of the file begins after which its lines go.
@@ -109,10 +112,10 @@ def test_a_convention(copy: Copy) -> None:
 
 @pytest.mark.slow
 def test_a_backend(copy: Copy) -> None:
-    text = (ROOT / "tests" / "hidden_world.py").read_text()
+    text = (ROOT / "tests" / "support" / "hidden_world.py").read_text()
     backend = text.replace('backend="hidden"', 'backend="mine"')
     package = written_all(copy.folder / "my_package", {"backend.py": backend, "__init__.py": ""})
-    shutil.copytree(ROOT / "tests" / "made_up", package / "room")
+    shutil.copytree(ROOT / "tests" / "support" / "made_up", package / "room")
     (register,) = code(recipe("Add a backend"))
     here = {"PYTHONPATH": str(copy.folder)}
     done = of_python("-c", register, folder=copy.folder, code=0, **here)

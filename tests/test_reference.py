@@ -17,7 +17,9 @@ from tools.benchmarks.interleave import NULL, Ratio
 from tools.reference.figures import DEFAULT, differences, flatten, largest_number, tolerance_of
 from tools.reference.groups import GROUPS, QUICK, absent, changes, kept, write
 
-from .conftest import REQUIRED, ROOT, of_python, refused
+from .support.claims import refused
+from .support.processes import of_python
+from .support.requirements import REQUIRED, ROOT
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +23,7 @@ import pytest
 
 import statemachine as sm
 from statemachine import conformance, releases
-from statemachine.backends.served.release_backend import ServedEngine, Server, served
+from statemachine.backends.served.release_backend import Server
 from statemachine.cli import main
 from statemachine.errors import (
     BadInputError,
@@ -36,27 +35,16 @@ from statemachine.errors import (
     UnsupportedError,
 )
 from statemachine.installed import engine_version
-from statemachine.interface import Behaviour
 from statemachine.processes import resident_memory
 from statemachine.worlds import make_worlds, step
 
-from .conftest import (
-    RELEASES,
-    after,
-    assert_in,
-    bits,
-    lesson_result,
-    lives,
-    opened,
-    path,
-    refused,
-    registered,
-    soon,
-    written,
-    written_all,
-)
-from .small_models import LINKS_AND_BALL, mjcf, model_of
-from .test_pybullet_backend import memory_of
+from .support.backends import RELEASES, process_of, registered
+from .support.claims import assert_in, refused
+from .support.files import written, written_all
+from .support.motions import after, bits, opened, path
+from .support.pages import lesson_result
+from .support.processes import lives, memory_of, soon
+from .support.small_models import LINKS_AND_BALL, mjcf, model_of
 
 OLD, STRANGE, SAME = RELEASES
 HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
@@ -68,11 +56,6 @@ def nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user without any release."""
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(tmp_path))
     return tmp_path
-
-
-def process_of(model: Any) -> int:
-    """The number of the process in which the engine of a Model runs."""
-    return Server.of(model._reading.engine).pid
 
 
 installs = pytest.mark.usefixtures("old_releases")
@@ -482,7 +465,7 @@ class TestReleases:
     def test_it_ends_with_its_parent(self) -> None:
         code = (
             "import statemachine as sm, threading\n"
-            "from tests.test_releases import process_of\n"
+            "from tests.support.backends import process_of\n"
             f"model = sm.load('so101', backend={OLD!r})\n"
             "data, pid = sm.make_data(model), process_of(model)\n"
             "threading.Timer(0.5, lambda: print(pid, flush=True)).start()\n"
@@ -529,7 +512,7 @@ class TestReleases:
             assert np.array_equal(worlds.qpos[2], run_of(model, 20)[0][-1])
 
     def test_any_engine_by_one_file(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        with registered("made up", "tests.test_releases:load_made_up") as name:
+        with registered("made up", "tests.support.backends:load_made_up") as name:
             outcomes = conformance.run(name)
             model = sm.load("so101", backend=name)
         assert model.engine_version == f"made up on {engine_version('mujoco')}"
@@ -537,23 +520,3 @@ class TestReleases:
         assert {outcome.result for outcome in outcomes} == {"passed", "skipped"}
         assert np.array_equal(run_of(model)[0], run_of(sm.load("so101"))[0])
         refused((UnsupportedError, "contacts", lambda: model.replace(contacts=False)))  # a flag
-
-
-def load_made_up(path: Path, defaults: Any = "model") -> Any:
-    """A backend of another package, whose engine is in a Python of its own."""
-    engine = ServedEngine(
-        "made up",
-        str(releases.python_of(SAME)),
-        str(Path(__file__).with_name("made_up_child.py")),
-        "the made-up engine",
-    )
-    native = sm.load("so101").capabilities
-    behaviours = {
-        **native.behaviours,
-        **dict.fromkeys(("contacts", "forces by part"), Behaviour("unsupported", "it tells none")),
-    }
-    flags = {"actuation", "contacts", "limits"}
-    said = replace(
-        native, options=tuple(sorted(set(native.options) - flags)), behaviours=behaviours
-    )
-    return served(engine, said)(path, defaults)

@@ -55,11 +55,13 @@ from statemachine.show.html import Look, check_target, report, write_report
 from statemachine.show.html.geometry import bones_of, mesh_as_data, mesh_of
 from statemachine.show.html.scene import moments_of, rows_at
 
-from .browser import Tab, browser
-from .conftest import ROOT, assert_has, assert_in, refused, soon
-from .test_drawing import area_of
-from .test_strange_traces import added, cut
-from .test_strange_traces import changed as edited
+from .support.browser import Tab, browser
+from .support.claims import assert_has, assert_in, refused
+from .support.processes import soon
+from .support.requirements import ROOT
+from .support.shapes import area_of
+from .support.traces import added, cut
+from .support.traces import changed as edited
 
 LIMIT = 2_000_000  # bytes
 CSS = ROOT / "statemachine/show/html/page.css"

@@ -32,7 +32,7 @@ from statemachine.lab.sweep.questions import SweepReportRequest, SweepRequest
 from statemachine.lab.validate.fingertip_request import FingertipRequest
 from statemachine.view.request import RecordingRequest, ServerSettings, SimulationRequest
 
-from .conftest import of_python
+from .support.processes import of_python
 
 HOLD = Request(("hold",))
 FINE = Side("so101", options={"timestep": 0.002})

@@ -22,8 +22,8 @@ from statemachine.lab.questions import film
 from statemachine.show import terminal
 from statemachine.show.blocks import Page, Printed, Question, RobotPicture, Text
 
-from .conftest import assert_has, assert_in
-from .rendering import rendering_environment
+from .support.claims import assert_has, assert_in
+from .support.rendering import rendering_environment
 
 
 def test_every_lesson_of_the_path_has_one() -> None:

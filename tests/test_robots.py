@@ -39,20 +39,13 @@ from statemachine.lab.robots.records import read_table, write_table
 from statemachine.lab.runs.provenance import model_files
 from statemachine.lab.runs.scenarios import scenario
 
-from .conftest import (
-    ROOT,
-    around,
-    assert_has,
-    assert_in,
-    need_engine,
-    processes_with,
-    refused,
-    shown,
-    soon,
-    written,
-    written_all,
-)
-from .small_models import mjcf
+from .support.claims import assert_has, assert_in, refused
+from .support.files import written, written_all
+from .support.pages import shown
+from .support.patches import around
+from .support.processes import processes_with, soon
+from .support.requirements import ROOT, need_engine
+from .support.small_models import mjcf
 
 GOOD = """<mujoco><option timestep='0.002'/><worldbody>
 <body name='arm' pos='0 0 1'><joint name='j' axis='0 1 0' damping='0.1'/>

@@ -19,7 +19,10 @@ from statemachine.processes import sandbox
 from statemachine.processes.parallel import worker_processes
 from statemachine.processes.places import View, bare_python
 
-from .conftest import ROOT, assert_has, lives, processes_with, refused, written_all
+from .support.claims import assert_has, refused
+from .support.files import written_all
+from .support.processes import lives, processes_with
+from .support.requirements import ROOT
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are POSIX")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")

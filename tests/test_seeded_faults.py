@@ -25,8 +25,11 @@ from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.course.grading.faults import patches
 from statemachine.interface import Model, State, read_only
 
-from .conftest import Patch, around, followed_by, need_engine, refused, registered
-from .pybullet_faults import PYBULLET_FAULTS
+from .support.backends import registered
+from .support.claims import refused
+from .support.patches import Patch, around, followed_by
+from .support.pybullet_faults import PYBULLET_FAULTS
+from .support.requirements import need_engine
 
 
 def derived(part: str, change: Callable[[MujocoData, np.ndarray], np.ndarray]) -> Patch:

@@ -32,8 +32,11 @@ from statemachine.course.grading.page import (
 from statemachine.errors import BadInputError
 from statemachine.processes import sandbox
 
-from .conftest import ROOT, refused, shown, written, written_all
-from .exercises import SOLUTION, TEMPLATE
+from .support.claims import refused
+from .support.exercises import SOLUTION, TEMPLATE
+from .support.files import written, written_all
+from .support.pages import shown
+from .support.requirements import ROOT
 
 SECRET = "the-text-of-a-file-of-the-teachers"
 JUDGE = ROOT / "statemachine" / "course" / "grading" / "judges" / "gravity.py"

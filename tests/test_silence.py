@@ -11,7 +11,8 @@ import pytest
 
 from statemachine.installed import silence
 
-from .conftest import ROOT, runs_in_silence
+from .support.processes import runs_in_silence
+from .support.requirements import ROOT
 
 pytestmark = pytest.mark.skipif(
     sys.platform not in ("linux", "darwin"), reason="C's streams can be exchanged in its library"

@@ -17,16 +17,10 @@ from statemachine import cli as command_line
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.installed import ENGINES, require
 
-from .conftest import (
-    REQUIRED,
-    ROOT,
-    Cli,
-    in_its_own_python,
-    of_python,
-    one_line,
-    refused,
-    written_all,
-)
+from .support.claims import refused
+from .support.files import written_all
+from .support.processes import Cli, in_its_own_python, of_python, one_line
+from .support.requirements import REQUIRED, ROOT
 
 HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 

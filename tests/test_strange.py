@@ -16,8 +16,11 @@ import statemachine as sm
 from statemachine.backends.compiled import check_numbers
 from statemachine.errors import EngineWarning, ModelError, StateMachineError
 
-from .conftest import assert_in, in_its_own_python, opened, refused, warnings_of, written
-from .small_models import model_of
+from .support.claims import assert_in, refused, warnings_of
+from .support.files import written
+from .support.motions import opened
+from .support.processes import in_its_own_python
+from .support.small_models import model_of
 
 _BODY = (
     '<body name="arm"{body}><joint name="lift"{joint}/><geom name="part" size="0.1"{geom}/></body>'

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
@@ -17,7 +15,7 @@ import statemachine as sm
 from statemachine.atomic_files import check_place, replace_file
 from statemachine.errors import ModelFileError, TraceError
 from statemachine.interface import JointType
-from statemachine.lab.compare import Agreement, Comparison, compare, witness
+from statemachine.lab.compare import compare, witness
 from statemachine.lab.questions import compare_page as report
 from statemachine.lab.recordings import (
     RunMetadata,
@@ -29,8 +27,12 @@ from statemachine.lab.recordings import (
     write,
 )
 
-from .conftest import Cli, assert_has, refused, shown, written_all
-from .small_models import TWO_NAMELESS, model_of
+from .support.claims import assert_has, refused
+from .support.files import written_all
+from .support.pages import shown
+from .support.processes import Cli
+from .support.small_models import TWO_NAMELESS, model_of
+from .support.traces import added, changed, cut, named
 
 
 @pytest.fixture(scope="module")
@@ -41,27 +43,6 @@ def box() -> Trace:
         start=RunStart(keyframe="held"),
         metadata=RunMetadata(experiment="box"),
     )
-
-
-def changed(trace: Trace, header: dict[str, Any] | None = None, **columns: Any) -> Trace:
-    return Trace(dataclasses.replace(trace.header, **(header or {})), {**trace.columns, **columns})
-
-
-def cut(trace: Trace, rows: int, **header: Any) -> Trace:
-    kept = {n: a[:rows] for n, a in trace.columns.items() if not n.startswith("contact_")}
-    touching = trace["contact_row"] < rows
-    kept |= {n: a[touching] for n, a in trace.columns.items() if n.startswith("contact_")}
-    return Trace(dataclasses.replace(trace.header, **header), kept)
-
-
-def named(found: Comparison) -> dict[str, Agreement]:
-    return {each.name: each for each in found.agreements}
-
-
-def added(array: Any, row: Any, by: Any) -> Any:
-    copy = np.array(array)
-    copy[row] += by
-    return copy
 
 
 @pytest.mark.parametrize(

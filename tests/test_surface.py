@@ -12,7 +12,7 @@ import statemachine as sm
 from statemachine import cli
 from statemachine.interface import OPTIONS
 
-from .conftest import ROOT
+from .support.requirements import ROOT
 
 SURFACE = tomllib.loads((ROOT / "surface.toml").read_text("utf-8"))
 

@@ -46,15 +46,10 @@ from statemachine.lab.sweep.folder import locked, settle_manifest
 from statemachine.lab.sweep.rows import KEY, RowWriter, counted, remove_failed
 from statemachine.lab.sweep.worker import differing, run_batch
 
-from .conftest import (
-    ROOT,
-    assert_has,
-    in_its_own_python,
-    refused,
-    soon,
-    without_estimates,
-    written,
-)
+from .support.claims import assert_has, refused
+from .support.files import written
+from .support.processes import in_its_own_python, soon, without_estimates
+from .support.requirements import ROOT
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("joblib")

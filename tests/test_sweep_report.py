@@ -25,7 +25,8 @@ from statemachine.lab.sweep.quantities import cell_values, parse_quantity
 from statemachine.lab.sweep.request import MANIFEST_VERSION
 from statemachine.lab.sweep.rows import DONE, FAILED, RowWriter, schema_of
 
-from .conftest import assert_has, assert_in, refused, shown
+from .support.claims import assert_has, assert_in, refused
+from .support.pages import shown
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run

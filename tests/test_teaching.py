@@ -18,8 +18,10 @@ from statemachine.course.lessons import LESSONS
 from statemachine.lab.probes.conventions import CONCEPTS
 from statemachine.lab.probes.conventions.page import OURS, REMEMBER
 
-from .conftest import ROOT, assert_not_in, refused, written_all
-from .exercises import WRONG
+from .support.claims import assert_not_in, refused
+from .support.exercises import WRONG
+from .support.files import written_all
+from .support.requirements import ROOT
 
 sys.path.insert(0, str(ROOT / "teaching"))
 import make_kits  # pyright: ignore[reportMissingImports]

@@ -31,8 +31,11 @@ from statemachine.lab.recordings import (
     write,
 )
 
-from .conftest import Cli, around, refused, written
-from .test_traces import same
+from .support.claims import refused
+from .support.files import written
+from .support.patches import around
+from .support.processes import Cli
+from .support.traces import same
 
 
 @pytest.fixture(scope="module")

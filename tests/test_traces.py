@@ -41,26 +41,21 @@ from statemachine.lab.recordings import (
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.release_names import is_release
 
-from .conftest import ROOT, Cli, assert_has, lesson_result, opened, refused, runs_in_silence
-from .small_models import ROTOR_PENDULUM, mjcf, model_of
+from .support.claims import assert_has, refused
+from .support.motions import opened
+from .support.pages import lesson_result
+from .support.processes import Cli, runs_in_silence
+from .support.requirements import ROOT
+from .support.small_models import ROTOR_PENDULUM, mjcf, model_of
+from .support.traces import same, traced
 
 INPUTS = ("time", "qpos", "qvel", "ctrl")
-
-
-def traced(name: str, backend: str = "mujoco", seconds: float = 0.5, **options: Any) -> Trace:
-    scenario = SCENARIOS[name]
-    model = sm.load(scenario.model, backend=backend)
-    return record_scenario(scenario, model, seconds=seconds, **options)
 
 
 def as_it_comes(name: str, **options: Any) -> Trace:
     """A short run of PyBullet with the defaults of the engine."""
     raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
     return record_scenario(SCENARIOS[name], raw, seconds=0.1, defaults="engine", **options)
-
-
-def same(one: Trace, two: Trace, columns: Any = None) -> bool:
-    return all(one[name].tobytes() == two[name].tobytes() for name in columns or one.columns)
 
 
 @pytest.fixture(scope="module")

@@ -24,16 +24,14 @@ from statemachine.errors import (
 )
 from statemachine.interface import DERIVED
 
-from .conftest import (
-    ROOT,
-    bits,
-    interrupted_at,
-    opened,
-    refused,
-    registered,
-    runs_in_silence,
-)
-from .small_models import crowded
+from .support.backends import registered
+from .support.claims import refused
+from .support.motions import bits, opened
+from .support.patches import interrupted_at
+from .support.processes import runs_in_silence
+from .support.requirements import ROOT
+from .support.small_models import crowded
+from .support.turns import meanwhile
 
 Use = Callable[[sm.Model, sm.Data], object]
 USES: dict[str, Use] = {
@@ -57,29 +55,6 @@ USES: dict[str, Use] = {
 @pytest.fixture
 def model(box: sm.Model) -> sm.Model:
     return box
-
-
-def meanwhile(of: Any, use: Callable[[], object], hook: str) -> list[BaseException | None]:
-    """Let another thread use something in the middle of the next step; what it raised.
-
-    Args:
-        of: A Data, or Worlds.
-        use: What the thread does.
-        hook: What is called in the middle: `_advance` of the object, or a method of its class.
-    """
-    place: Any = of if hook == "_advance" else type(of)
-    put = object.__setattr__ if place is of else type.__setattr__
-    right, raised = getattr(place, hook), []
-
-    def hooked(*args: object) -> object:
-        put(place, hook, right)
-        result = right(*args)
-        with ThreadPoolExecutor(1) as pool:
-            raised.append(pool.submit(use).exception())
-        return result
-
-    put(place, hook, hooked)
-    return raised
 
 
 @pytest.mark.parametrize("name", USES)
@@ -146,7 +121,7 @@ def mid_contact(request: pytest.FixtureRequest) -> Iterator[tuple[sm.Model, sm.D
     name = request.param.removesuffix(" as it comes")
     defaults: Any = "model" if name == request.param else "engine"
     with (
-        registered("hidden", "tests.hidden_world:load"),
+        registered("hidden", "tests.support.hidden_world:load"),
         opened(sm.load("so101/scene_box", name, defaults=defaults), 0, nstep=20) as opened_data,
     ):
         yield opened_data

@@ -11,7 +11,7 @@ from statemachine.lab.sweep.design import parse_vary, with_kinds
 from statemachine.measures import parse_tolerances
 from statemachine.typed_numbers import is_count, typed_float, typed_int
 
-from .conftest import refused
+from .support.claims import refused
 
 STRANGE = ["２", "1_000", "٣", "²", "½"]
 

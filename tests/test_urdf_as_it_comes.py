@@ -23,7 +23,9 @@ from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.lab.why import WhyRequest, explain
 from statemachine.models import models_dir
 
-from .conftest import opened, refused, warnings_of, written
+from .support.claims import refused, warnings_of
+from .support.files import written
+from .support.motions import opened
 
 pytestmark = pytest.mark.usefixtures("bullet")
 

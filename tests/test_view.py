@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-import random
 import signal
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -15,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
@@ -25,9 +23,7 @@ import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.lab.recordings import RunMetadata, RunStart, record, write
 from statemachine.measures import Gap
-from statemachine.view import server as serving
 from statemachine.view.live import Command, Live, Tempo
-from statemachine.view.server import Door
 from statemachine.view.session import (
     EnginePose,
     Frame,
@@ -37,8 +33,10 @@ from statemachine.view.session import (
 )
 from statemachine.view.viser_front import readout, warning
 
-from .conftest import ROOT, assert_has, assert_in, opened, refused
-from .small_models import ODD_DRIVES, model_of, on_both
+from .support.claims import assert_has, assert_in, refused
+from .support.motions import opened
+from .support.small_models import ODD_DRIVES, model_of, on_both
+from .support.viewer import Viewer, free_pair, served
 
 SCENE = "so101/scene_box"
 
@@ -429,56 +427,6 @@ def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) 
 
 # The command
 
-VIEW = [sys.executable, "-u", "-m", "statemachine", "view"]
-
-
-def _free_pair() -> int:
-    """A port that is free, and the next one too; another for each test at the same time."""
-    for port in random.SystemRandom().sample(range(18080, 32000), 100):
-        with socket.socket() as one, socket.socket() as two:
-            try:
-                one.bind(("127.0.0.1", port))
-                two.bind(("127.0.0.1", port + 1))
-            except OSError:
-                continue
-            return port
-    raise AssertionError("no two free ports")
-
-
-class Viewer:
-    """The command in a process of its own."""
-
-    def __init__(self, folder: Path, *arguments: str, **environment: str) -> None:
-        self._said = open(folder / "stderr", "w+")  # noqa: SIM115
-        self.process = subprocess.Popen(
-            [*VIEW, *arguments],
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            text=True,
-            cwd=ROOT,
-            env={**os.environ, **environment},
-        )
-
-    def line(self) -> str:
-        """The next line that it says."""
-        return self.process.stdout.readline()
-
-    def end(self) -> str:
-        """The rest of what it said; it ended well, and complained of nothing."""
-        rest = self.process.stdout.read()
-        code = self.process.wait(timeout=300)
-        self._said.seek(0)
-        assert (code, self._said.read()) == (0, "")
-        return rest
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.process.kill()
-        self.process.wait()
-        self._said.close()
-
 
 def _listening(pid: int) -> set[str]:
     """Addresses on which a process listens, as the kernel's tables have them."""
@@ -496,7 +444,7 @@ def _listening(pid: int) -> set[str]:
 
 @pytest.mark.usefixtures("viser")
 def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None:
-    port = _free_pair()
+    port = free_pair()
     with Viewer(tmp_path, "--port", str(port)) as viewer:
         address, _, token = viewer.line().strip().partition("/?token=")
         assert address == f"http://localhost:{port}"
@@ -525,7 +473,7 @@ def test_a_taken_port_is_said_the_next_one_is_taken_and_nothing_else_is_said(
     tmp_path: Path,
 ) -> None:
     """No banner of viser's, and viser's own variable for the port does not count."""
-    port = _free_pair()
+    port = free_pair()
     words = ("--port", str(port), "--seconds", "0.2", "--paused")
     with socket.socket() as holder:
         holder.bind(("127.0.0.1", port))
@@ -551,20 +499,9 @@ def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(
         ),
         tmp_path / "box.npz",
     )
-    port = str(_free_pair())
+    port = str(free_pair())
     with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
         assert_in(viewer.end(), "box of so101/scene_box", f"mujoco {mujoco_box.engine_version}")
-
-
-@contextmanager
-def served(door: Door | None = None) -> Iterator[Any]:
-    """A server of viser's behind a door."""
-    port = serving.free_port("127.0.0.1", 0)
-    server = serving.serve("127.0.0.1", port, "t", door or Door("127.0.0.1"))
-    try:
-        yield server
-    finally:
-        serving.stop(server)
 
 
 def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,8 +12,8 @@ import pytest
 from statemachine.errors import MissingEngineError
 from statemachine.view.server import Door
 
-from .conftest import assert_in, refused
-from .test_view import served as served_behind
+from .support.claims import assert_in, refused
+from .support.viewer import served as served_behind
 
 pytestmark = pytest.mark.usefixtures("viser")
 

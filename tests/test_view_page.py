@@ -21,9 +21,9 @@ from statemachine.view.server import Door
 from statemachine.view.session import LiveSession, TraceSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
-from .browser import Tab, browser
-from .conftest import assert_not_in
-from .test_view import Viewer, _free_pair, served
+from .support.browser import Tab, browser
+from .support.claims import assert_not_in
+from .support.viewer import Viewer, free_pair, served
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("viser")]  # a browser at work
 
@@ -194,7 +194,7 @@ def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
 def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
     """End to end: the process, the page, time that passes by itself, and Ctrl-C while watched."""
     with (
-        Viewer(tmp_path, "--backend", "all", "--port", str(_free_pair())) as viewer,
+        Viewer(tmp_path, "--backend", "all", "--port", str(free_pair())) as viewer,
         browser() as tab,
     ):
         address = viewer.line().strip()

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import of_python, written
+from .support.files import written
+from .support.processes import of_python
 
 WARNS = """
 import warnings

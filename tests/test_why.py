@@ -26,17 +26,13 @@ from statemachine.lab.why.settings import NEEDS, TITLES
 from statemachine.lab.why.shapley import shapley
 from statemachine.show.as_json import dumps
 
-from .conftest import (
-    ROOT,
-    assert_has,
-    need_engine,
-    opened,
-    refused,
-    registered,
-    shown,
-    written,
-)
-from .small_models import mjcf, on_both
+from .support.backends import registered
+from .support.claims import assert_has, refused
+from .support.files import written
+from .support.motions import opened
+from .support.pages import shown
+from .support.requirements import ROOT, need_engine
+from .support.small_models import mjcf, on_both
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -70,7 +66,7 @@ def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) ->
 
 def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
     """Another engine, a heavier arm: what stills the arm closes the gap, and is not a cause."""
-    with registered("hidden", "tests.hidden_world:load"):
+    with registered("hidden", "tests.support.hidden_world:load"):
         two = sm.load("so101/scene", backend="hidden")
         two.raw.body_mass[:] *= 1.3  # which no compiled model tells
         result = explain(WhyRequest(arm, two, HOLD, uncertain=None))

@@ -17,7 +17,9 @@ import pytest
 from statemachine.show import terminal
 from statemachine.show.blocks import Page, Table, Text, Verdict
 
-from .conftest import ROOT, assert_in, need_engine, of_python
+from .support.claims import assert_in
+from .support.processes import of_python
+from .support.requirements import ROOT, need_engine
 
 PACKAGE = ROOT / "statemachine"
 

@@ -29,19 +29,13 @@ from statemachine.errors import (
     UnsupportedError,
 )
 
-from .conftest import (
-    ROOT,
-    SHARED,
-    opened,
-    overlapping,
-    refused,
-    runs_in_silence,
-    shared,
-    started,
-)
-from .lives import equal, live
-from .small_models import RICH, loaded, model_of
-from .test_turns import meanwhile
+from .support.claims import overlapping, refused
+from .support.lives import equal, live
+from .support.motions import opened, started
+from .support.processes import runs_in_silence
+from .support.requirements import ROOT, SHARED, shared
+from .support.small_models import RICH, loaded, model_of
+from .support.turns import meanwhile
 
 N = 4
 

@@ -25,9 +25,11 @@ from statemachine.errors import (
 from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import Worlds, forward, make_worlds, record, reset, step
 
-from . import faulty_world as faulty
-from .conftest import after, assert_has, bullet_clients, refused, registered
-from .lives import live
+from .support import faulty_world as faulty
+from .support.backends import bullet_clients, registered
+from .support.claims import assert_has, refused
+from .support.lives import live
+from .support.motions import after
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
 N = 5
@@ -36,7 +38,7 @@ N = 5
 @pytest.fixture
 def model() -> Iterator[sm.Model]:
     """On the backend that fails when it is told to."""
-    with registered("faulty", "tests.faulty_world:load") as name:
+    with registered("faulty", "tests.support.faulty_world:load") as name:
         yield sm.load("so101", backend=name)
 
 

@@ -15,9 +15,10 @@ from statemachine.errors import BadInputError, EngineError, UnknownNameError
 from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
 
-from .conftest import ROOT, assert_in, need_engine, refused
-from .lives import live
-from .small_models import SLEEPY, loaded, model_of
+from .support.claims import assert_in, refused
+from .support.lives import live
+from .support.requirements import ROOT, need_engine
+from .support.small_models import SLEEPY, loaded, model_of
 
 FACTS = (
     "timestep", "gravity", "body_mass", "geom_friction", "actuator_kp", "actuator_kv",

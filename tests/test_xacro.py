@@ -16,7 +16,8 @@ from statemachine.lab.model_differences import read
 from statemachine.lab.robots import examine_all, find
 from statemachine.models import refuse_xacro, resolve
 
-from .conftest import refused, written
+from .support.claims import refused
+from .support.files import written
 
 SAYS = r"it is a xacro: turn it into a URDF first: `xacro robot\.urdf > OUT\.urdf`"
 DECLARED = 'xmlns:xacro="http://ros.org/wiki/xacro"'

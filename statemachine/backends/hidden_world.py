@@ -2,7 +2,7 @@
 
 MuJoCo lets its caller own the state. Most engines do not: functions reach a world inside. A
 `HiddenData` has arrays beside such a world. A backend is then what its engine does differently,
-in the hooks of a `HiddenWorld`; `tests/hidden_world.py` is a short one to start from.
+in the hooks of a `HiddenWorld`; `tests/support/hidden_world.py` is a short one to start from.
 """
 
 from __future__ import annotations

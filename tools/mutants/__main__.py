@@ -12,19 +12,20 @@ import signal
 import subprocess
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
 
 from .covered import Covered, environment, measure
-from .draw import ROOT, Mutant, Site, all_sites, draw, find
+from .draw import ROOT, Mutant, Site, all_sites, by_code, draw, find
+from .renew import NOT_TRIED, Row, renewed
 
 HERE = Path(__file__).resolve().parent
 WORK = ROOT / "build" / "mutants"
 RESULTS = HERE / "results.json"
 SECONDS = 60.0  # a mutant may take; its tests took a third of that without it
-_STATES = ("killed", "survived", "timed out", "not covered", "gone")
+_STATES = ("killed", "survived", "timed out", "not covered", "gone", NOT_TRIED)
 
 
 def _git(*arguments: str) -> str:
@@ -81,17 +82,15 @@ def _tried(site: Site, tests: list[str], tree: Path) -> tuple[str, str]:
     return "killed", named[1] if named else f"exit code {running.returncode}"
 
 
-def _run(mutants: list[Mutant]) -> list[dict[str, object]]:
-    """Every mutant with what became of it."""
+def _run(mutants: Sequence[Mutant]) -> list[Row]:
+    """Return every mutant with what became of it."""
     trees = [_copy(f"tree{number}") for number in range(os.cpu_count() or 1)]
     states = [_git("rev-parse", f"HEAD:{folder}")[:8] for folder in ("statemachine", "tests")]
     tested = WORK / "-".join(["covered", *states])
     if not (tested / "data").exists():
         shutil.rmtree(tested, ignore_errors=True)
         measure(trees[0], tested)
-    standing: dict[tuple[str, str, int, str], list[Site]] = defaultdict(list)
-    for site in all_sites(trees[0]):
-        standing[site.mutant.code].append(site)
+    standing = by_code(all_sites(trees[0]))
     found = [(mutant, find(mutant, standing)) for mutant in mutants]
     covered = Covered(tested)
     chosen = [covered.tests(site, SECONDS / 3) if site else [] for _, site in found]
@@ -102,7 +101,7 @@ def _run(mutants: list[Mutant]) -> list[dict[str, object]]:
     for tree in trees:
         free.put(tree)
 
-    def one(number: int) -> dict[str, object]:
+    def one(number: int) -> Row:
         mutant, site = found[number]
         if str(mutant) not in tried:
             tree = free.get()
@@ -113,55 +112,87 @@ def _run(mutants: list[Mutant]) -> list[dict[str, object]]:
                 lines.write(json.dumps([str(mutant), outcome]) + "\n")
         result, test = tried[str(mutant)]
         print(f"{result:12} {mutant.file} {mutant.scope} {mutant.kind}", flush=True)
-        return {**asdict(site.mutant if site else mutant), "result": result, "test": test}
+        return Row(site.mutant if site else mutant, result, test)
 
     with ThreadPoolExecutor(len(trees)) as pool:
         return list(pool.map(one, range(len(found))))
 
 
-def _table(results: list[dict[str, object]]) -> str:
-    """The score by room and what survived, as a page."""
+def _room(file: str) -> str:
+    """Return the room of a module: its folder in the package, two deep at most."""
+    _, *folders, name = file.split("/")
+    return "/".join(folders[:2]) if folders else name.removesuffix(".py")
+
+
+def _table(rows: Sequence[Row]) -> str:
+    """Return the score by room and what survived, as a page."""
     rooms: dict[str, Counter[str]] = defaultdict(Counter)
-    for row in results:
-        room = str(row["file"]).split("/")[1].removesuffix(".py")
-        rooms[room][str(row["result"])] += 1
-        rooms["**all**"][str(row["result"])] += 1
-    lines = ["| room | mutants | " + " | ".join(_STATES) + " | score |", "|---" * 8 + "|"]
+    for row in rows:
+        rooms[_room(row.mutant.file)][row.result] += 1
+        rooms["**all**"][row.result] += 1
+    lines = ["| room | mutants | " + " | ".join(_STATES) + " | score |", "|---" * 9 + "|"]
     for room, counts in sorted(rooms.items()):
-        tried = counts.total() - counts["timed out"] - counts["gone"]
+        tried = counts["killed"] + counts["survived"] + counts["not covered"]
         score = f"{counts['killed'] / tried:.0%}" if tried else "–"
         numbers = " | ".join(str(counts[state]) for state in _STATES)
         lines.append(f"| {room} | {counts.total()} | {numbers} | {score} |")
     for state in _STATES[1:]:
-        rows = [row for row in results if row["result"] == state]
-        lines += ["", f"## {state.capitalize()}: {len(rows)}", ""] if rows else []
+        mutants = [row.mutant for row in rows if row.result == state]
+        lines += ["", f"## {state.capitalize()}: {len(mutants)}", ""] if mutants else []
         lines += [
-            f"- `{row['file']}`, `{row['scope'] or 'module'}`, {row['kind']}: "
-            f"`` {row['statement']} ``, {row['index']}: `` {row['becomes']} ``".replace("\n", " ")
-            for row in rows
+            f"- `{mutant.file}`, `{mutant.scope or 'module'}`, {mutant.kind}: "
+            f"`` {mutant.statement} ``, {mutant.index}: `` {mutant.becomes} ``".replace("\n", " ")
+            for mutant in mutants
         ]
     return "\n".join(lines) + "\n"
 
 
+def read() -> list[Row]:
+    """Return the mutants of results.json, with what became of each."""
+    rows = []
+    for entry in json.loads(RESULTS.read_text("utf-8")):
+        result, test = entry.pop("result"), entry.pop("test")
+        rows.append(Row(Mutant(**entry), result, test))
+    return rows
+
+
+def write(rows: Sequence[Row]) -> None:
+    """Write results.json and SCORE.md, and print the score."""
+    entries = [row.to_dict() for row in rows]
+    RESULTS.write_text(json.dumps(entries, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    (HERE / "SCORE.md").write_text("# Score\n\n" + _table(rows), "utf-8")
+    print(_table(rows).partition("##")[0])
+
+
 def main() -> int:
-    """Replay the mutants of results.json, or draw them anew."""
+    """Replay the mutants of results.json, bring them up to date, or draw them anew."""
     parser = argparse.ArgumentParser("python -m tools.mutants", description=__doc__)
-    parser.add_argument("--draw", type=int, metavar="N", help="draw N mutants anew")
+    action = parser.add_mutually_exclusive_group()
+    action.add_argument("--draw", type=int, metavar="N", help="draw N mutants anew")
+    action.add_argument(
+        "--renew",
+        action="store_true",
+        help="bring the list up to date with today's source, and try nothing",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of what is drawn (0)")
     options = parser.parse_args()
-    before = json.loads(RESULTS.read_text("utf-8")) if not options.draw else []
-    fields = tuple(Mutant.__dataclass_fields__)
-    kept = [Mutant(**{name: row[name] for name in fields}) for row in before]
-    results = _run(kept or draw(options.draw, options.seed))
+    if options.renew:
+        write(renewed(read(), all_sites(ROOT), options.seed))
+        return 0
+    if options.draw:
+        write(_run(draw(options.draw, options.seed)))
+        return 0
+    before = read()
+    now = _run([row.mutant for row in before])
+    write(now)
     lost = [
-        new for old, new in zip(before, results, strict=False)
-        if (old["result"], new["result"]) == ("killed", "survived")
-    ]  # fmt: skip
-    RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", "utf-8")
-    (HERE / "SCORE.md").write_text("# Score\n\n" + _table(results), "utf-8")
-    print(_table(results).partition("##")[0])
+        row
+        for old, row in zip(before, now, strict=True)
+        if (old.result, row.result) == ("killed", "survived")
+    ]
     for row in lost:
-        print(f"killed before, survives now: {row['file']} {row['scope']}: {row['statement']}")
+        mutant = row.mutant
+        print(f"killed before, survives now: {mutant.file} {mutant.scope}: {mutant.statement}")
     return bool(lost)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 import random
-from collections import Counter, deque
-from collections.abc import Iterator
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,11 @@ class Mutant:
     def code(self) -> tuple[str, str, int, str]:
         """What identifies it wherever it stands."""
         return self.kind, self.statement, self.index, self.becomes
+
+    @property
+    def function(self) -> str:
+        """The name of the function or class that it is in; "" at the top of a module."""
+        return self.scope.rpartition(".")[2]
 
 
 @dataclass(frozen=True)
@@ -170,6 +175,14 @@ def all_sites(root: Path) -> list[Site]:
     return [site for file in files for site in sites(file, root)]
 
 
+def by_code(sites: Iterable[Site]) -> dict[tuple[str, str, int, str], list[Site]]:
+    """Return the sites of each fault, by what identifies it wherever it stands."""
+    standing: dict[tuple[str, str, int, str], list[Site]] = defaultdict(list)
+    for site in sites:
+        standing[site.mutant.code].append(site)
+    return standing
+
+
 def draw(count: int, seed: int) -> list[Mutant]:
     """Mutants of the package, each fault equally likely."""
     mutants = sorted({site.mutant for site in all_sites(ROOT)}, key=str)
@@ -178,11 +191,10 @@ def draw(count: int, seed: int) -> list[Mutant]:
 
 def find(mutant: Mutant, standing: dict[tuple[str, str, int, str], list[Site]]) -> Site | None:
     """Where a mutant's code stands today: in its place, in its function, or alone of its kind."""
-    function = mutant.scope.rpartition(".")[2]
     same = standing.get(mutant.code, [])
     for fits in (
         [site for site in same if site.mutant == mutant],
-        [site for site in same if site.mutant.scope.rpartition(".")[2] == function and function],
+        [site for site in same if site.mutant.function == mutant.function != ""],
         same if len(mutant.statement) > 20 else [],
     ):
         if fits and (len(fits) == 1 or fits[0].mutant == mutant):

@@ -77,8 +77,8 @@ def tasks(backend: str) -> Figures:
 
 
 def student_files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Each attempt of tests/exercises in a file of its own, as a student hands it in."""
-    exercises = importlib.import_module("tests.exercises")
+    """Each attempt of tests/support/exercises in a file of its own, as a student hands it in."""
+    exercises = importlib.import_module("tests.support.exercises")
     for attempt in (*exercises.WRONG, *exercises.RIGHT):
         file = folder / f"{attempt.solves} {attempt.name.partition('-')[2]}.py"
         file.write_text(attempt.text, "utf-8")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from .conftest import ROOT
+from .requirements import ROOT
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"

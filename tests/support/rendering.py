@@ -22,7 +22,8 @@ from statemachine.engines import room
 from statemachine.installed import DEFAULT
 from statemachine.show.drawing.scene import Camera
 
-from .conftest import ROOT, absent, opened
+from .motions import opened
+from .requirements import ROOT, absent
 
 POSES = ((0, 0, 0, 0, 0, 0.2), (0.3, -0.8, 0.9, 0.6, 0.4, 0.8))
 VIEWS = ((90, -5), (180, -10), (135, -30), (160, -80))
@@ -54,7 +55,7 @@ def silhouettes(
         "shots": [(np.asarray(qpos).tolist(), asdict(camera)) for qpos, camera in shots],
     }
     done = subprocess.run(
-        [sys.executable, "-m", "tests.rendering", json.dumps(job), str(at)],
+        [sys.executable, "-m", "tests.support.rendering", json.dumps(job), str(at)],
         capture_output=True,
         text=True,
         cwd=ROOT,

@@ -10,7 +10,7 @@ import numpy as np
 
 import statemachine as sm
 
-from .conftest import written
+from .files import written
 
 IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 

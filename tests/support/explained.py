@@ -13,7 +13,7 @@ import statemachine as sm
 from statemachine.lab.runs.scenarios import Scenario
 from statemachine.lab.why import Explanation, WhyRequest, explain
 
-from .conftest import written
+from .files import written
 
 # Two links on servos above a floor, a ball on the floor, and a weight on a spring.
 ARM = """

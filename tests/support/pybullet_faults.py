@@ -1,7 +1,7 @@
 """Faults that a backend on PyBullet is likely to have; each is caught by what it names.
 
 `test_seeded_faults` puts them into our own. What the conformance checks cannot see, a test of
-one of PyBullet's does: its name stands there then.
+one of PyBullet's does, with a claim of `pybullet_claims`: it stands there then.
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ import pytest
 from statemachine.interface import POSES, Model
 from statemachine.rotations import matrix_from_quat
 
-from . import conftest
-from . import test_pybullet_backend as ours
-from . import test_pybullet_trees as trees
-from .conftest import Patch
+from . import patches
+from .patches import Patch
+from .pybullet_claims import moves_as_on_mujoco, two_free_bodies_are_two
 from .small_models import TREES
 
 
@@ -44,8 +43,8 @@ def _parts() -> Any:
 
 
 def around(where: str, name: str) -> Callable[[Callable[..., Any]], Patch]:
-    """As of conftest; `where` is a path from `_parts`, as "shared.Shared"."""
-    return conftest.around(lambda: functools.reduce(getattr, where.split("."), _parts()), name)
+    """As of `patches`; `where` is a path from `_parts`, as "shared.Shared"."""
+    return patches.around(lambda: functools.reduce(getattr, where.split("."), _parts()), name)
 
 
 @around("ghost.Ghost", "poses")
@@ -145,7 +144,7 @@ PYBULLET_FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...
     "armature dropped": (armature_dropped, {"a_force_accelerates_by_the_armature"}, ()),
     "damping left on": (damping_left_on, {"free_body_velocity_conventions"}, ()),
     # The suite's only model of several trees cannot be loaded then: no check gets to fail.
-    "files are cached": (files_are_cached, set(), (ours.test_two_free_bodies_are_two,)),
+    "files are cached": (files_are_cached, set(), (two_free_bodies_are_two,)),
     "friction of contacts the other way": (
         around("pb", "getContactPoints")(
             lambda right, **of: [(*p[:10], -p[10], p[11], -p[12], p[13]) for p in right(**of)]
@@ -165,7 +164,7 @@ PYBULLET_FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...
     ),
     "spin in world axes": (spin_in_world_axes, {"free_body_velocity_conventions"}, ()),
     "ctrl is not clamped": (
-        conftest.around(Model, "_acting")(lambda right, self, name, array: array),
+        patches.around(Model, "_acting")(lambda right, self, name, array: array),
         {"ctrl_is_clamped_inside"},
         (),
     ),
@@ -178,7 +177,7 @@ PYBULLET_FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...
             )
         ),
         set(),
-        (functools.partial(trees.test_a_file_moves_as_on_mujoco, text=TREES, most=2e-5),),
+        (functools.partial(moves_as_on_mujoco, text=TREES, most=2e-5),),
     ),
     "state forgets what was observed": (
         around("driven.DrivenWorld", "place")(

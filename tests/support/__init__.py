@@ -1,0 +1,1 @@
+"""What several tests use, by concept; no test imports another test."""

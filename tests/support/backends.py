@@ -1,0 +1,62 @@
+"""Backends that are known for a while, releases of engines, and what an engine holds."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import statemachine as sm
+from statemachine import backends, releases
+from statemachine.backends.served.release_backend import ServedEngine, Server, served
+from statemachine.installed import engine_version, require
+from statemachine.interface import Behaviour
+
+
+@contextmanager
+def registered(name: str, loader: str) -> Iterator[str]:
+    """A backend of another package, known under a name for a while."""
+    backends.register(name, loader)
+    try:
+        yield name
+    finally:
+        backends._BACKENDS.pop(name)
+
+
+def bullet_clients() -> set[int]:
+    """The worlds of PyBullet in this process that nobody closed or lost."""
+    gc.collect()
+    pb: Any = require("pybullet")
+    return {client for client in range(1024) if pb.isConnected(client)}
+
+
+# An old one, one that is too old for the arm, and the one that is installed.
+RELEASES = ("mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={engine_version('mujoco')}")
+
+
+def process_of(model: Any) -> int:
+    """The number of the process in which the engine of a Model runs."""
+    return Server.of(model._reading.engine).pid
+
+
+def load_made_up(path: Path, defaults: Any = "model") -> Any:
+    """A backend of another package, whose engine is in a Python of its own."""
+    engine = ServedEngine(
+        "made up",
+        str(releases.python_of(RELEASES[-1])),
+        str(Path(__file__).with_name("made_up_child.py")),
+        "the made-up engine",
+    )
+    native = sm.load("so101").capabilities
+    behaviours = {
+        **native.behaviours,
+        **dict.fromkeys(("contacts", "forces by part"), Behaviour("unsupported", "it tells none")),
+    }
+    flags = {"actuation", "contacts", "limits"}
+    said = replace(
+        native, options=tuple(sorted(set(native.options) - flags)), behaviours=behaviours
+    )
+    return served(engine, said)(path, defaults)

@@ -1,0 +1,44 @@
+"""Lessons, and pages as somebody sees them."""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stdout
+from typing import Any, TypeVar
+
+from statemachine.course.lessons import LESSONS
+from statemachine.course.lessons.session import take
+from statemachine.interface import Model
+from statemachine.show import terminal
+from statemachine.show.blocks import Page
+
+T = TypeVar("T")
+# Options with which a lesson of many steps is a short one.
+QUICK = {
+    "worlds": ("--most", "4"),
+    "speed": ("--steps", "200"),
+    "gravity": ("--longer", "0"),
+    "replay": ("--steps", "100"),
+}
+
+
+def lesson_result(name: str, model: Model, **options: Any) -> Any:
+    """What a lesson finds on a Model."""
+    return take(LESSONS[name], model, model.backend, options).result
+
+
+def shown(page: Page) -> str:
+    """A page as a terminal of 80 columns shows it."""
+    with redirect_stdout(io.StringIO()) as said:
+        terminal.show(page)
+    return said.getvalue()
+
+
+def blocks(page: Page, kind: type[T]) -> list[T]:
+    """The blocks of one kind on a page."""
+    return [block for block in page.blocks if isinstance(block, kind)]
+
+
+def with_figures(figures: Any, **others: Any) -> Any:
+    """Figures of which some are others."""
+    return type(figures)(**vars(figures) | others)

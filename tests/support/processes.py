@@ -1,0 +1,104 @@
+"""Commands and code in processes of their own."""
+
+from __future__ import annotations
+
+import mmap
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from .requirements import ROOT
+
+_ESTIMATE = re.compile(r"^.*: may take \d+ s\n", re.MULTILINE)
+
+
+def without_estimates(stderr: str) -> str:
+    """Return standard error without the line that says how long a slow command may take.
+
+    A command prints that line where it takes longer than 20 s, which on a busy machine any may.
+    """
+    return _ESTIMATE.sub("", stderr)
+
+
+def of_python(
+    *words: object, folder: Path = ROOT, code: int | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Python with such words in a process of its own, which has this checkout.
+
+    `code` is the exit code that it must have, if that is all that is asked of it. Its standard
+    error is without the line that depends on speed (`without_estimates`).
+    """
+    done = subprocess.run(
+        [sys.executable, *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=600,  # of a busy machine
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        check=False,
+    )
+    done.stderr = without_estimates(done.stderr)
+    assert code in (None, done.returncode), done.stdout + done.stderr
+    return done
+
+
+def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Code that was run in a folder by a Python of its own, which has this checkout."""
+    # Of a fork beside threads, from 3.12.
+    return of_python("-W", "ignore:This process:DeprecationWarning", "-c", code, folder=folder)
+
+
+def runs_in_silence(code: str, folder: Path, printed: str = "") -> None:
+    """Code ends well in a Python of its own, and prints nothing but this."""
+    done = in_its_own_python(code, folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, printed, "")
+
+
+Cli = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -> None:
+    """A command was refused, in one line that says why."""
+    assert (done.returncode, done.stdout) == (code, ""), done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("statemachine")
+    assert says in line
+
+
+def lives(pid: int) -> bool:
+    """Whether a process has not ended; zombies have."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def soon(so: Callable[[], object], seconds: float = 300.0) -> bool:
+    """Return whether something is so within some seconds.
+
+    Nobody waits longer than it takes, and a busy machine may take long.
+    """
+    until = time.monotonic() + seconds
+    while time.monotonic() < until and not so():
+        time.sleep(0.05)
+    return bool(so())
+
+
+def processes_with(part: object) -> list[int]:
+    """Processes in whose command line something stands."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if str(part).encode() in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+    return found
+
+
+def memory_of(pid: int | str = "self") -> float:
+    """Resident memory of a process [MB]."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * mmap.PAGESIZE / 1e6
