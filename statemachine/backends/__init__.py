@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
-from ..interface.checks import as_switch
-from ..interface.records import Defaults
+from ..interface.checks import as_switch, unsupported_by
+from ..interface.records import Defaults, ReadOptions
 from ..model_files import checked_file
 from ..models import AnyPath
 from ..release_names import is_release, version_of
@@ -71,7 +71,8 @@ class Loader(Protocol):
 
     A loader that refuses files for what they have takes `options`, too, a mapping as
     `Model.replace` has them: what is switched off there is nothing to refuse. To the Models of
-    the others `load` applies them.
+    the others `load` applies them. One that reads files as `balance_inertia` and `meshes` say
+    takes `read_options`, too.
     """
 
     def __call__(self, path: os.PathLike[str], defaults: Defaults) -> Model: ...
@@ -187,6 +188,8 @@ def load(
     defaults: Defaults = "model",
     menagerie: AnyPath | None = None,
     trust_binary: bool = False,
+    balance_inertia: bool = False,
+    meshes: bool = True,
     **options: Any,
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
@@ -203,6 +206,11 @@ def load(
         menagerie: A menagerie folder to look the name up in.
         trust_binary: Whether a binary model (.mjb) is read. MuJoCo does not check one: a damaged
             or malicious file can crash or harm the process.
+        balance_inertia: Whether an inertia whose principal moments break A + B >= C, which MuJoCo
+            refuses, is balanced: all three become their mean. An EngineWarning names each.
+        meshes: Whether shapes that are meshes are read. Without them a file can be read whose
+            meshes are missing, or of a format that MuJoCo does not know; an EngineWarning says
+            what touches nothing then.
         **options: As `Model.replace` takes them, before anything of the file is refused:
             `contacts=False` loads a robot of whose geoms the engine knows no shape.
 
@@ -237,14 +245,37 @@ def load(
         ) from error
     if is_release(backend):
         loader = partial(loader, release=backend)
+    read_options = ReadOptions(
+        balance_inertia=as_switch(balance_inertia, "balance_inertia"),
+        meshes=as_switch(meshes, "meshes"),
+    )
+    early = _read_arguments(backend, loader, read_options)
     takes_options = "options" in inspect.signature(loader).parameters
-    early = {"options": options} if options and takes_options else {}
+    if options and takes_options:
+        early["options"] = options
     loaded = loader(path, defaults=defaults, **early)
+    vars(loaded)["read_options"] = read_options
     if options and not takes_options:
         loaded = loaded.replace(**options)
     if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
+
+
+def _read_arguments(
+    backend: str, loader: Callable[..., Model], read_options: ReadOptions
+) -> dict[str, Any]:
+    """Return what a loader is told of how a file is read; nothing of one that is read as written.
+
+    Raises:
+        UnsupportedError: It reads files in its own way.
+    """
+    told = list(read_options.arguments())
+    if not told:
+        return {}
+    if "read_options" not in inspect.signature(loader).parameters:
+        raise unsupported_by(backend, told[0], "it reads files in its own way")
+    return {"read_options": read_options}
 
 
 def _of_usual_start(model: Model) -> str:
@@ -276,7 +307,9 @@ def on_default(model: Model) -> Model:
         ModelError: It cannot read the file.
     """
     with warnings.catch_warnings(action="ignore", category=EngineWarning):  # told of the model
-        return model if model.backend == DEFAULT else load(model.path)
+        if model.backend == DEFAULT:
+            return model
+        return load(model.path, **model.read_options.arguments())
 
 
 def _find(name: str) -> str:

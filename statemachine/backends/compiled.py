@@ -14,21 +14,20 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape, unescape
 
 import mujoco
 import numpy as np
 
-from ..errors import EngineWarning, ModelError, one_line, shown
+from ..errors import BadInputError, EngineWarning, ModelError, one_line, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
-from ..models import AnyPath, mesh_file
+from ..interface.records import AS_WRITTEN, ReadOptions
+from ..models import AnyPath
 from .actuators import control_names, delay_steps, servos
 from .binary import is_binary, read_binary
 from .controls import ctrl_owners
@@ -93,37 +92,74 @@ def compiler_warnings() -> Iterator[list[str]]:
         texts[:] = [text for text in texts if " Time = " not in text]
 
 
-def compile_file(path: AnyPath) -> mujoco.MjModel:
+def compile_file(path: AnyPath, options: ReadOptions = AS_WRITTEN) -> mujoco.MjModel:
     """Compile an MJCF, URDF or MJB file; the suffix ".mjb" says that it is binary.
+
+    Static bodies that are fused with their parents, as those of a URDF are behind fixed joints,
+    leave a site of their name where their frame is.
 
     Args:
         path: The file. Meshes are looked for beside it, as the file says.
+        options: How it is read, beside that.
 
     Raises:
+        BadInputError: Options are given for a binary file, which was compiled already.
         ModelError: MuJoCo cannot compile the file, with its reason; or it compiles one
             with a number that no step can be taken with; or the file is binary, and nobody
             said that it is to be trusted (see `binary`).
     """
     text = os.fspath(path)
-    binary = read_binary(text) if is_binary(text) else None
-    try:
-        if binary is not None:
-            from .delays import from_binary
-
-            raw = from_binary(binary)
-        else:
-            spec = spec_with_packages(Path(text))
-            raw = spec.compile() if spec else mujoco.MjModel.from_xml_path(text)
-    except (ValueError, *ENGINE_ERRORS) as error:
-        reason = reason_of(error)
-        if missing := re.search(r"opening file '(.*)'", reason):
-            place = Path(text).absolute().parent / Path(missing[1]).parent
-            reason += f"; it is looked for in {place}: copy that folder along with the model"
-        raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
+    if is_binary(text):
+        raw = _from_binary(text, read_binary(text), options)
+    else:
+        raw = _compile_xml(Path(text), options)
     check_numbers(raw, text)
-    if doubtful := "; ".join(_doubtful(raw)):
-        warnings.warn(f"{text}: {doubtful}", EngineWarning, stacklevel=4)
+    doubtful = list(_doubtful(raw))
+    if options != AS_WRITTEN:
+        from .reading import effects
+
+        doubtful += effects(Path(text), options)
+    if doubtful:
+        warnings.warn(f"{text}: {'; '.join(doubtful)}", EngineWarning, stacklevel=4)
     return raw
+
+
+def _from_binary(path: str, content: bytes, options: ReadOptions) -> mujoco.MjModel:
+    """Read a binary model, of which `content` is all.
+
+    Raises:
+        BadInputError: Options are given, for which it is too late.
+        ModelError: MuJoCo cannot read it.
+    """
+    if options != AS_WRITTEN:
+        raise BadInputError(
+            f"{path} is binary, compiled already: balance_inertia and meshes are of XML files"
+        )
+    from .delays import from_binary
+
+    try:
+        return from_binary(content)
+    except (ValueError, *ENGINE_ERRORS) as error:
+        raise ModelError(f"MuJoCo cannot read {path}: {reason_of(error)}") from error
+
+
+def _compile_xml(path: Path, options: ReadOptions) -> mujoco.MjModel:
+    """Compile an MJCF or a URDF file.
+
+    Raises:
+        ModelError: MuJoCo cannot read it, with its reason and what a user can do.
+    """
+    try:
+        spec = read_spec(path)
+        if spec.compiler.fusestatic or options != AS_WRITTEN:
+            from .reading import prepare
+
+            prepare(spec, options)
+        return spec.compile()
+    except (ValueError, *ENGINE_ERRORS) as error:
+        from .refusals import explained
+
+        raise ModelError(f"MuJoCo cannot read {path}: {explained(path, options, error)}") from error
 
 
 def contacts_in(raw: mujoco.MjModel, inputs: Mapping[str, Array]) -> tuple[Ints, Array]:
@@ -168,36 +204,27 @@ def check_numbers(raw: mujoco.MjModel, name: str) -> None:
         raise ModelError(f"{name} has a number that nothing can be computed with: {problem}")
 
 
-_PACKAGE = re.compile(r"(?<=[\"'])package://[^\"']*")
+def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
+    """Read an MJCF or a URDF file, and compile nothing.
 
+    Meshes of a URDF that MuJoCo would not find are looked up as `_file_text` says.
 
-def read_spec(path: Path) -> mujoco.MjSpec:
-    """An MJCF or a URDF file before it is compiled.
+    Args:
+        path: The file.
+        visuals: Whether visual shapes of a URDF are read, too, which MuJoCo leaves out unless the
+            file says `discardvisual="false"`.
 
     Raises:
         ValueError: MuJoCo cannot read it.
     """
-    return spec_with_packages(path) or mujoco.MjSpec.from_file(str(path))
+    text = None
+    if path.suffix != ".xml":
+        from ._file_text import text_for
 
-
-def spec_with_packages(path: Path) -> mujoco.MjSpec | None:
-    """A URDF whose meshes are in ROS packages, which MuJoCo does not look for; None of others."""
-    if path.suffix.lower() != ".urdf":
-        return None
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return None
-    if not _PACKAGE.search(text):
-        return None
-
-    def in_its_package(match: re.Match[str]) -> str:
-        file = mesh_file(unescape(match[0], {"&quot;": '"', "&apos;": "'"}), path.parent)
-        if file is None:
-            return match[0]
-        return escape(str(file.resolve()), {'"': "&quot;", "'": "&apos;"})
-
-    spec = mujoco.MjSpec.from_string(_PACKAGE.sub(in_its_package, text))
+        text = text_for(path, visuals)
+    if text is None:
+        return mujoco.MjSpec.from_file(str(path))
+    spec = mujoco.MjSpec.from_string(text)
     spec.modelfiledir = str(path.parent.resolve())
     return spec
 

@@ -31,7 +31,7 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_vector, engine_steps, unsupported
-from ..interface.records import Defaults, StateLayout
+from ..interface.records import AS_WRITTEN, Defaults, ReadOptions, StateLayout
 from ..models import AnyPath
 from .compiled import (
     ENGINE_ERRORS,
@@ -111,7 +111,9 @@ _COMPONENTS = {
 }
 
 
-def load(path: AnyPath, defaults: Defaults = "model") -> MujocoModel:
+def load(
+    path: AnyPath, defaults: Defaults = "model", read_options: ReadOptions = AS_WRITTEN
+) -> MujocoModel:
     """Compile an MJCF, URDF or MJB file.
 
     Args:
@@ -119,12 +121,13 @@ def load(path: AnyPath, defaults: Defaults = "model") -> MujocoModel:
         defaults: "engine" leaves the engine's automatic reset as the file has it
             (a divergence is raised all the same); nothing else differs, since
             nothing is emulated on MuJoCo.
+        read_options: How the file is read.
 
     Raises:
         ModelError: MuJoCo cannot compile the file; with its reason.
     """
     with compiler_warnings() as texts:
-        raw = compile_file(path)
+        raw = compile_file(path, read_options)
     if defaults == "model":
         raw.opt.disableflags |= int(_DISABLE.mjDSBL_AUTORESET)
     pass_on(texts, stacklevel=4)

@@ -30,7 +30,7 @@ from ..interface import (
 )
 from ..interface.checks import HUGE
 from ..interface.options import checked_options
-from ..interface.records import Defaults
+from ..interface.records import AS_WRITTEN, Defaults, ReadOptions
 from ..measures.text import few
 from ..models import AnyPath
 from . import edits as _edits
@@ -139,6 +139,7 @@ def load(
     path: AnyPath,
     defaults: Defaults = "model",
     options: Mapping[str, Any] = MappingProxyType({}),
+    read_options: ReadOptions = AS_WRITTEN,
 ) -> PybulletModel:
     """Compile an MJCF, URDF or MJB file, and write it as URDF for PyBullet.
 
@@ -151,6 +152,7 @@ def load(
             it is set, 1/240 s a step. PyBullet reads a URDF itself, by `useFixedBase` unless it
             has a floating joint; of an MJCF a URDF is written. ctrl is then what
             POSITION_CONTROL aims at.
+        read_options: How the file is read.
 
     Raises:
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
@@ -159,7 +161,7 @@ def load(
         BadInputError: The value of an option has the wrong shape, kind or size.
     """
     with compiler_warnings() as texts:
-        raw = compile_file(path)
+        raw = compile_file(path, read_options)
     for text in texts:
         warnings.warn(f"MuJoCo, which compiles {path}: {text}", EngineWarning, stacklevel=3)
     if defaults == "engine":
@@ -170,7 +172,7 @@ def load(
     if checked:
         timestep = _edits.step_length(float(raw.opt.timestep), substeps, checked)
         raw = _edits.edited(raw, checked, timestep)
-    file = UrdfFile.read(Path(path)) if defaults == "engine" else None
+    file = UrdfFile.read(Path(path), read_options) if defaults == "engine" else None
     plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
     model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))

@@ -33,8 +33,7 @@ import numpy as np
 
 from ..errors import ModelError, one_line
 from ..interface import Array
-from ._urdf_text import urdf_text
-from .compiled import ENGINE_ERRORS, reason_of
+from .compiled import ENGINE_ERRORS, read_spec, reason_of
 
 # The mass [kg] and the moment of inertia [kg m^2] that a body gets which moves and has none. MuJoCo
 # refuses what is not above 1e-15 (mjMINVAL).
@@ -159,24 +158,6 @@ def compile_mended(
             faults.append(fault)
             continue
         return MendedModel(read_spec(path, visuals), compiled, tuple(repairs))
-
-
-def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
-    """Read a file, and compile nothing.
-
-    Args:
-        path: An MJCF or URDF file.
-        visuals: Whether visual shapes of a URDF are read, too.
-
-    Raises:
-        ValueError: MuJoCo cannot read it.
-    """
-    text = urdf_text(path, visuals)
-    if text is None:
-        return mujoco.MjSpec.from_file(str(path))
-    spec = mujoco.MjSpec.from_string(text)
-    spec.modelfiledir = str(path.parent.resolve())
-    return spec
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from ..installed import raise_if_interrupted
 
 if TYPE_CHECKING:
     from ..interface import Array, Data, Model
+    from ..interface.records import ReadOptions
     from ..show.drawing.scene import Camera, Drawer
     from .call_watch import CallWatch
     from .description.records import Robot
@@ -312,6 +313,7 @@ class RawEngine:
         giver: Path,
         parts: Collection[str],
         names: Mapping[str, Mapping[str, str]],
+        options: ReadOptions,
     ) -> Any:
         """The compiled model of a file that has parts of another one instead of its own.
 
@@ -320,6 +322,7 @@ class RawEngine:
             giver: The other.
             parts: Of `counts`.
             names: By kind ("joint", "body", "site") the names in `taker` of what `giver` has.
+            options: How `taker` is read.
 
         Raises:
             ModelError: It cannot be made.

@@ -14,7 +14,18 @@ from numpy.typing import NDArray
 from ..errors import BadInputError, ReadOnlyError, no_attribute, unknown_name
 from ..release_names import engine_of
 from .checks import TINY, index_of, unsupported, whole_number
-from .records import Array, Capabilities, Ints, JointType, Keyframe, Sizes, StateLayout, read_only
+from .records import (
+    AS_WRITTEN,
+    Array,
+    Capabilities,
+    Ints,
+    JointType,
+    Keyframe,
+    Sizes,
+    StateLayout,
+    moving_sites,
+    read_only,
+)
 
 
 class Model(ABC):
@@ -54,6 +65,7 @@ class Model(ABC):
         mocap_pos0, mocap_quat0: (nmocap, 3) [m] and (nmocap, 4) wxyz, where the file has them.
         site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
         keyframes: The states that the file names.
+        read_options: How the file was read, as `load` was told.
     """
 
     backend: str
@@ -105,6 +117,7 @@ class Model(ABC):
     mocap_quat0: Array
     keyframes: tuple[Keyframe, ...]
 
+    read_options = AS_WRITTEN
     _holds_start = False  # whether the commands before a keyframe were that of the keyframe
     _clamps = False  # whether what acts of ctrl is always within its range
     if TYPE_CHECKING:
@@ -148,6 +161,12 @@ class Model(ABC):
         It is not to be written to. None where there is none.
         """
         return None
+
+    @property
+    def moving_sites(self) -> tuple[bool, ...]:
+        """Whether joints move each site."""
+        parents, jointed = self.body_parentid.tolist(), self.jnt_bodyid.tolist()
+        return moving_sites(self.site_bodyid.tolist(), parents, jointed)
 
     def body_id(self, name: str) -> int:
         """Id of a body."""
@@ -211,9 +230,9 @@ class Model(ABC):
             UnsupportedError: This backend has no such option.
             BadInputError: The value has the wrong shape, kind or size.
         """
-        from .options import checked_options
+        from .options import checked_options, without_read_options
 
-        checked = checked_options(self, options)
+        checked = checked_options(self, without_read_options(self, options))
         return self._replace(checked)._started_as(self, checked)
 
     def with_compiled(self, compiled: Any) -> Model:
@@ -229,8 +248,9 @@ class Model(ABC):
         raise unsupported(self, "compiled", "it does not start from a compiled model")
 
     def _started_as(self, before: Model, options: Mapping[str, Any]) -> Self:
-        """Itself, made of another Model by some options: how it starts is told on."""
+        """Itself, made of another Model by some options: how it starts and was read is told on."""
         vars(self)["_holds_start"] = before._holds_start or "latency" in options
+        vars(self)["read_options"] = before.read_options
         return self
 
     def _check_quaternions(self, qpos: Array) -> None:

@@ -298,7 +298,10 @@ class LiveSession(Session, ExitStack):
         first = models[0]
         for other in models[1:]:
             _check_twins(first, other)
-        tip_site = usual_site(first.site_names) if site is None else first.site_id(site)
+        if site is None:
+            tip_site = usual_site(first.site_names, first.moving_sites)
+        else:
+            tip_site = first.site_id(site)
         super().__init__(
             tuple(model.backend for model in models),
             first.timestep,
@@ -413,7 +416,7 @@ class TraceSession(Session):
             header.timestep,
             Joints(header.joints, header.jnt_type, header.jnt_qposadr),
             sites,
-            usual_site(sites),
+            usual_site(sites, header.moving_sites),
         )
         self.header = header
         self._traces = traces

@@ -14,6 +14,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...errors import ModelError, UnsupportedError
+from ...interface.records import AS_WRITTEN, ReadOptions
+from .._file_text import urdf_text
 from .client import as_file, load_urdf
 
 # PyBullet has room for 128 numbers of a tree, and of a position for 7 of its base; from 122 joints
@@ -46,8 +48,12 @@ class UrdfFile:
         return bool(self.floating)
 
     @classmethod
-    def read(cls, path: Path) -> UrdfFile | None:
+    def read(cls, path: Path, options: ReadOptions = AS_WRITTEN) -> UrdfFile | None:
         """Read a file; None if it is no URDF.
+
+        Args:
+            path: The file.
+            options: How it is read. Inertias need not be balanced: PyBullet has its own.
 
         Raises:
             ModelError: Its links are no tree: PyBullet would end the process.
@@ -55,6 +61,8 @@ class UrdfFile:
         """
         try:
             content = path.read_bytes()
+            if not options.meshes and (text := urdf_text(path, options=options)) is not None:
+                content = text.encode()
             root = ElementTree.fromstring(content)
         except (OSError, ElementTree.ParseError, ValueError, LookupError):
             return None

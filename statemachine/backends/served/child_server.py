@@ -5,7 +5,7 @@ only, and imports nothing of this package. Its argument is a file that knows the
 
 - `load(file, text, names)`: a model of a file, or of its text where that is not empty; what is
   said of it, "version" of the engine at least; and numeric fields of those names, if the engine has
-  such;
+  such. A release of MuJoCo is told as `read`, too, how it reads the file;
 - `Simulation(model)`: a world; those of a model share it. `memory` is name and length of each
   array that the engine remembers from step to step beside qpos and qvel, `kept_memory` names
   of those that a write into qpos or qvel leaves as they are, `untold` names of derived arrays that
@@ -93,7 +93,9 @@ class Answerer:
 
     def load(self, job, edits):
         """Compile a file, and edit fields; the fields that were asked for, as the file has them."""
-        model, said, fields = self.engine.load(job["file"], job["text"], job.get("fields", ()))
+        names = job.get("fields", ())
+        told = {"read": job["read"]} if "read" in job else {}
+        model, said, fields = self.engine.load(job["file"], job["text"], names, **told)
         read = (array.tobytes() for array in fields.values())
         digest = hashlib.sha256(b"".join([repr(said).encode(), *read])).hexdigest()
         if job.get("digest", digest) != digest:

@@ -7,7 +7,7 @@ import pickle
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
@@ -20,6 +20,7 @@ from ...interface.checks import HUGE
 from ...interface.records import Arrays, Sizes
 from ...processes import PipedChild
 from ...release_names import is_release, version_of
+from ...rotations import matrix_from_quat
 from ..hidden_world import HiddenWorld, Memory, Moment, Read
 from . import child_server
 
@@ -242,6 +243,7 @@ class ServedWorld(HiddenWorld):
         opened: Callable[[Server], int],
         compiled: Any,
         timestep: float,
+        frames: Sequence[int] = (),
     ) -> None:
         """Open it.
 
@@ -250,9 +252,12 @@ class ServedWorld(HiddenWorld):
             opened: Loads the model there; its number. All worlds of a Model have the same one.
             compiled: The mjModel, in the terms of the installed release.
             timestep: Of an engine step [s]: that of the mjModel, when the model was made.
+            frames: Ids of the sites of the mjModel that the engine has not; they are fixed to its
+                bodies.
         """
         self.engine, self._engine, self._opened = engine.title, engine, opened
         self._compiled, self.timestep, self.qpos0 = compiled, timestep, compiled.qpos0
+        self._frames = list(frames)
         # Steps of a call that have one command take one exchange.
         self._ahead = not compiled.actuator_delay.any()
         self._ctrl = np.zeros(compiled.nu)
@@ -328,10 +333,30 @@ class ServedWorld(HiddenWorld):
             state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
             _, self._derived = self._server.ask("look", {"state": state}, world=self._world)
         arrays: dict[str, Any] = dict(self._derived)
+        if self._frames:
+            arrays |= self._with_frames(arrays)
         values = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
         if "contacts" not in self.untold:
             values["contacts"] = Contacts(**arrays)
         return values
+
+    def _with_frames(self, arrays: Arrays) -> Arrays:
+        """Return site_xpos and site_xmat of all sites, those that the engine has not among them.
+
+        Args:
+            arrays: Derived by the engine: xpos, xquat, and those of its own sites.
+        """
+        raw, frames = self._compiled, self._frames
+        own = np.setdiff1d(np.arange(raw.nsite), frames)
+        bodies = raw.site_bodyid[frames]
+        turns = matrix_from_quat(arrays["xquat"][bodies])
+        offsets = np.einsum("bij,bj->bi", turns, raw.site_pos[frames])
+        mats = np.einsum("bij,bjk->bik", turns, matrix_from_quat(raw.site_quat[frames]))
+        places, axes = np.empty((raw.nsite, 3)), np.empty((raw.nsite, 9))
+        places[own], axes[own] = arrays["site_xpos"], arrays["site_xmat"]
+        places[frames] = arrays["xpos"][bodies] + offsets
+        axes[frames] = mats.reshape(-1, 9)
+        return {"site_xpos": places, "site_xmat": axes}
 
     def close(self) -> None:
         self._end()

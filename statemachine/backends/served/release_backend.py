@@ -10,8 +10,9 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -21,12 +22,12 @@ import numpy as np
 from ...errors import EngineError, ModelError
 from ...interface import Capabilities
 from ...interface.checks import unsupported_by
-from ...interface.records import Arrays, Defaults
+from ...interface.records import AS_WRITTEN, Arrays, Defaults, ReadOptions
 from ...models import AnyPath
 from ...release_names import is_release, version_of
 from ...releases import python_of
 from ..binary import is_binary
-from ..compiled import check_numbers, facts, fastest, spec_with_packages
+from ..compiled import check_numbers, facts, fastest, read_spec
 from ..edits import put
 from ..hidden_data import HiddenModel
 from ..mujoco_backend import MujocoModel
@@ -43,19 +44,26 @@ _OWN = (
 # What is large and laid out in each release's own way: nobody sends it to another.
 _UNSENT = ("flex", "mesh", "oct")
 _SAME = (
-    *("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "nsite", "ntendon", "neq", "nkey"),
+    *("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "ntendon", "neq", "nkey"),
     "nmocap",
 )
 _NO_EDITS = MappingProxyType[str, Any]({})
 _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mjtEnableBit}
 
 
-def load(path: AnyPath, defaults: Defaults = "model", *, release: str) -> HiddenModel:
+def load(
+    path: AnyPath,
+    defaults: Defaults = "model",
+    read_options: ReadOptions = AS_WRITTEN,
+    *,
+    release: str,
+) -> HiddenModel:
     """Compile a file in both releases.
 
     Args:
         path: An MJCF or URDF file.
         defaults: As of the installed engine.
+        read_options: How the file is read.
         release: As "mujoco==3.3.7".
 
     Raises:
@@ -64,7 +72,7 @@ def load(path: AnyPath, defaults: Defaults = "model", *, release: str) -> Hidden
     """
     python, version = str(python_of(release)), version_of(release)
     engine = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
-    return served(engine)(path, defaults)
+    return served(engine)(path, defaults, read_options)
 
 
 def served(
@@ -77,14 +85,32 @@ def served(
         capabilities: What the backend says of itself; None for what is said of MuJoCo.
     """
 
-    def load_there(path: AnyPath, defaults: Defaults = "model") -> ServedModel:
+    def load_there(
+        path: AnyPath, defaults: Defaults = "model", read_options: ReadOptions = AS_WRITTEN
+    ) -> ServedModel:
         if is_binary(os.fspath(path)):
             raise ModelError(
                 f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML"
             )
-        return ServedModel(_compiled(engine, load_installed(path, defaults)), capabilities)
+        installed = load_installed(path, defaults, read_options)
+        source = _source(engine, installed.path, read_options)
+        return ServedModel(_compiled(engine, installed, source), capabilities)
 
     return load_there
+
+
+@dataclass(frozen=True)
+class EngineSource:
+    """What an engine in a Python of its own reads of a file.
+
+    Attributes:
+        text: Instead of the file; "" for the file itself.
+        read: How it reads the file, by names of `READ_OPTIONS`; empty where the text says it, or
+            the file is read as it is written.
+    """
+
+    text: str = ""
+    read: Mapping[str, bool] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +123,8 @@ class EngineReading:
         model: In the installed release's terms.
         shared: Names of the fields that both have.
         digest: Of what was read, by which a file that changed since then is seen.
+        source: What the engine read of the file.
+        frames: Ids of the sites that the engine has not: the frames of fused bodies.
     """
 
     engine: ServedEngine
@@ -104,15 +132,54 @@ class EngineReading:
     model: MujocoModel
     shared: frozenset[str]
     digest: str
+    source: EngineSource
+    frames: tuple[int, ...]
 
 
 def _opened(reading: EngineReading, edits: Mapping[str, Any], server: Server) -> int:
     """Return the number that the model of a file with some fields edited has there."""
-    return _loaded(server, reading.model, edits, digest=reading.digest).number
+    return _loaded(server, reading.model, reading.source, edits, digest=reading.digest).number
 
 
-def _compiled(engine: ServedEngine, installed: MujocoModel) -> EngineReading:
+def _source(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineSource:
+    """Return what an engine reads of a file.
+
+    Of a URDF it is a text with the meshes named by the places where they are, and with the options
+    in it. An MJCF may include others: so a release of MuJoCo is told the options.
+
+    Raises:
+        UnsupportedError: The engine is none, and reads an MJCF as it is written.
+    """
+    if path.suffix.lower() == ".urdf":
+        from .._file_text import urdf_text
+
+        text = urdf_text(path, options=options)
+        return EngineSource() if text is None else EngineSource(text)
+    if options == AS_WRITTEN:
+        return EngineSource()
+    if not is_release(engine.name):
+        wanted = next(iter(options.arguments()))
+        raise unsupported_by(engine.name, wanted, "it reads an MJCF as it is written")
+    return EngineSource(read=asdict(options))
+
+
+def _frames(installed: MujocoModel) -> tuple[int, ...]:
+    """Return the ids of the sites that the file of a model does not have, but its frames."""
+    spec = read_spec(installed.path)
+    if not spec.compiler.fusestatic:
+        return ()
+    written = {site.name for site in spec.sites}
+    names = enumerate(installed.site_names)
+    return tuple(k for k, name in names if name and name not in written)
+
+
+def _compiled(engine: ServedEngine, installed: MujocoModel, source: EngineSource) -> EngineReading:
     """Let an engine read a file that the installed release has compiled.
+
+    Args:
+        engine: The engine.
+        installed: What the installed release makes of the file.
+        source: What the engine reads of the file.
 
     Raises:
         ModelError: It cannot read the file, or finds other parts in it.
@@ -121,19 +188,21 @@ def _compiled(engine: ServedEngine, installed: MujocoModel) -> EngineReading:
     raw, path, title = copy.copy(installed.raw), installed.path, engine.title
     try:
         server = Server.of(engine)
-        loaded = _loaded(server, installed)
+        loaded = _loaded(server, installed, source)
     except AnswerError as error:
         raise ModelError(f"{title} cannot read {path}: {error}") from error
     except (LostError, OSError) as error:
         anew = f"; to make it anew: {engine.anew}" if is_release(engine.name) else ""
         raise EngineError(f"{title} cannot be run: {error}{anew}") from error
     server.forgotten.append(loaded.number)
-    fields = loaded.fields
-    for name in _SAME:
-        if name in fields and int(fields[name]) != getattr(raw, name):
+    fields, frames = loaded.fields, _frames(installed)
+    counts = {name: int(getattr(raw, name)) for name in _SAME}
+    counts["nsite"] = raw.nsite - len(frames)
+    for name, count in counts.items():
+        if name in fields and int(fields[name]) != count:
             raise ModelError(
                 f"{title} reads {path} as another robot: {name} is {int(fields[name])} there "
-                f"and {getattr(raw, name)} in MuJoCo {mujoco.__version__}"
+                f"and {count} in MuJoCo {mujoco.__version__}"
             )
     shared = _take_over(raw, fields) | set(loaded.flags)
     for name, set_there in loaded.flags.items():
@@ -145,6 +214,8 @@ def _compiled(engine: ServedEngine, installed: MujocoModel) -> EngineReading:
         model=MujocoModel(raw, path, installed.substeps),
         shared=frozenset(shared),
         digest=loaded.digest,
+        source=source,
+        frames=frames,
     )
 
 
@@ -183,22 +254,27 @@ def _take_over_flags(raw: mujoco.MjModel, name: str, set_there: list[str]) -> No
 
 
 def _loaded(
-    server: Server, model: MujocoModel, edits: Mapping[str, Any] = _NO_EDITS, **digest: str
+    server: Server,
+    model: MujocoModel,
+    source: EngineSource,
+    edits: Mapping[str, Any] = _NO_EDITS,
+    **digest: str,
 ) -> LoadedModel:
     """Let an engine read the file of a model: as `Server.load`.
 
     Args:
         server: Its process.
         model: What the installed release makes of the file.
+        source: What it reads of the file.
         edits: Numeric fields that are then another than in the file; flags by their names.
         **digest: Of what was read in the file before.
     """
-    spec = spec_with_packages(model.path)
-    text, file = spec.to_xml() if spec else "", str(model.path.absolute())
+    file = str(model.path.absolute())
     numbers = {name: value for name, value in edits.items() if name not in _FLAGS}
     flags = {name: value for name, value in edits.items() if name in _FLAGS}
-    fields = [*_SAME, *_fields(model.raw)]
-    return server.load(text, file, numbers, fields=fields, flags=flags, **digest)
+    fields = [*_SAME, "nsite", *_fields(model.raw)]
+    read = {"read": dict(source.read)} if source.read else {}
+    return server.load(source.text, file, numbers, fields=fields, flags=flags, **read, **digest)
 
 
 def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
@@ -262,7 +338,7 @@ class ServedModel(HiddenModel):
         opened = partial(_opened, reading, _edits(reading, engine.raw))
         timestep = float(inner.raw.opt.timestep)
         super().__init__(
-            partial(ServedWorld, reading.engine, opened, inner.raw, timestep),
+            partial(ServedWorld, reading.engine, opened, inner.raw, timestep, reading.frames),
             backend=reading.engine.name,
             engine_version=reading.version,
             capabilities=record,

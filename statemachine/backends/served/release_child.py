@@ -127,12 +127,16 @@ def constraint_part(model, data, part):
     return total
 
 
-def load(file, text, names):
+def load(file, text, names, read=None):
     """Compile a file; its flags, and the numeric fields that this release has of those names."""
     if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
         mujoco.set_mju_user_warning(lambda text: None)
-    read = mujoco.MjModel.from_xml_string if text else mujoco.MjModel.from_xml_path
-    model = read(text or file)
+    if read is not None:
+        model = with_options(file, **read)
+    elif text:
+        model = mujoco.MjModel.from_xml_string(text)
+    else:
+        model = mujoco.MjModel.from_xml_path(file)
     if hasattr(mujoco.mjtDisableBit, "mjDSBL_AUTORESET"):
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     fields = {}
@@ -142,6 +146,22 @@ def load(file, text, names):
             fields[name] = np.asarray(value, float)
     flags = {f"opt.{kind}flags": flags_of(model, kind) for kind in KINDS}
     return model, {"version": mujoco.__version__, "flags": flags}, fields
+
+
+def with_options(file, balance_inertia, meshes):
+    """Compile a file with its inertias balanced, or without the geoms that are meshes."""
+    if not hasattr(mujoco, "MjSpec"):
+        raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads a file as it is written")
+    spec = mujoco.MjSpec.from_file(file)
+    if balance_inertia:
+        getattr(spec, "compiler", spec).balanceinertia = True
+    if not meshes:
+        for element in [geom for geom in spec.geoms if geom.meshname] + list(spec.meshes):
+            if hasattr(spec, "delete"):
+                spec.delete(element)
+            else:
+                element.delete()
+    return spec.compile()
 
 
 def edit(model, edits, flags):

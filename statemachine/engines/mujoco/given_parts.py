@@ -8,8 +8,10 @@ from typing import Any
 
 from ...backends.binary import is_binary
 from ...backends.compiled import ENGINE_ERRORS, read_spec, reason_of
+from ...backends.reading import prepare
 from ...errors import ModelError
 from ...installed import require
+from ...interface.records import ReadOptions
 
 # What an element has of its own in each file, or what is set apart.
 _ITS_OWN = {
@@ -36,7 +38,11 @@ def counts(raw: Any) -> dict[str, int]:
 
 
 def with_parts(
-    taker: Path, giver: Path, parts: Collection[str], names: Mapping[str, Mapping[str, str]]
+    taker: Path,
+    giver: Path,
+    parts: Collection[str],
+    names: Mapping[str, Mapping[str, str]],
+    options: ReadOptions,
 ) -> Any:
     """The compiled model of a file that has some parts of another file instead of its own.
 
@@ -45,6 +51,7 @@ def with_parts(
         giver: The other.
         parts: Of `counts`.
         names: By kind ("joint", "body", "site") the names in `taker` of the elements of `giver`.
+        options: How `taker` is read.
 
     Raises:
         ModelError: MuJoCo does not compile it so; a file is binary; or an actuator acts on what
@@ -54,6 +61,7 @@ def with_parts(
         raise ModelError(f"{path.name} is binary: no part of it can be given, or replaced")
     try:
         to, of = read_spec(taker), read_spec(giver)
+        prepare(to, options)
     except (ValueError, *ENGINE_ERRORS) as error:
         reason = reason_of(error)
         raise ModelError(f"{taker.name} with parts of {giver.name}: {reason}") from error

@@ -52,7 +52,7 @@ class PybulletEngine(RawEngine):
                 feature="causes of a gap",
                 reason="a floating joint is fixed",
             )
-        emulated = backend.load(model.path).replace(**options)
+        emulated = backend.load(model.path, read_options=model.read_options).replace(**options)
         return PybulletDials(model.replace(**options), emulated)
 
     def unlike_its_users(self, model: Model) -> list[str]:

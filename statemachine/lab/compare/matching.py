@@ -194,8 +194,8 @@ def match_models(left: Model, right: Model, names: Mapping[str, str] | None = No
     bodies = _and_further(((solid.left, solid.right) for solid in solids), by_name)
     sites = _sites(left, right, given, matching, trees)
     actuators = _actuators(left, right, joints, given)
-    only_left = _only(left, 0, joints, actuators, sites)
-    only_right = _only(right, 1, joints, actuators, sites)
+    only_left = _only((left, right), 0, joints, actuators, sites)
+    only_right = _only((right, left), 1, joints, actuators, sites)
     return Matched(
         left=left,
         right=right,
@@ -219,12 +219,27 @@ def _joints(matching: Matching) -> Pairs:
     return tuple(sorted(joints))
 
 
-def _only(model: Model, side: int, joints: Pairs, actuators: Pairs, sites: Pairs) -> Only:
-    """Return what has no counterpart: the names of one of two Models, 0 or 1."""
+def _only(
+    models: tuple[Model, Model], side: int, joints: Pairs, actuators: Pairs, sites: Pairs
+) -> Only:
+    """Return what has no counterpart: the names of one of two Models, 0 or 1.
+
+    A site that is a body in the other file is none of it: so it is where a link behind a fixed
+    joint is fused with its parent in one of them, and not in the other.
+
+    Args:
+        models: The Model, and the other one.
+        side: Which of the two the Model is in the pairs.
+        joints: Pairs of ids.
+        actuators: Pairs of ids.
+        sites: Pairs of ids.
+    """
+    model, other = models
+    further_sites = _rest(model.site_names, sites, side)
     return {
         "joint": _rest(model.joint_names, joints, side),
         "actuator": _rest(model.actuator_names, actuators, side),
-        "site": _rest(model.site_names, sites, side),
+        "site": tuple(name for name in further_sites if name not in other.body_names),
     }
 
 

@@ -169,12 +169,16 @@ def _unit_length(quats: Array) -> Array:
 
 
 def default_tip(*headers: Header) -> str:
-    """The site that all have: gripperframe, else the last one; "" if they share none."""
-    shared = [site for site in headers[0].sites if site]
+    """Return the site that all have: gripperframe, else the last that joints move; "" if none."""
+    first = headers[0]
+    shared = [k for k, site in enumerate(first.sites) if site]
     for header in headers[1:]:
-        shared = [site for site in shared if site in header.sites]
-    tip = usual_site(shared)
-    return "" if tip is None else shared[tip]
+        shared = [k for k in shared if first.sites[k] in header.sites]
+    names, moving = [first.sites[k] for k in shared], None
+    if first.moving_sites is not None:
+        moving = [first.moving_sites[k] for k in shared]
+    tip = usual_site(names, moving)
+    return "" if tip is None else names[tip]
 
 
 def normal_forces(trace: Trace) -> dict[str, Array]:

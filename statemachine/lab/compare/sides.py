@@ -22,6 +22,7 @@ from ...installed import DEFAULT, PAIR
 from ...interface import OPTIONS, Model
 from ...interface.checks import as_count
 from ...interface.options import OptionValue
+from ...interface.records import READ_OPTIONS
 from ...measures.text import command, listed
 from ...models import SUFFIXES as MODELS
 from ...models import resolve
@@ -46,7 +47,7 @@ class Side:
         file: A name or a file, as `load` takes it.
         engine: The backend to run it on.
         defaults: "model", or "engine" for the engine as its own users meet it.
-        options: As `Model.replace` takes them.
+        options: As `load` takes them: those of `Model.replace`, balance_inertia, meshes.
         menagerie: A menagerie folder to look the name up in.
         taken: Parts of another side's file that stand in place of its own.
     """
@@ -83,7 +84,8 @@ class Side:
         load_it = partial(self.chosen_backend().load_to_run, self.file, menagerie=self.menagerie)
         if self.taken is None:
             return load_it(**options)
-        model = self.taken.given_to(load_it())
+        read = {name: options[name] for name in READ_OPTIONS if name in options}
+        model = self.taken.given_to(load_it(**read))
         return model.replace(**options) if options else model
 
     def taking(self, parts: Sequence[str], of: Side, names: Mapping[str, str]) -> Side:
@@ -119,7 +121,7 @@ class TakenParts:
             "site": _renamed(giver.site_names, model.site_names, matched.sites),
         }
         return model.with_compiled(
-            room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
+            room(DEFAULT).with_parts(model.path, giver.path, self.parts, names, model.read_options)
         )
 
 
@@ -226,7 +228,7 @@ def _refuse_mistyped(word: str) -> None:
     parts = word.split(",")
     if len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")):
         raise BadInputError(f"two sides are two words: type {' '.join(parts)}")
-    if word in OPTIONS:
+    if word in (*OPTIONS, *READ_OPTIONS):
         raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
 
 
@@ -238,7 +240,7 @@ def _option(text: str) -> tuple[str, OptionValue]:
         BadInputError: It has no value, or an invalid one.
     """
     name, _, given = text.partition("=")
-    check_name("option", name, OPTIONS)
+    check_name("option", name, (*OPTIONS, *READ_OPTIONS))
     if not given:
         raise BadInputError(f"{name}= has no value")
     if given.lower() in _SWITCHES:

@@ -14,6 +14,7 @@ from ...errors import TraceError
 from ...interface import OPTIONS, JointType
 from ...interface.checks import HUGE
 from ...interface.options import OptionValue
+from ...interface.records import READ_OPTIONS, moving_sites
 from ...release_names import engine_of
 from ..runs.provenance import Provenance
 
@@ -61,14 +62,14 @@ class Header:
         command: The command that makes it again, or "".
         provenance: Engine, versions, the model's file and digest, seed.
         defaults: "model", or "engine" for the engine as its own users meet it.
-        options: What `Model.replace` was given.
+        options: What `Model.replace` was given, and `load` of `READ_OPTIONS`.
         keyframe: Where it started; None for the default state, or one that was given.
         timestep: Simulated time between rows [s]; substeps: engine steps within it.
         gravity: (3,) [m/s²], as the engine had it.
         nq, nv, nu, nmocap: Lengths of qpos, qvel, ctrl and mocap_pos.
         joints, sites, bodies, geoms, actuators: Names by id.
         jnt_type, jnt_qposadr, jnt_dofadr: As in a Model.
-        geom_bodyid, body_parentid, actuator_jntid, jnt_bodyid: As in a Model.
+        geom_bodyid, body_parentid, actuator_jntid, jnt_bodyid, site_bodyid: As in a Model.
         ctrlrange: (nu, 2), infinite where unlimited.
         energy_by: The engine that computed the energies, or "".
         rewritten: Rows whose state is not what the step before left: the controller wrote it
@@ -110,6 +111,7 @@ class Header:
     recorded: bool = False
     nmocap: int = 0
     jnt_bodyid: tuple[int, ...] = ()  # traces before it have none
+    site_bodyid: tuple[int, ...] = ()  # nor have they this
     schema: int = SCHEMA
 
     @property
@@ -177,6 +179,13 @@ class Header:
         return labels_of_joints(self.joints, self.jnt_type, self.jnt_bodyid, self.bodies)
 
     @property
+    def moving_sites(self) -> tuple[bool, ...] | None:
+        """Whether joints move each site; None of a trace that does not tell."""
+        if len(self.site_bodyid) != len(self.sites):
+            return None
+        return moving_sites(self.site_bodyid, self.body_parentid, self.jnt_bodyid)
+
+    @property
     def body_labels(self) -> tuple[str, ...]:
         """A name for each body: its own, or "body 1" by its number."""
         return tuple(name or f"body {k}" for k, name in enumerate(self.bodies))
@@ -194,6 +203,8 @@ class Header:
         _check_length("ctrlrange", self.ctrlrange, self.nu)
         if self.jnt_bodyid:  # traces before it have none
             _check_ids("jnt_bodyid", self.jnt_bodyid, joints, range(bodies))
+        if self.site_bodyid:
+            _check_ids("site_bodyid", self.site_bodyid, len(self.sites), range(bodies))
         for name, kind, qpos, dof in zip(
             self.joint_labels, self.jnt_type, self.jnt_qposadr, self.jnt_dofadr, strict=True
         ):
@@ -270,9 +281,9 @@ def _tuple_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 
 def _option(name: str, value: Any) -> bool:
-    """Whether `Model.replace` might take this; it looks closer."""
+    """Whether `Model.replace` or `load` might take this; they look closer."""
     known = isinstance(value, bool) or _text(value) or _finite(value) or _tuple_of(_finite)(value)
-    return name in OPTIONS and known
+    return name in (*OPTIONS, *READ_OPTIONS) and known
 
 
 def _count(value: Any) -> bool:
@@ -346,6 +357,7 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
     "jnt_qposadr": _integers,
     "jnt_dofadr": _integers,
     "jnt_bodyid": _integers,
+    "site_bodyid": _integers,
     "geom_bodyid": _integers,
     "body_parentid": _integers,
     "actuator_jntid": _integers,

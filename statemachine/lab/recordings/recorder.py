@@ -166,13 +166,15 @@ def _header(
     model: Model, controller: Controller | None, start: RunStart, metadata: RunMetadata
 ) -> Header:
     """Return what is known of a run before it begins."""
+    options: dict[str, OptionValue] = {**model.read_options.arguments()}
+    options |= {name: _plain(value) for name, value in metadata.options.items()}
     return Header(
         experiment=_experiment(metadata, controller),
         says=metadata.says,
         command=metadata.command,
         provenance=provenance(model, metadata.seed),
         defaults=metadata.defaults,
-        options={name: _plain(value) for name, value in metadata.options.items()},
+        options=options,
         keyframe=_keyframe_name(model, start.keyframe),
         timestep=model.timestep,
         substeps=model.substeps,
@@ -214,6 +216,7 @@ class ModelLayout(TypedDict):
     jnt_qposadr: tuple[int, ...]
     jnt_dofadr: tuple[int, ...]
     jnt_bodyid: tuple[int, ...]
+    site_bodyid: tuple[int, ...]
     geom_bodyid: tuple[int, ...]
     body_parentid: tuple[int, ...]
     actuator_jntid: tuple[int, ...]
@@ -237,6 +240,7 @@ def layout_of(model: Model) -> ModelLayout:
         "jnt_qposadr": tuple(model.jnt_qposadr.tolist()),
         "jnt_dofadr": tuple(model.jnt_dofadr.tolist()),
         "jnt_bodyid": tuple(model.jnt_bodyid.tolist()),
+        "site_bodyid": tuple(model.site_bodyid.tolist()),
         "geom_bodyid": tuple(model.geom_bodyid.tolist()),
         "body_parentid": tuple(model.body_parentid.tolist()),
         "actuator_jntid": tuple(model.actuator_jntid.tolist()),

@@ -9,6 +9,7 @@ from ...backends import BackendChoice
 from ...backends.chosen import one_backend
 from ...errors import check_name, printable
 from ...installed import DEFAULT
+from ...interface.records import READ_OPTIONS
 from ...measures.text import command
 from ...models import AnyPath
 from ..runs.controllers import (
@@ -182,25 +183,27 @@ def answer_play(request: PlayRequest, reporter: Reporter = QUIET) -> Trace:
         StateMachineError: The model cannot be loaded.
     """
     trace, backend = read(request.file), request.chosen_backend()
+    options = trace.header.options
+    read_options = {name: options[name] for name in READ_OPTIONS if name in options}
     if request.model is None:
         file, is_same = model_file(trace.header, request.menagerie, request.file)
-        model = backend.load_to_run(file)
+        model = backend.load_to_run(file, **read_options)
         if not is_same:
             reporter.note(
                 f"{trace.header.provenance.model_file} as it is here is not the file that the "
                 "trace was recorded with: its digest is another"
             )
     else:
-        model = backend.load_to_run(request.model, menagerie=request.menagerie)
-    if trace.header.options:
-        model = model.replace(**trace.header.options)
+        model = backend.load_to_run(request.model, menagerie=request.menagerie, **read_options)
+    if options:
+        model = model.replace(**options)
     with reporter.stage(f"play on {backend}") as progress:
         return play(
             trace,
             model,
             command=request.typed,
             defaults=backend.defaults,
-            options=trace.header.options,
+            options=options,
             progress=progress,
         )
 

@@ -302,7 +302,7 @@ def _run(
 
 def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
     """The usual site (3,) [m] in world axes at some positions; `data` of the ended run serves."""
-    site = usual_site(model.site_names)
+    site = usual_site(model.site_names, model.moving_sites)
     if site is None:
         return None
     tips = []

@@ -111,7 +111,8 @@ class Ruler:
         self.time, self.between = _moments_of(left, right)
         self._model = model = matched.left
         joints = np.array(matched.joints, np.int64).reshape(-1, 2).T
-        usual_tip = usual_site([model.site_names[a] for a, _ in matched.sites])
+        moving, sites = model.moving_sites, [a for a, _ in matched.sites]
+        usual_tip = usual_site([model.site_names[a] for a in sites], [moving[a] for a in sites])
         tips = (None, None) if usual_tip is None else matched.sites[usual_tip]
         self._places = (
             _Places.of(model, joints[0], tips[0]),

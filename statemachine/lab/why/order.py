@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...backends import load
+from ...backends import on_default
 from ...engines import room
 from ...engines.records import BodyPair, Counterparts, Pairs
 from ...installed import DEFAULT
@@ -67,8 +67,7 @@ def in_order_of_left(left: Model, right: Model, matched: Matched) -> Model:
         *own.readable(right.compiled, left.compiled, swapped),
     ]
     edits = [edit for row in rows if not row.refused for edit in row.edits]
-    base = left if left.backend == DEFAULT else load(left.path)
-    shown = base.with_compiled(own.edited(left.compiled, edits))
+    shown = on_default(left).with_compiled(own.edited(left.compiled, edits))
     if (shown.timestep, shown.substeps) != (right.timestep, right.substeps):
         shown = shown.replace(timestep=right.timestep, substeps=right.substeps)
     return shown

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from ...backends import load
+from ...backends import on_default
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Model
@@ -174,7 +174,7 @@ class Trials:
         if model.backend == DEFAULT:
             return model
         first = self.setup.models[0]
-        base = first if first.backend == DEFAULT else load(model.path)
+        base = first if first.backend == DEFAULT else on_default(model)
         return base if model.compiled is None else base.with_compiled(model.compiled)
 
     def repeats(self) -> bool:

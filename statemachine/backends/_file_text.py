@@ -1,7 +1,8 @@
-"""A URDF's text as MuJoCo is to read it: with the mesh files that it would not find by itself.
+"""The text that MuJoCo is given in place of a file that it does not read as it is.
 
-MuJoCo looks for a mesh in the folder of the URDF, or in the `meshdir` of its <compiler>, by the
-name as it is written. Two kinds of names it does not find there:
+Of a URDF that is one with the mesh files that it would not find by itself. MuJoCo looks for a mesh
+in the folder of the URDF, or in the `meshdir` of its <compiler>, by the name as it is written. Two
+kinds of names it does not find there:
 
 - `package://robot/meshes/part.stl`: ROS knows where packages are, a file alone does not;
 - `meshes/part.stl` where `meshdir` is "meshes" already. Up to MuJoCo 3 the folders in the name of a
@@ -17,29 +18,56 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.sax.saxutils import quoteattr
 
+from ..interface.records import AS_WRITTEN, ReadOptions
 from ..models import mesh_file, what_is_there
 
 _PACKAGE = "package://"
 
 
-def is_urdf(path: Path) -> bool:
-    """Return whether a file is a URDF, by its suffix."""
-    return path.suffix.lower() == ".urdf"
+# Suffixes by which MuJoCo knows that a file is XML.
+_KNOWN = (".xml", ".urdf")
 
 
-def urdf_text(path: Path, visuals: bool = False) -> str | None:
+def text_for(path: Path, visuals: bool = False) -> str | None:
+    """Return the text that MuJoCo is given in place of a file; None where it reads the file itself.
+
+    Args:
+        path: An MJCF or URDF file.
+        visuals: As of `urdf_text`.
+
+    Raises:
+        ValueError: The file cannot be read.
+    """
+    text = urdf_text(path, visuals)
+    if text is not None or path.suffix in _KNOWN:
+        return text
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError, LookupError) as error:
+        raise ValueError(f"{path.name} cannot be read: {error}") from None
+    if root.tag == "robot":
+        return ElementTree.tostring(root, encoding="unicode")
+    # An included file may have any suffix, and the files that it names are found beside it.
+    name = quoteattr(root.get("model", "MuJoCo Model"))
+    return f"<mujoco model={name}><include file={quoteattr(str(path.absolute()))}/></mujoco>"
+
+
+def urdf_text(path: Path, visuals: bool = False, options: ReadOptions = AS_WRITTEN) -> str | None:
     """Return the text of a URDF in which every mesh that is there is named so that it is found.
 
     Args:
         path: The file.
         visuals: Whether visual shapes are to be read, too, which MuJoCo leaves out unless the file
             says `discardvisual="false"`.
+        options: What is written into the text, too: the `balanceinertia` of its <compiler>, and
+            shapes without those that are meshes.
 
     Returns:
         The text; None where MuJoCo can be given the file as it is, or the file is no URDF.
     """
-    if not is_urdf(path):
+    if path.suffix.lower() != ".urdf":
         return None
     try:
         root = ElementTree.parse(path).getroot()
@@ -49,6 +77,11 @@ def urdf_text(path: Path, visuals: bool = False) -> str | None:
         return None
     compiler = _compiler_of(root)
     is_changed = _name_meshes(root, compiler, path.parent)
+    if options.balance_inertia:
+        compiler.set("balanceinertia", "true")
+        is_changed = True
+    if not options.meshes:
+        is_changed = _drop_meshes(root) or is_changed
     if visuals and compiler.get("discardvisual") != "false":
         compiler.set("discardvisual", "false")
         is_changed = True
@@ -98,6 +131,19 @@ def _name_meshes(root: Element, compiler: Element, folder: Path) -> bool:
             mesh.set("filename", _last_part(name))
     compiler.set("strippath", "false")
     return True
+
+
+def _drop_meshes(root: Element) -> bool:
+    """Take the shapes that are meshes from the links of a URDF; return whether there are any."""
+    shapes = [
+        (link, shape)
+        for link in root.iter("link")
+        for shape in link
+        if shape.find("geometry/mesh") is not None
+    ]
+    for link, shape in shapes:
+        link.remove(shape)
+    return bool(shapes)
 
 
 def _mesh_elsewhere(name: str, folder: Path, meshdir: Path) -> Path | None:
