@@ -38,7 +38,7 @@ def main() -> int:
             )
             return 2
     try:
-        from statemachine import cli as run
+        from statemachine.cli import main as run
     except Exception:  # a broken installation; exit code 1 would be an answer
         traceback.print_exc()
         print("statemachine: it cannot be imported, for the reason above", file=sys.stderr)

@@ -9,6 +9,7 @@ from .installed import DEFAULT
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)", re.ASCII)
 _EXAMPLE = f"{DEFAULT}==3.3.7"
+_OLDEST = (3, 0, 0)  # whose contacts are arrays, as those of every release since
 
 
 def is_release(name: str) -> bool:
@@ -31,6 +32,21 @@ def version_of(name: str) -> str:
         )
     check_name("engine with releases", match["engine"], [DEFAULT])
     return match["version"]
+
+
+def check_age(name: str) -> None:
+    """Raise BadInputError for a release that is too old to be driven.
+
+    Raises:
+        BadInputError: As `version_of`, or it is older than 3.0.0.
+    """
+    numbers = re.findall(r"[0-9]+", version_of(name))
+    if tuple(map(int, numbers[:3])) < _OLDEST:
+        oldest = ".".join(map(str, _OLDEST))
+        raise BadInputError(
+            f"{name} is too old to be driven: its contacts are no arrays; the oldest release that "
+            f"can be is {DEFAULT}=={oldest}"
+        )
 
 
 def engine_of(name: str) -> str:

@@ -22,7 +22,7 @@ from typing import Any
 
 from .errors import BadInputError, EngineError, MissingEngineError
 from .installed import DEFAULT, engine_version
-from .release_names import is_release, version_of
+from .release_names import check_age, is_release, version_of
 
 if sys.platform == "win32":
     fcntl = None
@@ -47,8 +47,9 @@ def python_of(name: str) -> Path:
 
     Raises:
         MissingEngineError: It is not here.
-        BadInputError: As `version_of`.
+        BadInputError: As `check_age`.
     """
+    check_age(name)
     if not is_here(name):
         raise MissingEngineError(_ADD.format(name, name), engine=name)
     return _python_in(folder() / name)
@@ -61,7 +62,7 @@ def backends_of(versions: str) -> list[str]:
         versions: With commas between: "3.1.6,3.3.7".
 
     Raises:
-        BadInputError: As `version_of`.
+        BadInputError: As `check_age`.
         MissingEngineError: Some are not here; with the command that adds all of them.
     """
     installed = engine_version(DEFAULT)
@@ -70,6 +71,8 @@ def backends_of(versions: str) -> list[str]:
     names = [DEFAULT if word == installed else f"{DEFAULT}=={word}" for word in ordered]
     if len(names) == 1:
         raise BadInputError(f"{versions} is installed: name another release to compare it with")
+    for name in filter(is_release, names):
+        check_age(name)
     missing = [name for name in names if is_release(name) and not is_here(name)]
     if missing:
         raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
@@ -93,8 +96,9 @@ def published(since: str) -> list[str]:
 
     Raises:
         EngineError: It cannot be asked.
-        BadInputError: It has no such release.
+        BadInputError: As `check_age`, or it has no such release.
     """
+    check_age(f"{DEFAULT}=={since}")
     uv = ["uv", "tool", "run", "--python", sys.executable]  # which brings a pip where there is none
     run = uv if find_spec("pip") is None and shutil.which("uv") else [sys.executable, "-m"]
     asked = [*run, "pip", "index", "versions", DEFAULT]
@@ -198,9 +202,10 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         say: Told what is being done.
 
     Raises:
-        BadInputError: As `version_of`, or there is no such Python.
+        BadInputError: As `check_age`, or there is no such Python; nothing is downloaded then.
         EngineError: It cannot be installed, or does not run.
     """
+    check_age(name)
     version, home = version_of(name), folder()
     if is_here(name):
         say(f"{name} is here already")

@@ -14,7 +14,7 @@ from statemachine.lab.recordings.request import PlayRequest, answer_play
 from statemachine.lab.validate.fingertip import certify
 from statemachine.releases import is_here
 
-from .conftest import SHARED, shared
+from .support.requirements import SHARED, shared
 
 mujoco = pytest.importorskip("mujoco")
 

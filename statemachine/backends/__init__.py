@@ -309,7 +309,8 @@ def on_default(model: Model) -> Model:
     with warnings.catch_warnings(action="ignore", category=EngineWarning):  # told of the model
         if model.backend == DEFAULT:
             return model
-        return load(model.path, **model.read_options.arguments())
+        options: dict[str, Any] = {**model.read_options.arguments()}
+        return load(model.path, **options)
 
 
 def _find(name: str) -> str:

@@ -3,49 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array, Ints
+from .compiled_actuators import ActivationKind, BiasKind, CtrlChart, CtrlInput, GainKind
 from .controls import ctrl_owners
+
+if TYPE_CHECKING:
+    from .compiled_types import MjModel
 
 # What the controls of an actuator with several are: bits of its ctrlspec, in their order.
 _INPUTS = {
-    int(mujoco.mjtCtrlInput.mjINPUT_POS): "position",
-    int(mujoco.mjtCtrlInput.mjINPUT_VEL): "velocity",
-    int(mujoco.mjtCtrlInput.mjINPUT_FF): "feedforward",
-    int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE): "voltage",
-    int(mujoco.mjtCtrlInput.mjINPUT_PRESSURE): "pressure",
+    CtrlInput.POSITION: "position",
+    CtrlInput.VELOCITY: "velocity",
+    CtrlInput.FEEDFORWARD: "feedforward",
+    CtrlInput.VOLTAGE: "voltage",
+    CtrlInput.PRESSURE: "pressure",
 }
-_CHARTS = {
-    int(mujoco.mjtCtrlChart.mjCHART_EXPMAP): ("x", "y", "z"),
-    int(mujoco.mjtCtrlChart.mjCHART_QUAT): ("w", "x", "y", "z"),
+_CHARTS: dict[int, tuple[str, ...]] = {
+    CtrlChart.EXPMAP: ("x", "y", "z"),
+    CtrlChart.QUAT: ("w", "x", "y", "z"),
 }
 
 
-def servos(m: mujoco.MjModel) -> tuple[Ints, NDArray[np.bool_]]:
+def servos(m: MjModel) -> tuple[Ints, NDArray[np.bool_]]:
     """Return the actuator of each number of ctrl (nu,), and whether it is a position servo.
 
     An actuator may take several numbers of ctrl.
     """
     owner = ctrl_owners(m)
-    fixed = m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
-    affine = m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    fixed = m.actuator_gaintype == GainKind.FIXED
+    affine = m.actuator_biastype == BiasKind.AFFINE
     gain = m.actuator_gainprm[:, 0]
     servo = fixed & affine & (m.actuator_biasprm[:, 1] == -gain) & (gain != 0)
     # An integrator's ctrl is a velocity.
-    direct = (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
-    servo &= np.isin(m.actuator_dyntype, [int(kind) for kind in direct])
+    direct = (ActivationKind.NONE, ActivationKind.FILTER, ActivationKind.FILTEREXACT)
+    servo &= np.isin(m.actuator_dyntype, direct)
     return owner, servo[owner]
 
 
-def control_names(m: mujoco.MjModel) -> Iterator[str]:
+def control_names(m: MjModel) -> Iterator[str]:
     """Yield a name for each number of ctrl: the actuator's, with a suffix if it takes several."""
     for i in range(m.nactuator):
         name, count, spec = m.actuator(i).name, int(m.actuator_ctrlnum[i]), m.actuator_ctrlspec[i]
-        if m.actuator_gaintype[i] == int(mujoco.mjtGain.mjGAIN_SO3):
+        if m.actuator_gaintype[i] == GainKind.SO3:
             parts = _CHARTS.get(int(spec), ())
         else:
             parts = tuple(part for bit, part in _INPUTS.items() if int(spec) & bit)
@@ -54,7 +58,7 @@ def control_names(m: mujoco.MjModel) -> Iterator[str]:
         yield from (f"{name}.{part}" if name and count > 1 else name for part in parts)
 
 
-def delay_steps(m: mujoco.MjModel) -> Ints:
+def delay_steps(m: MjModel) -> Ints:
     """Return the engine steps (nu,) by which each number of ctrl acts late."""
     steps = np.minimum(commands_needed(m.actuator_delay, m.opt.timestep), m.actuator_history[:, 0])
     return steps.astype(np.int64)[ctrl_owners(m)]

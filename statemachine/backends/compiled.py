@@ -135,7 +135,7 @@ def _from_binary(path: str, content: bytes, options: ReadOptions) -> mujoco.MjMo
         raise BadInputError(
             f"{path} is binary, compiled already: balance_inertia and meshes are of XML files"
         )
-    from .delays import from_binary
+    from .compiled_bytes import from_binary
 
     try:
         return from_binary(content)
@@ -207,7 +207,7 @@ def check_numbers(raw: mujoco.MjModel, name: str) -> None:
 def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
     """Read an MJCF or a URDF file, and compile nothing.
 
-    Meshes of a URDF that MuJoCo would not find are looked up as `_file_text` says.
+    Meshes of a URDF that MuJoCo would not find are looked up as `file_text` says.
 
     Args:
         path: The file.
@@ -219,7 +219,7 @@ def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
     """
     text = None
     if path.suffix != ".xml":
-        from ._file_text import text_for
+        from .file_text import text_for
 
         text = text_for(path, visuals)
     if text is None:

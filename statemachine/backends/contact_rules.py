@@ -6,14 +6,16 @@ section Contact parameters. A pair of geoms that a file names itself is not aske
 
 from __future__ import annotations
 
-from typing import Any
-
-import mujoco
+from typing import TYPE_CHECKING, Any
 
 from ..interface import Array
+from .compiled_flags import DisableFlag
+
+if TYPE_CHECKING:
+    from .compiled_types import MjModel
 
 
-def bodies_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
+def bodies_meet(raw: MjModel, a: int, b: int) -> bool:
     """Whether geoms of two bodies may touch.
 
     They may not within one rigid piece, nor as parent and child, nor where they are excluded.
@@ -21,18 +23,18 @@ def bodies_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
     left, right = int(raw.body_weldid[a]), int(raw.body_weldid[b])
     if left == right or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
         return False
-    if raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
+    if raw.opt.disableflags & DisableFlag.FILTERPARENT:
         return True
     up: Any = raw.body_weldid[raw.body_parentid[[left, right]]]
     return not ((up[0] == right and right) or (up[1] == left and left))
 
 
-def masks_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
+def masks_meet(raw: MjModel, a: int, b: int) -> bool:
     """Whether the masks of two geoms let them touch."""
     return bool((raw.geom_contype[[a, b]] & raw.geom_conaffinity[[b, a]]).any())
 
 
-def mixed(raw: mujoco.MjModel, a: int, b: int) -> tuple[int, Array, Array, Array]:
+def mixed(raw: MjModel, a: int, b: int) -> tuple[int, Array, Array, Array]:
     """The parameters of a contact of two geoms.
 
     Returns:

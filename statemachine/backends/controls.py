@@ -9,9 +9,9 @@ import numpy as np
 from ..interface import Ints
 
 if TYPE_CHECKING:
-    import mujoco
+    from .compiled_types import MjModel
 
 
-def ctrl_owners(m: mujoco.MjModel) -> Ints:
+def ctrl_owners(m: MjModel) -> Ints:
     """Return the actuator (nu,) of each number of ctrl; one may take several."""
     return np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)

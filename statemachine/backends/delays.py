@@ -10,15 +10,18 @@ from __future__ import annotations
 
 import struct
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
 from ..processes import free_memory
 from .actuators import commands_needed
+from .compiled_bytes import compile_text, from_binary, saved
+
+if TYPE_CHECKING:
+    from .compiled_types import MjModel
 
 SHORTER = 1 - 1e-6
 _LARGE = 1e7  # bytes of buffers, from which on it is asked what memory is free
@@ -27,7 +30,7 @@ _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></w
 <actuator><motor joint="j" delay="1" nsample="{}"/></actuator></mujoco>"""
 
 
-def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> Ints:
+def commands_kept(m: MjModel, delay: Array, timestep: Array | float) -> Ints:
     """How many commands each actuator keeps: what its delay needs, and what the file asks for.
 
     Args:
@@ -58,7 +61,7 @@ def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> I
     return counts.astype(np.int64)
 
 
-def with_room(m: mujoco.MjModel, counts: Ints | None = None) -> mujoco.MjModel:
+def with_room(m: MjModel, counts: Ints | None = None) -> MjModel:
     """The same model, with a buffer for the delay of every actuator; itself if it has them.
 
     Args:
@@ -79,7 +82,7 @@ def with_room(m: mujoco.MjModel, counts: Ints | None = None) -> mujoco.MjModel:
     return roomy
 
 
-def with_room_of(m: mujoco.MjModel, before: mujoco.MjModel, counts: Ints) -> mujoco.MjModel:
+def with_room_of(m: MjModel, before: MjModel, counts: Ints) -> MjModel:
     """What `with_room` would make of one of many worlds that share larger buffers.
 
     Args:
@@ -93,7 +96,7 @@ def with_room_of(m: mujoco.MjModel, before: mujoco.MjModel, counts: Ints) -> muj
     return with_room(own, counts)
 
 
-def places_of(before: mujoco.MjModel, shared: mujoco.MjModel, counts: Ints) -> Ints:
+def places_of(before: MjModel, shared: MjModel, counts: Ints) -> Ints:
     """Where the buffers of a Data of one world's model are in those that many worlds share.
 
     Args:
@@ -115,7 +118,7 @@ def places_of(before: mujoco.MjModel, shared: mujoco.MjModel, counts: Ints) -> I
     return places
 
 
-def hold(m: mujoco.MjModel, history: Array, ctrl: Array, counts: Ints | None = None) -> None:
+def hold(m: MjModel, history: Array, ctrl: Array, counts: Ints | None = None) -> None:
     """Let the commands before the start have been that of the start.
 
     Args:
@@ -137,7 +140,7 @@ def hold(m: mujoco.MjModel, history: Array, ctrl: Array, counts: Ints | None = N
         history[which] = rows
 
 
-def _appended(m: mujoco.MjModel, counts: Ints) -> tuple[Ints, Ints]:
+def _appended(m: MjModel, counts: Ints) -> tuple[Ints, Ints]:
     """Actuators that need a larger buffer, and where each starts; last, where they all end."""
     short = np.flatnonzero(counts > m.actuator_history[:, 0])
     # Two numbers of the buffer's own, and a time and a command for each that is kept.
@@ -145,24 +148,12 @@ def _appended(m: mujoco.MjModel, counts: Ints) -> tuple[Ints, Ints]:
     return short, m.nhistory + np.cumsum([0, *sizes])
 
 
-def _of_size(m: mujoco.MjModel, nhistory: int) -> mujoco.MjModel:
+def _of_size(m: MjModel, nhistory: int) -> MjModel:
     """A copy whose Data have buffers of another size."""
     blob = saved(m)
     at = _history_offset()
     blob[at : at + 8] = np.frombuffer(struct.pack("<q", nhistory), np.uint8)
     return from_binary(blob.tobytes())
-
-
-def from_binary(content: bytes) -> mujoco.MjModel:
-    """The compiled model in the bytes of an MJB file."""
-    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": content})
-
-
-def saved(m: mujoco.MjModel) -> np.ndarray:
-    """A compiled model in the bytes of an MJB file."""
-    blob = np.empty(mujoco.mj_sizeModel(m), np.uint8)
-    mujoco.mj_saveModel(m, None, blob)
-    return blob
 
 
 @cache
@@ -171,7 +162,7 @@ def _history_offset() -> int:
 
     It is the first in which two models with other buffers differ; sizes come before arrays.
     """
-    few, more = (mujoco.MjModel.from_xml_string(_SMALL.format(count)) for count in (1, 2))
+    few, more = (compile_text(_SMALL.format(count)) for count in (1, 2))
     at = int(np.flatnonzero(saved(few) != saved(more))[0])
     for model in (few, more):
         size = struct.unpack("<q", saved(model)[at : at + 8].tobytes())[0]

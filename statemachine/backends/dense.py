@@ -1,50 +1,20 @@
 """Small dense algebra that gives the same bits on every processor of a kind.
 
 NumPy's products and solutions go through a BLAS that chooses its kernels by the
-processor, and their last bits differ. MuJoCo's functions were compiled once, for all.
-They are also as quick, at these sizes.
+processor, and their last bits differ. Those of `compiled_algebra` do not, and are as quick at
+these sizes.
 """
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from ..interface import Array
+from .compiled_algebra import dot, factored, product, solved, times
 
-_TINY = 1e-15  # smallest pivot
+__all__ = ["dot", "factored", "pivoted", "product", "solved", "times"]
+
 _PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
-
-
-def times(matrix: Array, vector: Array) -> Array:
-    """The product (n,) of a matrix (n, m) and a vector (m,)."""
-    product = np.empty(len(matrix))
-    mujoco.mju_mulMatVec(product, matrix, vector)
-    return product
-
-
-def product(left: Array, right: Array) -> Array:
-    """The product (n, k) of matrices (n, m) and (m, k)."""
-    result = np.empty((len(left), right.shape[1]))
-    mujoco.mju_mulMatMat(result, left, right)
-    return result
-
-
-def dot(left: Array, right: Array) -> float:
-    """The product of two vectors (n,)."""
-    return mujoco.mju_dot(left, right)
-
-
-def factored(matrix: Array) -> Array:
-    """Cholesky's factor of a positive definite matrix (n, n), which it takes the place of."""
-    mujoco.mju_cholFactor(matrix, _TINY)
-    return matrix
-
-
-def solved(factor: Array, right: Array) -> Array:
-    """The solution (n,) for a right-hand side (n,), which it takes the place of."""
-    mujoco.mju_cholSolve(right, factor, right)
-    return right
 
 
 def pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:

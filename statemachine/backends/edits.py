@@ -7,28 +7,30 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array
 from .actuators import servos
-from .served.release_child import held
+from .compiled_flags import DisableFlag
+from .served.release_parts import held
 
-_DISABLE = mujoco.mjtDisableBit
+if TYPE_CHECKING:
+    from .compiled_types import MjModel
+
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
-    "actuation": _DISABLE.mjDSBL_ACTUATION,
-    "contacts": _DISABLE.mjDSBL_CONTACT,
-    "limits": _DISABLE.mjDSBL_LIMIT,
+    "actuation": DisableFlag.ACTUATION,
+    "contacts": DisableFlag.CONTACT,
+    "limits": DisableFlag.LIMIT,
 }
 _HINDRANCES = {  # option -> flags of a file that would leave it without effect
-    "gravity": (_DISABLE.mjDSBL_GRAVITY,),
-    "damping": (_DISABLE.mjDSBL_DAMPER,),
-    "frictionloss": (_DISABLE.mjDSBL_FRICTIONLOSS, _DISABLE.mjDSBL_CONSTRAINT),
-    "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
-    "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
+    "gravity": (DisableFlag.GRAVITY,),
+    "damping": (DisableFlag.DAMPER,),
+    "frictionloss": (DisableFlag.FRICTIONLOSS, DisableFlag.CONSTRAINT),
+    "contacts": (DisableFlag.CONSTRAINT,),
+    "limits": (DisableFlag.CONSTRAINT,),
 }
 _ARRAYS = {  # option -> the array that it is
     "gravity": "opt.gravity",
@@ -41,7 +43,7 @@ _ARRAYS = {  # option -> the array that it is
 CONSTANTS_FOLLOW = frozenset({"armature", "mass"})
 
 
-def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
+def changes(raw: MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return which arrays of a compiled model some options change, and to what.
 
     Args:
@@ -81,7 +83,7 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
     return arrays
 
 
-def _set_gain(raw: mujoco.MjModel, arrays: dict[str, Any], name: str, value: Array) -> None:
+def _set_gain(raw: MjModel, arrays: dict[str, Any], name: str, value: Array) -> None:
     """Add what one gain of the position servos changes.
 
     Args:
@@ -98,7 +100,7 @@ def _set_gain(raw: mujoco.MjModel, arrays: dict[str, Any], name: str, value: Arr
         gain[..., owner[servo], 0] = value[..., servo]
 
 
-def _flags(raw: mujoco.MjModel, options: Mapping[str, Any]) -> Any:
+def _flags(raw: MjModel, options: Mapping[str, Any]) -> Any:
     """Return the bits of what is disabled, with some options: an array, without axes or (n,)."""
     flags = np.asarray(raw.opt.disableflags)
     for name, value in options.items():
@@ -110,9 +112,7 @@ def _flags(raw: mujoco.MjModel, options: Mapping[str, Any]) -> Any:
     return flags
 
 
-def varied(
-    raw: mujoco.MjModel, options: Mapping[str, Any]
-) -> tuple[mujoco.MjModel, dict[str, Any]]:
+def varied(raw: MjModel, options: Mapping[str, Any]) -> tuple[MjModel, dict[str, Any]]:
     """What worlds share, and the arrays of the compiled model that each has of its own.
 
     Args:
@@ -147,7 +147,7 @@ def _rows(array: Array, value: Any) -> Array:
     return np.array(np.broadcast_to(array, (*value.shape[:-1], *array.shape[-2:])))
 
 
-def edited(raw: mujoco.MjModel, options: dict[str, Any], timestep: float) -> mujoco.MjModel:
+def edited(raw: MjModel, options: dict[str, Any], timestep: float) -> MjModel:
     """A copy with options of `Model.replace`, which has checked them, and room for a latency.
 
     Args:
@@ -163,7 +163,9 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any], timestep: float) -> muj
     for name, value in written.items():
         put(raw, name, value)
     if CONSTANTS_FOLLOW & options.keys():
-        mujoco.mj_setConst(raw, mujoco.MjData(raw))
+        from .compiled_stages import set_constants
+
+        set_constants(raw)
     raw.opt.timestep = timestep
     if not raw.actuator_delay.any():
         return raw
@@ -172,7 +174,7 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any], timestep: float) -> muj
     return with_room(raw)
 
 
-def put(raw: mujoco.MjModel, name: str, value: Any, index: tuple[Any, ...] = ()) -> None:
+def put(raw: MjModel, name: str, value: Any, index: tuple[Any, ...] = ()) -> None:
     """Write into a compiled model.
 
     Args:

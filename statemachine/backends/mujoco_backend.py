@@ -41,7 +41,7 @@ from .compiled import (
     facts,
 )
 from .mujoco.alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
-from .served.release_child import constraint_part, contact_arrays
+from .served.release_parts import constraint_part, contact_arrays
 
 # Not RK4: after its step the derived values are neither of the state before nor after.
 INTEGRATORS = {
@@ -166,7 +166,7 @@ class MujocoModel(Model):
         Raises:
             OSError: It cannot be written.
         """
-        from .delays import saved
+        from .compiled_bytes import saved
 
         Path(path).write_bytes(saved(self.raw).tobytes())
 

@@ -42,7 +42,7 @@ def _of_missing_file(path: Path, name: str) -> str:
     place = path.absolute().parent / Path(name).parent
     if path.suffix.lower() != ".urdf" or what_is_there(place) == "a folder":
         return f"it is looked for in {place}: copy that folder along with the model"
-    # Without the folders in a mesh's name `_file_text` has looked for it, too.
+    # Without the folders in a mesh's name `file_text` has looked for it, too.
     return (
         f"it is looked for in {place}, and without the folders of its name in the meshdir of the "
         "<compiler>, as strippath='true' has it: copy the meshes along with the model"

@@ -113,6 +113,10 @@ class RawEngine:
         """What of a Model's file its backend leaves out, each in a few words."""
         return []
 
+    def read_otherwise(self, left: Model, right: Model) -> list[str]:
+        """Say what only one of two releases of the engine reads in the file of both Models."""
+        return []
+
     # The engine as it comes. Nothing here goes through an adapter that emulates the contract.
 
     def terms(self, model: Model) -> tuple[EngineTerm, ...]:

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from ...errors import ModelError, UnsupportedError
 from ...interface.records import AS_WRITTEN, ReadOptions
-from .._file_text import urdf_text
+from ..file_text import urdf_text
 from .client import as_file, load_urdf
 
 # PyBullet has room for 128 numbers of a tree, and of a position for 7 of its base; from 122 joints

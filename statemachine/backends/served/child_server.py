@@ -17,7 +17,10 @@ only, and imports nothing of this package. Its argument is a file that knows the
   returns how many. `forward()` derives of the present. `derived(vector)` gives what is derived,
   of the moment that the last step started from or of the present after `forward`, which it is told
   again, by name, and of the contacts geom, dist, pos, frame, force and torque;
-- `edit(model, edits, flags)`, if it can change a model: other values in fields, and these flags.
+- `edit(model, edits, flags)`, if it can change a model: other values in fields, and these flags;
+- `written(file, text)`, if its elements may be others than the installed MuJoCo reads: what it
+  reads in the file, as MJCF. Of an engine whose `load` says "names" of elements, by kind, it is
+  asked for where they differ.
 
 A message and its answer are pickled: what is said, and arrays as shapes and bytes, since an older
 NumPy cannot read the arrays of a later one. The process ends with its input, in the midst of a
@@ -103,6 +106,11 @@ class Answerer:
         if edits or job.get("flags"):
             self.engine.edit(model, edits, job["flags"])
         return {"model": self.keep(model), "digest": digest, **said}, fields
+
+    def written(self, job, _):
+        """What the engine reads in a file, as MJCF."""
+        told = {"read": job["read"]} if "read" in job else {}
+        return {"text": self.engine.written(job["file"], job["text"], **told)}, {}
 
     def make(self, job, _):
         """A world of a model."""

@@ -58,6 +58,7 @@ class LoadedModel:
         digest: Of what it read, by which a file that changed since then is seen.
         flags: Names of the flags that are set, by the names of their sets; empty where the engine
             tells of none.
+        names: Names of the elements, by kind; empty where the engine tells of none.
         fields: Numeric fields that were asked for, by name, as far as the engine has them.
     """
 
@@ -65,6 +66,7 @@ class LoadedModel:
     version: str
     digest: str
     flags: Mapping[str, list[str]]
+    names: Mapping[str, list[str]]
     fields: Arrays
 
 
@@ -186,6 +188,7 @@ class Server:
             version=answer["version"],
             digest=answer["digest"],
             flags=answer.get("flags", {}),
+            names=answer.get("names", {}),
             fields=fields,
         )
         name, version = self._engine.name, loaded.version
@@ -193,6 +196,20 @@ class Server:
             self.forgotten.append(loaded.number)
             raise EngineError(f"the environment of {name} has {version}: {self._engine.anew}")
         return loaded
+
+    def written(self, text: str, file: str, **job: Any) -> str:
+        """Return as MJCF what it reads in a file.
+
+        Args:
+            text: Of the file, or "".
+            file: Its path.
+            **job: "read", how it reads the file.
+
+        Raises:
+            LostError, AnswerError: As `ask`.
+        """
+        answer, _ = self.ask("written", file=file, text=text, **job)
+        return answer["text"]
 
     def make(self, model: int) -> MadeWorld:
         """Let it make a world of a model, which is given by its number.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -19,7 +20,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...errors import EngineError, ModelError
+from ...errors import EngineError, EngineWarning, ModelError, one_line
 from ...interface import Capabilities
 from ...interface.checks import unsupported_by
 from ...interface.records import AS_WRITTEN, Arrays, Defaults, ReadOptions
@@ -27,13 +28,22 @@ from ...models import AnyPath
 from ...release_names import is_release, version_of
 from ...releases import python_of
 from ..binary import is_binary
-from ..compiled import check_numbers, facts, fastest, read_spec
+from ..compiled import (
+    ENGINE_ERRORS,
+    check_numbers,
+    compiler_warnings,
+    facts,
+    fastest,
+    read_spec,
+)
 from ..edits import put
 from ..hidden_data import HiddenModel
 from ..mujoco_backend import MujocoModel
 from ..mujoco_backend import load as load_installed
+from ..unshared import UnsharedElement, unshared_elements
 from . import release_child as child
 from .engine_process import AnswerError, LoadedModel, LostError, ServedEngine, ServedWorld, Server
+from .release_parts import held
 
 # Arrays that no motion depends on, and what each release computes of the others in its own way.
 _OWN = (
@@ -48,6 +58,7 @@ _SAME = (
     "nmocap",
 )
 _NO_EDITS = MappingProxyType[str, Any]({})
+_INSTALLED = f"MuJoCo {mujoco.__version__}"
 _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mjtEnableBit}
 
 
@@ -68,7 +79,7 @@ def load(
 
     Raises:
         MissingEngineError: That release has no environment here.
-        ModelError: One of the two cannot read the file, or they read different parts in it.
+        ModelError: One of the two cannot read the file.
     """
     python, version = str(python_of(release)), version_of(release)
     engine = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
@@ -94,7 +105,11 @@ def served(
             )
         installed = load_installed(path, defaults, read_options)
         source = _source(engine, installed.path, read_options)
-        return ServedModel(_compiled(engine, installed, source), capabilities)
+        model = ServedModel(_compiled(engine, installed, source), capabilities)
+        if model.unshared:
+            sentences = "; ".join(str(element) for element in model.unshared)
+            warnings.warn(f"{path}: {sentences}", EngineWarning, stacklevel=4)
+        return model
 
     return load_there
 
@@ -125,6 +140,7 @@ class EngineReading:
         digest: Of what was read, by which a file that changed since then is seen.
         source: What the engine read of the file.
         frames: Ids of the sites that the engine has not: the frames of fused bodies.
+        unshared: What only this engine, or only the installed release, reads in the file.
     """
 
     engine: ServedEngine
@@ -134,6 +150,7 @@ class EngineReading:
     digest: str
     source: EngineSource
     frames: tuple[int, ...]
+    unshared: tuple[UnsharedElement, ...]
 
 
 def _opened(reading: EngineReading, edits: Mapping[str, Any], server: Server) -> int:
@@ -151,7 +168,7 @@ def _source(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineSou
         UnsupportedError: The engine is none, and reads an MJCF as it is written.
     """
     if path.suffix.lower() == ".urdf":
-        from .._file_text import urdf_text
+        from ..file_text import urdf_text
 
         text = urdf_text(path, options=options)
         return EngineSource() if text is None else EngineSource(text)
@@ -182,10 +199,10 @@ def _compiled(engine: ServedEngine, installed: MujocoModel, source: EngineSource
         source: What the engine reads of the file.
 
     Raises:
-        ModelError: It cannot read the file, or finds other parts in it.
+        ModelError: It cannot read the file, or what it reads cannot be told in these terms.
         EngineError: It cannot be run.
     """
-    raw, path, title = copy.copy(installed.raw), installed.path, engine.title
+    path, title = installed.path, engine.title
     try:
         server = Server.of(engine)
         loaded = _loaded(server, installed, source)
@@ -195,15 +212,10 @@ def _compiled(engine: ServedEngine, installed: MujocoModel, source: EngineSource
         anew = f"; to make it anew: {engine.anew}" if is_release(engine.name) else ""
         raise EngineError(f"{title} cannot be run: {error}{anew}") from error
     server.forgotten.append(loaded.number)
-    fields, frames = loaded.fields, _frames(installed)
-    counts = {name: int(getattr(raw, name)) for name in _SAME}
-    counts["nsite"] = raw.nsite - len(frames)
-    for name, count in counts.items():
-        if name in fields and int(fields[name]) != count:
-            raise ModelError(
-                f"{title} reads {path} as another robot: {name} is {int(fields[name])} there "
-                f"and {count} in MuJoCo {mujoco.__version__}"
-            )
+    fields, raw, frames = loaded.fields, copy.copy(installed.raw), _frames(installed)
+    frame_names = [installed.site_names[k] for k in frames]
+    if _reads_otherwise(loaded, raw, frames):
+        raw, frames = _reading_of(server, loaded, source, path, title), ()
     shared = _take_over(raw, fields) | set(loaded.flags)
     for name, set_there in loaded.flags.items():
         _take_over_flags(raw, name, set_there)
@@ -216,7 +228,68 @@ def _compiled(engine: ServedEngine, installed: MujocoModel, source: EngineSource
         digest=loaded.digest,
         source=source,
         frames=frames,
+        unshared=unshared_elements(installed.raw, raw, _INSTALLED, title, frame_names),
     )
+
+
+def _reads_otherwise(loaded: LoadedModel, raw: mujoco.MjModel, frames: tuple[int, ...]) -> bool:
+    """Return whether an engine finds other elements in a file than a compiled model has.
+
+    Args:
+        loaded: What the engine found.
+        raw: The compiled model.
+        frames: Ids of its sites that are no elements of the file.
+    """
+    names = child.names_of(raw)
+    names["site"] = [name for k, name in enumerate(names["site"]) if k not in frames]
+    if any(loaded.names[kind] != names[kind] for kind in loaded.names):
+        return True
+    return bool(_other_sizes(loaded, raw, len(frames)))
+
+
+def _other_sizes(loaded: LoadedModel, raw: mujoco.MjModel, frames: int = 0) -> str:
+    """Return the first size that an engine has otherwise than a compiled model; "" for none.
+
+    Args:
+        loaded: What the engine found.
+        raw: The compiled model.
+        frames: How many of its sites are no elements of the file.
+    """
+    sizes = {name: int(getattr(raw, name)) for name in _SAME}
+    sizes["nsite"] = raw.nsite - frames
+    for name, here in sizes.items():
+        if name in loaded.fields and int(loaded.fields[name]) != here:
+            return f"{name} is {int(loaded.fields[name])} there and {here} in {_INSTALLED}"
+    return ""
+
+
+def _reading_of(
+    server: Server, loaded: LoadedModel, source: EngineSource, path: Path, title: str
+) -> mujoco.MjModel:
+    """Compile what an engine reads in a file, which it writes as MJCF, in the installed release.
+
+    Raises:
+        ModelError: It has other elements than the engine, still.
+    """
+    try:
+        text = server.written(source.text, str(path.absolute()), **_read(source))
+        reading = mujoco.MjSpec.from_string(text)
+        reading.modelfiledir = str(path.parent.resolve())
+        with compiler_warnings():  # the file's own are told already
+            raw = reading.compile()
+    except (AnswerError, ValueError, *ENGINE_ERRORS) as error:
+        raise ModelError(
+            f"{title} reads {path} as another robot than {_INSTALLED}, and what it reads cannot be "
+            f"compiled here: {one_line(error)}"
+        ) from error
+    if difference := _other_sizes(loaded, raw):
+        raise ModelError(f"{title} reads {path} as another robot: {difference}")
+    return raw
+
+
+def _read(source: EngineSource) -> dict[str, dict[str, bool]]:
+    """Return how an engine reads a file, as an argument of its process, if not as it is written."""
+    return {"read": dict(source.read)} if source.read else {}
 
 
 def _take_over(raw: mujoco.MjModel, fields: Arrays) -> set[str]:
@@ -250,7 +323,7 @@ def _take_over_flags(raw: mujoco.MjModel, name: str, set_there: list[str]) -> No
         for own in child.SPLIT.get(flag, (flag,)):
             if own in kinds:
                 bits += int(kinds[own])
-    setattr(*child.held(raw, name), bits)
+    setattr(*held(raw, name), bits)
 
 
 def _loaded(
@@ -273,8 +346,8 @@ def _loaded(
     numbers = {name: value for name, value in edits.items() if name not in _FLAGS}
     flags = {name: value for name, value in edits.items() if name in _FLAGS}
     fields = [*_SAME, "nsite", *_fields(model.raw)]
-    read = {"read": dict(source.read)} if source.read else {}
-    return server.load(source.text, file, numbers, fields=fields, flags=flags, **read, **digest)
+    more = {**_read(source), **digest}
+    return server.load(source.text, file, numbers, fields=fields, flags=flags, **more)
 
 
 def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
@@ -289,7 +362,7 @@ def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator
 
 
 def _field(raw: mujoco.MjModel, name: str) -> Any:
-    return getattr(*child.held(raw, name))
+    return getattr(*held(raw, name))
 
 
 def _edits(reading: EngineReading, raw: mujoco.MjModel) -> dict[str, Any]:
@@ -347,6 +420,11 @@ class ServedModel(HiddenModel):
             _own=capabilities,
             **_taken_over(inner),
         )
+
+    @property
+    def unshared(self) -> tuple[UnsharedElement, ...]:
+        """Return what only this engine, or only the installed MuJoCo, reads in the file."""
+        return self._reading.unshared
 
     @property
     def compiled(self) -> mujoco.MjModel:

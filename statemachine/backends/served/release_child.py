@@ -1,36 +1,35 @@
 """A release of MuJoCo, as `child_server` asks it, in the Python of that release's environment.
 
-It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package. What is
-the same in every release the other modules take from here.
+It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package: it runs
+the file beside it.
 """
 
 from __future__ import annotations
 
 import copy
+import os
+import runpy
+import tempfile
 
 import mujoco
 import numpy as np
 
+_BESIDE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "release_parts.py")
+_parts = runpy.run_path(_BESIDE)
+PARTS, contact_arrays = _parts["PARTS"], _parts["contact_arrays"]
+constraint_part, held = _parts["constraint_part"], _parts["held"]
+
 HUGE = 1e10
 POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
 FORCES = ("qacc", "qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
-_KINDS = mujoco.mjtConstraint
+# Kinds of elements, as the arrays of their names call them.
+NAMED = ("body", "jnt", "geom", "site", "tendon", "eq", "actuator", "key")
 # What a state is, by prefix and name.
 STATE = ("", "qpos"), ("", "qvel"), ("qacc_", "warmstart"), ("", "act")
 KINDS = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
 SPLIT = {"mjDSBL_PASSIVE": ("mjDSBL_SPRING", "mjDSBL_DAMPER")}  # flags that became two later
 _ALL = mujoco.mjtWarning
 ALARMS = [int(kind) for kind in (_ALL.mjWARN_BADQPOS, _ALL.mjWARN_BADQVEL, _ALL.mjWARN_BADQACC)]
-PARTS = {
-    "qfrc_contact": (
-        _KINDS.mjCNSTR_CONTACT_FRICTIONLESS,
-        _KINDS.mjCNSTR_CONTACT_PYRAMIDAL,
-        _KINDS.mjCNSTR_CONTACT_ELLIPTIC,
-    ),
-    "qfrc_friction": (_KINDS.mjCNSTR_FRICTION_DOF, _KINDS.mjCNSTR_FRICTION_TENDON),
-    "qfrc_limit": (_KINDS.mjCNSTR_LIMIT_JOINT, _KINDS.mjCNSTR_LIMIT_TENDON),
-    "qfrc_equality": (_KINDS.mjCNSTR_EQUALITY,),
-}
 
 
 class Simulation:
@@ -106,50 +105,59 @@ class Simulation:
         return arrays
 
 
-def contact_arrays(model, data):
-    """Return arrays of the contacts, by name; the forces are along the axes of each."""
-    listed, force = data.contact, np.zeros((data.ncon, 6))
-    for k in range(data.ncon):
-        mujoco.mj_contactForce(model, data, k, force[k])
-    arrays = {"dist": np.array(listed.dist), "force": force[:, :3], "torque": force[:, 3:]}
-    arrays["geom"] = np.array(listed.geom, dtype=np.int64).reshape(-1, 2)
-    arrays["pos"] = np.array(listed.pos).reshape(-1, 3)
-    arrays["frame"] = np.array(listed.frame).reshape(-1, 3, 3)
-    return arrays
-
-
-def constraint_part(model, data, part):
-    """The forces (nv,) of the rows of constraints that make up one of `PARTS`."""
-    total = np.zeros(model.nv)
-    if data.nefc:
-        rows = np.isin(data.efc_type, [int(kind) for kind in PARTS[part]])
-        mujoco.mj_mulJacTVec(model, data, total, np.where(rows, data.efc_force, 0.0))
-    return total
-
-
 def load(file, text, names, read=None):
     """Compile a file; its flags, and the numeric fields that this release has of those names."""
-    if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
-        mujoco.set_mju_user_warning(lambda text: None)
-    if read is not None:
-        model = with_options(file, **read)
-    elif text:
-        model = mujoco.MjModel.from_xml_string(text)
-    else:
-        model = mujoco.MjModel.from_xml_path(file)
+    model = compiled(file, text, read)
     if hasattr(mujoco.mjtDisableBit, "mjDSBL_AUTORESET"):
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     fields = {}
     for name in names:
-        value = getattr(*held(model, name), None)
+        holder, field = held(model, name)
+        value = getattr(holder, field, None)
         if isinstance(value, (np.ndarray, int, float)):
             fields[name] = np.asarray(value, float)
     flags = {f"opt.{kind}flags": flags_of(model, kind) for kind in KINDS}
-    return model, {"version": mujoco.__version__, "flags": flags}, fields
+    said = {"version": mujoco.__version__, "flags": flags, "names": names_of(model)}
+    return model, said, fields
 
 
-def with_options(file, balance_inertia, meshes):
-    """Compile a file with its inertias balanced, or without the geoms that are meshes."""
+def compiled(file, text, read=None):
+    """Compile a file, or its text where that is not empty, or the file with options of reading."""
+    if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
+        mujoco.set_mju_user_warning(lambda text: None)
+    if read is not None:
+        return spec_with_options(file, **read).compile()
+    make = mujoco.MjModel.from_xml_string if text else mujoco.MjModel.from_xml_path
+    return make(text or file)
+
+
+def written(file, text, read=None):
+    """Return as MJCF what this release reads in a file, or in its text."""
+    if read is not None:
+        spec = spec_with_options(file, **read)
+        spec.compile()
+        return spec.to_xml()
+    model = compiled(file, text)  # anew: what is written is what was compiled last
+    with tempfile.TemporaryDirectory() as folder:
+        name = os.path.join(folder, "read.xml")
+        mujoco.mj_saveLastXML(name, model)
+        with open(name, encoding="utf-8") as lines:
+            return lines.read()
+
+
+def names_of(model):
+    """Names of the elements of a model, by kind; "" of one without a name."""
+    names = {}
+    for kind in NAMED:
+        starts = getattr(model, "name_" + kind + "adr").tolist()
+        ends = [model.names.index(b"\0", start) for start in starts]
+        texts = [model.names[start:end] for start, end in zip(starts, ends)]  # noqa: B905
+        names[kind] = [text.decode(errors="replace") for text in texts]
+    return names
+
+
+def spec_with_options(file, balance_inertia, meshes):
+    """Return the spec of a file with its inertias balanced, or without its mesh geoms."""
     if not hasattr(mujoco, "MjSpec"):
         raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads a file as it is written")
     spec = mujoco.MjSpec.from_file(file)
@@ -161,7 +169,7 @@ def with_options(file, balance_inertia, meshes):
                 spec.delete(element)
             else:
                 element.delete()
-    return spec.compile()
+    return spec
 
 
 def edit(model, edits, flags):
@@ -194,9 +202,3 @@ def flags_of(model, kind):
     bits = getattr(model.opt, f"{kind}flags")
     members = KINDS[kind].__members__.items()
     return [name for name, bit in members if "BL_" in name and bits & int(bit)]  # not mjNDISABLE
-
-
-def held(model, name):
-    """Whose attribute a field is, and its name there: "opt.timestep", "body_mass"."""
-    holder, _, field = name.rpartition(".")
-    return (getattr(model, holder) if holder else model), field

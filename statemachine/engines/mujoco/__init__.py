@@ -42,6 +42,7 @@ class MujocoEngine(RawEngine):
     edited = function_of(".mujoco.differences:edited")
     counts = function_of(".mujoco.given_parts:counts")
     with_parts = function_of(".mujoco.given_parts:with_parts")
+    read_otherwise = function_of(".mujoco.readings:read_otherwise")
     drawer = function_of(".mujoco.rendering:MujocoDrawer")
     drawing_environment = function_of(".mujoco.rendering:environment")
     drawing_diagnosis = function_of(".mujoco.rendering:diagnosis")

@@ -112,6 +112,12 @@ class SidesRun:
         return (*lines, *self.matched.notes)
 
 
+def read_otherwise(left: Model, right: Model) -> list[str]:
+    """Say what only one of two releases of an engine reads in the file of both sides."""
+    engines = {engine_of(model.backend) for model in (left, right)}
+    return room(engines.pop()).read_otherwise(left, right) if len(engines) == 1 else []
+
+
 def prepare_sides(
     request: Request,
 ) -> tuple[tuple[Rerun, Rerun], Matched | None, tuple[str, ...]]:
@@ -191,6 +197,7 @@ def prepare_sides(
     )
     notes += request.taken
     notes += dict.fromkeys(chain(*notes_on_engines))
+    notes += read_otherwise(left, right)
     return reruns, matched, tuple(notes)
 
 

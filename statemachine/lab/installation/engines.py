@@ -10,6 +10,7 @@ from platform import python_version
 from ...errors import BadInputError
 from ...installed import available, engine_version
 from ...measures.text import NONE
+from ...release_names import check_age
 from ...releases import Release, add, folder, releases, remove
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
@@ -35,6 +36,8 @@ class AddReleasesRequest:
     def __post_init__(self) -> None:
         if not self.names:
             raise BadInputError("no release is named: name one, such as mujoco==3.3.7")
+        for name in self.names:  # before the first of them is downloaded
+            check_age(name)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from ..compare import Agreement, Comparison, SidesRun
 from ..compare.agreement import WitnessResult
 from ..compare.instead import Instead
 from ..compare.perturbed import ChaosFloor
+from ..compare.stillness import nothing_moved
 from ..why import page as why
 from .finding import (
     Event,
@@ -45,7 +46,6 @@ from .sides_page import (
     provenance,
     unmatched,
 )
-from .stillness import nothing_moved
 
 if TYPE_CHECKING:
     from ..why import Explanation

@@ -18,9 +18,9 @@ from ..compare import Agreement, Comparison, Series
 from ..compare.instead import Instead
 from ..compare.perturbed import CLEAR, Chance, ChaosFloor
 from ..compare.series import SETTLED, at_the_end
+from ..compare.stillness import extent_of, nothing_moved
 from ..recordings import Trace
 from ..why.answer_page import answer, proofs
-from .stillness import extent_of, nothing_moved
 
 if TYPE_CHECKING:
     from ..why import Explanation

@@ -26,8 +26,8 @@ from ..compare import Comparison, Request
 from ..compare.convergence import FINER, Convergence, GapLimit, LimitVerdict
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
+from ..compare.stillness import nothing_moved
 from .finding import leading, moment, name_of
-from .stillness import nothing_moved
 
 LEADS = {
     "rounding": "There is no gap beyond rounding, whatever the timestep",
@@ -592,6 +592,7 @@ class _Releases:
         until: The last moment that is compared [s].
         steps: A row for each release and the next.
         bars: How far each release is from the next.
+        read: What a release reads in the file that the next does not, or the other way round.
     """
 
     first: str
@@ -599,6 +600,7 @@ class _Releases:
     until: float
     steps: Table
     bars: Bars
+    read: Items
 
 
 def _releases_of(pairs: Sequence[_NextRelease]) -> _Releases:
@@ -608,7 +610,13 @@ def _releases_of(pairs: Sequence[_NextRelease]) -> _Releases:
         until=max(pair.comparison.until for pair in pairs),
         steps=_releases_table(pairs),
         bars=_releases_bars(pairs),
+        read=Items(_notes_of(pairs)),
     )
+
+
+def _notes_of(pairs: Sequence[_NextRelease]) -> list[str]:
+    """Return what is noted of each release and the next, as sentences."""
+    return [sentence(note) for pair in pairs for note in pair.comparison.notes]
 
 
 def _releases_table(pairs: Sequence[_NextRelease]) -> Table:

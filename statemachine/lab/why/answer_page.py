@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...measures.text import NONE, capital, percent, quantity, short_time
-from ..questions.stillness import nothing_moved
+from ..compare.stillness import nothing_moved
 from .values_page import values_of
 
 if TYPE_CHECKING:

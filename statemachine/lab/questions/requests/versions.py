@@ -10,7 +10,7 @@ from .... import releases
 from ....errors import BadInputError
 from ...compare.agreement import Comparison, compare
 from ...compare.sides import Request
-from ...compare.two_sides import run_sides
+from ...compare.two_sides import read_otherwise, run_sides
 from ...runs.drive import Progress, part_of, silent
 from ...runs.reporter import QUIET, Reporter
 from .one_step import check_runs
@@ -54,7 +54,10 @@ def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> list[Compari
 
     def compared(pair: tuple[str, str], progress: Progress = silent) -> Comparison:
         run = run_sides(replace(request.run, backends=pair), progress)
-        return compare(*run.traces, tolerances=request.tolerances, robot=run.robot)
+        comparison = compare(*run.traces, tolerances=request.tolerances, robot=run.robot)
+        models = [rerun.model for rerun in run.reruns if rerun is not None]
+        read = read_otherwise(*models) if len(models) == len(pair) else []
+        return replace(comparison, notes=(*comparison.notes, *read))
 
     if request.bisect:
         backends = releases.around_a_change(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...measures.text import quantity
-from ..compare.instead import Instead
-from ..compare.motion import Motion
+from .instead import Instead
+from .motion import Motion
 
 STILL = "Nothing moved ({most} in {seconds:g} s{energy}), so nothing was compared: {instead}"
 TRY = "try {experiment}, which moves {file}"
