@@ -14,12 +14,13 @@ import pytest
 import statemachine as sm
 from statemachine.errors import BadInputError, EndedEarlyError, EngineWarning
 from statemachine.lab.compare import Uncertainty, chaos_floor, compare, perturbed_runs
+from statemachine.lab.compare.chaos import Band
 from statemachine.lab.compare.convergence import Convergence, convergence, verdict_of
 from statemachine.lab.compare.matching import match_models
-from statemachine.lab.compare.perturbed import ROUNDING, RUNS, Band, parse_uncertainty
+from statemachine.lab.compare.perturbed import ROUNDING, RUNS, parse_uncertainty
 from statemachine.lab.questions import compare_page as report
+from statemachine.lab.questions.convergence import page
 from statemachine.lab.questions.finding import headline, leading
-from statemachine.lab.questions.steps import convergence as page
 from statemachine.lab.recordings import Rerun, Trace, record
 from statemachine.lab.why.gap import Ruler
 

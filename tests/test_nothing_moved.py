@@ -13,11 +13,11 @@ import pytest
 from statemachine.lab.compare import Request, Side, compare
 from statemachine.lab.compare.instead import instead_of
 from statemachine.lab.questions import comparison as shown
-from statemachine.lab.questions.compare_page import junit
+from statemachine.lab.questions.convergence import page as limits
+from statemachine.lab.questions.junit import junit
 from statemachine.lab.questions.requests import causes, converge, gap
 from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult
-from statemachine.lab.questions.steps import convergence as limits
-from statemachine.lab.questions.steps import versions
+from statemachine.lab.questions.versions import page as versions
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.why import Explanation
 from statemachine.lab.why import page as why
@@ -185,6 +185,7 @@ def test_a_body_that_stands_is_compared_by_what_it_presses_with(tmp_path: Path) 
 def test_a_sag_below_the_tolerance_is_compared_by_its_energy(tmp_path: Path) -> None:
     one = written(tmp_path / "one.xml", STIFF)
     found = compared("droop", one).comparison
+    assert found.motion.angle is not None
     assert 0 < found.motion.angle < 2 * np.pi / 4096
     assert (found.motion.moved, found.motion.loaded, found.outcome) == (False, True, "agrees")
     heavier = written(tmp_path / "two.xml", STIFF.replace('mass="0.2"', 'mass="0.3"'))

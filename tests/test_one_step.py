@@ -13,7 +13,7 @@ from statemachine.errors import BadInputError
 from statemachine.lab.compare import rerun_of
 from statemachine.lab.compare.one_step import RELATIVE, OneStep, StageGap, one_step
 from statemachine.lab.compare.stages import STAGES
-from statemachine.lab.questions.steps import one_step as page
+from statemachine.lab.questions.one_step import page
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain

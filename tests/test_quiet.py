@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.errors import EngineWarning
 from statemachine.interface import Array
 from statemachine.lab.compare.one_step import OneStep, one_step
 from statemachine.lab.compare.sides import Request, Side
@@ -114,21 +115,26 @@ def test_one_body_is_as_large_as_its_shape(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dof", range(3))
 def test_a_force_at_its_floor_moves_nothing_that_can_be_seen(dof: int, tmp_path: Path) -> None:
-    """Raw MuJoCo, 2 s with the servos on: the tip is within 5 µm, each joint far within a count."""
+    """Raw MuJoCo, 2 s with the servos on: the tip is within 0.1 µm, as is where each joint is."""
     scale = scale_of(model_of(tmp_path, ARM))
     push = np.zeros(3)
     push[dof] = inertias_of(ARM)[dof] * scale.angular_acceleration
     calm, calm_tip = pushed(ARM, np.zeros(3))
     moved, moved_tip = pushed(ARM, push)
-    assert 0 < np.abs(moved - calm).max() < 0.01 * 2 * np.pi / 4096
-    assert np.linalg.norm(moved_tip - calm_tip) < 5e-6
+    assert 0 < np.abs(moved - calm).max() < 1e-3 * 2 * np.pi / 4096
+    assert np.linalg.norm(moved_tip - calm_tip) < 1e-7
 
 
-def test_without_servos_it_is_no_more_than_a_free_fall_by_as_much(tmp_path: Path) -> None:
-    """In 2 s the floor of an acceleration makes half of a t²."""
+def test_a_contact_force_at_its_floor_moves_a_robot_by_micrometres(tmp_path: Path) -> None:
+    """Raw MuJoCo, without gravity and without anything that holds it, for 2 s."""
     scale = scale_of(model_of(tmp_path, WELDED))
-    assert 0.5 * scale.acceleration * 2.0**2 < 3e-6
-    assert scale.force / scale.mass == pytest.approx(scale.acceleration)
+    model, data = raw(WELDED.replace('<option timestep="0.002"', '<option gravity="0 0 0"'))
+    model.eq_data[:], data.eq_active[:] = 0, 0
+    data.qfrc_applied[0] = scale.force
+    while data.time < 2:
+        mujoco.mj_step(model, data)
+    assert data.qpos[0] == pytest.approx(0.5 * 2.0**-23 * 9.81 * 2**2, rel=0.01)
+    assert data.qpos[0] < 3e-6
 
 
 REAL = {
@@ -178,7 +184,9 @@ def test_the_parts_of_what_a_weld_does_are_told_by_both_engines(tmp_path: Path) 
 
 @pytest.mark.usefixtures("bullet")
 def test_a_force_on_what_weighs_nothing_is_no_difference(tmp_path: Path) -> None:
-    result = compared("hold", written(tmp_path / "m.xml", DISC), engines=("mujoco", "pybullet"))
+    file = written(tmp_path / "m.xml", DISC)
+    with pytest.warns(EngineWarning, match="margin"):
+        result = compared("hold", file, engines=("mujoco", "pybullet"))
     (force,) = (a for a in result.comparison.agreements if a.kind == "force")
     assert 1e-6 < force.max < force.tolerance  # what was the tolerance, and is
     assert force.verdict == "agrees"

@@ -263,18 +263,18 @@ def test_how_a_file_was_read_cannot_be_replaced(tmp_path):
 
 def test_options_are_on_or_off(tmp_path):
     with pytest.raises(BadInputError, match="meshes"):
-        sm.load(arm(tmp_path), meshes="no")
+        sm.load(arm(tmp_path), meshes="no")  # pyright: ignore[reportArgumentType]
 
 
 def test_a_binary_model_is_read_as_it_is(tmp_path):
     file = tmp_path / "arm.mjb"
-    sm.load(arm(tmp_path)).save_binary(file)
+    sm.load(arm(tmp_path)).save_binary(file)  # pyright: ignore[reportAttributeAccessIssue]
     with pytest.warns(EngineWarning), pytest.raises(BadInputError, match="binary"):
         sm.load(file, trust_binary=True, meshes=False)
 
 
 def test_a_side_of_a_comparison_takes_the_options(tmp_path):
-    from statemachine.lab.compare.sides import parse_sides
+    from statemachine.lab.compare.typed_sides import parse_sides
 
     path = arm(tmp_path, mesh="absent.stl", lower=UNBALANCED)
     (side,) = parse_sides([str(path), "balance_inertia=on", "meshes=off"])

@@ -28,7 +28,8 @@ from statemachine.lab.compare import Comparison, compare, touches
 from statemachine.lab.compare.series import total_forces
 from statemachine.lab.questions.compare_page import PageParts
 from statemachine.lab.questions.compare_page import page as compared
-from statemachine.lab.questions.finding import events_of, headline, leading, subject
+from statemachine.lab.questions.events import events_of
+from statemachine.lab.questions.finding import headline, leading, subject
 from statemachine.lab.questions.over_time import CHARTS_SHOWN, charts_of
 from statemachine.lab.questions.sides_page import commanded
 from statemachine.lab.recordings import Trace, record_scenario, shipped

@@ -6,7 +6,7 @@ import pytest
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError
-from statemachine.lab.compare.sides import parse_sides
+from statemachine.lab.compare.typed_sides import parse_sides
 from statemachine.lab.sweep.design import parse_vary, with_kinds
 from statemachine.measures import parse_tolerances
 from statemachine.typed_numbers import is_count, typed_float, typed_int

@@ -10,7 +10,7 @@ from itertools import product
 
 import pytest
 
-from statemachine.lab.compare.perturbed import against_floor
+from statemachine.lab.compare.chaos import against_floor
 from statemachine.lab.why.verdict import (
     Answer,
     CausePart,

@@ -2,14 +2,18 @@
 
 A tolerance that is a share of the quantity itself says nothing where that quantity is rounding: of
 8e-34 N·m a millionth is less still. So nothing is called a difference that is below a share of the
-robot's own weight and size. The share of a force is 2⁻²³, a ten-millionth: what a number in single
-precision keeps, in which many simulators hold their state. A force of that share of its weight
-moves a robot by 2 µm in 2 s, whatever the weight is; a mass of 0.1 g more on an arm of 6 N weighs
-a thousand times as much.
+robot's own weight and size. There are two shares.
 
-A place has another share, 1e-9, for a depth makes a force: a contact with MuJoCo's default solref
-answers a depth d with an acceleration of d/(0.95 · 0.02 s)² = 2770 s⁻² · d (its manual,
-"Computation", solver parameters), so that g · 2⁻²³ is that of 4e-10 m.
+Of a run, of the forces of its contacts and of its energy, it is 2⁻²³, a ten-millionth: what a
+number in single precision keeps, in which many simulators hold their state. A force of that share
+of its weight moves a robot by 2 µm in 2 s, whatever the weight is; 0.1 g more on an arm of 6 N
+weighs a thousand times as much.
+
+Of one step from one state, where nothing has had the time to add up, it is a billionth: of g for an
+acceleration, of the robot's size for a place. In 2 s such an acceleration makes 20 nm. A force has
+the floor of the acceleration, times the inertia that it acts on, so that a light wrist has a lower
+one than the shoulder. It is far above what double precision makes of a step (1e-16, times some
+thousands), and below what a solver leaves of a contact (MuJoCo's stops at 1e-8).
 """
 
 from __future__ import annotations
@@ -20,8 +24,8 @@ import numpy as np
 
 from ..interface import Array, Model
 
-SHARE = 2.0**-23  # of a weight, of g, of an inertia: the precision of a float32
-PLACES = 1e-9  # of a size; of a radian
+SHARE = 2.0**-23  # of a weight, in a run: the precision of a float32
+OF_A_STEP = 1e-9  # of g, of a size, of an inertia, of a radian
 GRAVITY = 9.81  # m/s², whatever that of the model is: a robot in orbit is as heavy to move
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
@@ -73,7 +77,7 @@ class RobotScale:
 
     @property
     def force(self) -> float:
-        """Floor of a contact's force [N]; what it does to a joint has a floor of its own."""
+        """Floor of a contact's force [N]; what it does to a joint has a lower one of its own."""
         return SHARE * self.weight
 
     @property
@@ -83,30 +87,30 @@ class RobotScale:
 
     @property
     def acceleration(self) -> float:
-        """Floor of the acceleration of what slides [m/s²].
+        """Floor of the acceleration of what slides, in one step [m/s²].
 
         The floor of a force on it is that, times the inertia of its degree of freedom.
         """
-        return SHARE * GRAVITY
+        return OF_A_STEP * GRAVITY
 
     @property
     def angular_acceleration(self) -> float:
-        """Floor of the acceleration of what turns [rad/s²].
+        """Floor of the acceleration of what turns, in one step [rad/s²].
 
         It is that of a pendulum as long as the robot. The floor of a torque is that, times the
-        inertia of its degree of freedom: a light wrist has a lower one than the shoulder.
+        inertia of its degree of freedom.
         """
-        return SHARE * GRAVITY / self.size
+        return OF_A_STEP * GRAVITY / self.size
 
     @property
     def length(self) -> float:
-        """Floor of a place, or of a depth [m]."""
-        return PLACES * self.size
+        """Floor of a place, or of a depth, in one step [m]."""
+        return OF_A_STEP * self.size
 
     @property
     def angle(self) -> float:
-        """Floor of a rotation [rad]."""
-        return PLACES
+        """Floor of a rotation, in one step [rad]."""
+        return OF_A_STEP
 
 
 def force_floor(robot: RobotScale | None) -> float:

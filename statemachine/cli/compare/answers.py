@@ -69,7 +69,7 @@ def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
 def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     """Compare one step of both sides."""
     from ...lab.compare.labels import numbered
-    from ...lab.questions import steps
+    from ...lab.questions import one_step
     from ...lab.questions.requests.one_step import answer
 
     run = request.run
@@ -77,23 +77,23 @@ def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     labels = run.backends
     if run.sides:
         labels = run.sides[0].label, run.sides[1].label
-    page = steps.one_step(result, numbered(labels), Path(run.what[0]).name)
+    page = one_step.page(result, numbered(labels), Path(run.what[0]).name)
     return show(page, result, options.json)
 
 
 def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     """Run both sides with ever finer steps."""
-    from ...lab.questions import steps
+    from ...lab.questions import convergence
     from ...lab.questions.requests.converge import answer
 
     result = answer(request, TerminalReporter())
-    page = steps.convergence(result, Path(request.run.what[0]).name)
+    page = convergence.page(result, Path(request.run.what[0]).name)
     return show(page, result, options.json)
 
 
 def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     """Compare each release with the next one."""
-    from ...lab.questions import steps
+    from ...lab.questions import versions
     from ...lab.questions.requests.versions import answer
     from ...lab.questions.run_files import write_tests
     from ...show.charts import write_pictures
@@ -102,7 +102,7 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     comparisons = answer(request, TerminalReporter())
     if options.junit is not None:
         write_tests(options.junit, comparisons)
-    page = steps.versions(comparisons, request.run)
+    page = versions.page(comparisons, request.run)
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
     return show(page, comparisons, options.json)

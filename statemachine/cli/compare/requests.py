@@ -184,7 +184,7 @@ def _backends(options: argparse.Namespace, what: Sequence[str]) -> tuple[str, st
 def _models_request_of(options: argparse.Namespace) -> ModelsRequest:
     """Return which files are compared."""
     from ...backends.chosen import chosen_backends
-    from ...lab.compare.sides import parse_sides
+    from ...lab.compare.typed_sides import parse_sides
     from ...lab.questions.requests.models import ModelsRequest
 
     _check_words_of_models(options)

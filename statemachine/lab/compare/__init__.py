@@ -15,12 +15,16 @@ Two engines that agree prove nothing; neither side is the truth.
 from __future__ import annotations
 
 from ..recordings import Rerun, rerun_of
-from .agreement import Agreement, Comparison, SideRun, compare, witness
+from .agreement import Agreement, Comparison, SideRun, compare
+from .chaos import chaos_floor
 from .labels import Labels, labels_of
-from .perturbed import Uncertainty, chaos_floor, perturbed_runs
+from .perturbed import Uncertainty, perturbed_runs
+from .prepared_sides import prepare_sides
 from .series import Series, default_tip, series, touches
-from .sides import Request, Side, parse_sides, split_words
-from .two_sides import SidesRun, prepare_sides, run_sides
+from .sides import Request, Side
+from .two_sides import SidesRun, run_sides
+from .typed_sides import parse_sides, split_words
+from .witnessed import witness
 
 __all__ = [
     "Agreement",

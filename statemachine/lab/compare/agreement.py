@@ -1,34 +1,26 @@
-"""How far two traces agree: figures and a verdict for each quantity.
-
-And how far the fingertip of each is from a third party's: two that agree may both be wrong.
-"""
+"""How far two traces agree: figures and a verdict for each quantity."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ...backends import load
-from ...errors import StateMachineError, TraceError
-from ...installed import WITNESS
-from ...kinematics import Kinematics, shared_joints
+from ...errors import TraceError
 from ...measures import (
     QUANTITIES,
     Deviation,
     RobotScale,
     Tolerance,
     common_moments,
-    distances,
     same_pairs,
     tolerance_of,
 )
 from ...measures.text import on
-from ..recordings import Header, Trace, model_file
-from ..runs.provenance import Provenance, model_files
+from ..recordings import Trace
+from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
 from .motion import Motion, Motions, least_motions, motion_of, with_efforts
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
@@ -374,86 +366,3 @@ def _first_touch(touch: Touch, missed: str, until: float, allowed: Tolerance) ->
         verdict="differs" if is_beyond else "agrees",
         note=missed,
     )
-
-
-@dataclass(frozen=True)
-class WitnessResult:
-    """How far the fingertip of each side is from where a third party puts it.
-
-    Attributes:
-        by: The witness and its version.
-        site: Which site.
-        left: Largest distance at any row of the first trace [m].
-        right: Largest distance at any row of the second trace [m].
-        rows: How many poses were compared.
-        grade: "own reading" if the witness read the model's file with its own parser, "same
-            reading" if it computed from the numbers that the file was compiled to.
-    """
-
-    by: str
-    site: str
-    left: float
-    right: float
-    rows: int
-    grade: str
-
-
-def witness(left: Trace, right: Trace, path: Path | None = None) -> WitnessResult | None:
-    """Hold Pinocchio's forward kinematics of each trace's qpos against the recorded site.
-
-    Args:
-        left: A trace.
-        right: Another, of the same model.
-        path: The model's file; by default the one that the headers name.
-
-    Returns:
-        The distances; None where Pinocchio is missing, where neither it nor an engine that is
-        here can read the model, and where the file that the traces were recorded with is not
-        here.
-    """
-    site = default_tip(left.header, right.header)
-    if not site or "site_xpos" not in left or "site_xpos" not in right:
-        return None
-    ours, theirs = (trace.header.provenance.model_sha256 for trace in (left, right))
-    if path is None and ours != theirs:
-        return None  # one model cannot be the witness of two
-    try:
-        file, same = (path, True) if path else model_file(left.header)
-        if not same:
-            return None
-        kinematics = _readable(file, left.header, site)
-        first, second = (_gap(kinematics, trace, site) for trace in (left, right))
-        if not np.isfinite([first, second]).all():
-            return None
-    except StateMachineError:
-        return None
-    return WitnessResult(
-        by=f"{WITNESS} {kinematics.version}",
-        site=site,
-        left=first,
-        right=second,
-        rows=len(left) + len(right),
-        grade=kinematics.grade,
-    )
-
-
-def _readable(file: Path, header: Header, site: str) -> Kinematics:
-    """The robot from a scene's file, or from one that it includes, or from its numbers."""
-    for path in model_files(file):
-        try:
-            kinematics = Kinematics(path)
-            names = [header.joints[k] for k in shared_joints(kinematics, header.joints)]
-        except StateMachineError:
-            continue
-        if site in kinematics.site_names:
-            return kinematics if kinematics.joint_names == tuple(names) else Kinematics(path, names)
-    return Kinematics.same_reading(load(file))
-
-
-def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
-    header = trace.header
-    joints = [header.joint_labels[k] for k in shared_joints(kinematics, header.joints)]
-    qpos = [trace.qpos[:, joint_columns(header, name).qpos] for name in joints]
-    theirs = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site).pos
-    ours, _ = trace.site(site)
-    return float(distances(ours, theirs).max())

@@ -34,7 +34,8 @@ from ..recordings import Rerun
 from ..recordings.recorder import put_row
 from ..runs.drive import Progress, silent
 from .matching import Matched, match_models
-from .stages import AFTER, FORCE, FOUND, STAGES, StageMeasure, StageReader, StepReading, measures
+from .stage_measures import StageMeasure, measures
+from .stages import AFTER, FORCE, FOUND, STAGES, StageReader, StepReading
 
 MOMENTS = 200
 RELATIVE = 1e-6  # of the scale of a stage: what is less is rounding

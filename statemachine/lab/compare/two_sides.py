@@ -4,50 +4,43 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from ...backends import BackendChoice, parse_backend
-from ...engines import room
-from ...errors import BadInputError, MissingEngineError, StateMachineError, TraceError
+from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import DEFAULT
-from ...interface import Model
-from ...measures import RobotScale, common_moments, places_of
-from ...measures.text import command, milliseconds
-from ...release_names import engine_of
+from ...measures import RobotScale, places_of
+from ...measures.text import command
 from ..recordings import (
     Rerun,
-    SideStart,
     Trace,
-    beginning_with,
-    commands_of,
-    model_file,
     play,
     read,
     replayed,
     rerun_of,
     shipped,
-    start_of,
 )
 from ..runs.controllers import is_function
-from ..runs.drive import Progress, check_length, part_of, silent, steps_in
-from ..runs.scenarios import SCENARIOS, Controller, Scenario
+from ..runs.drive import Progress, part_of, silent
+from ..runs.scenarios import SCENARIOS
 from .alike import (
     called,
-    controller_for_right,
-    for_left,
     in_terms_of_right,
-    match_sides,
     named_as_left,
     same_commands,
 )
 from .labels import files_apart, labels_of, lacking
 from .matching import Matched, missing_parts
-from .recorded import recorded_model
-from .sides import Request, Side
+from .prepared_sides import prepare_sides
+from .recorded import (
+    of_a_run,
+    other_side,
+    recorded_model,
+    refuse_of_run,
+    side_of_trace,
+)
+from .sides import Request
 
 Loop = Literal["the same", "its own", "recorded", "more than ctrl"]
 
@@ -110,160 +103,6 @@ class SidesRun:
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
-
-
-def read_otherwise(left: Model, right: Model) -> list[str]:
-    """Say what only one of two releases of an engine reads in the file of both sides."""
-    engines = {engine_of(model.backend) for model in (left, right)}
-    return room(engines.pop()).read_otherwise(left, right) if len(engines) == 1 else []
-
-
-def prepare_sides(
-    request: Request,
-) -> tuple[tuple[Rerun, Rerun], Matched | None, tuple[str, ...]]:
-    """Load both sides of a request, match them, and say how each is run.
-
-    What an experiment or a trace tells the left, the right is told too; a function of the user's
-    is asked on each side.
-
-    Returns:
-        How the left and the right are run; what of the left is what of the right, None if both
-        are of one file; and what a reader should know of it.
-
-    Raises:
-        StateMachineError: A side cannot be loaded, or cannot do what was asked.
-    """
-    trace = read(request.what[0]) if request.is_traces else None
-    scenario = recorded_scenario(trace) if trace else request.scenario()
-    sides = request.both_sides(scenario.model)
-    given = {**scenario.options, **request.options}
-    left, right = models = [side.load(**given) for side in sides]
-    matched = match_sides(sides, left, right, request.names)
-    seconds = scenario.seconds if trace or request.seconds is None else request.seconds
-    _check_moments(models, seconds)
-    for model in models:
-        check_length(model, seconds)
-    notes_on_engines = [room(engine_of(model.backend)).unlike_its_users(model) for model in models]
-    start, notes = None, list[str]()
-    if trace is not None:
-        _refuse_of_run(request)
-        trace = for_left(trace, left, request)
-        scenario, seed = recorded_scenario(trace), trace.header.provenance.seed
-        start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
-        notes.append(
-            f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
-        )
-    else:
-        scenario = scenario.on(left)
-        seed = request.seed if scenario.seeded else None
-    right_start = _start_of_right(scenario.keyframe, start, left, right, matched)
-    notes += right_start.notes
-    notes += _notes_on_every(request.every, left, right)
-
-    def left_controller(model: Model) -> Controller:
-        return scenario.controller(model, request.seed)
-
-    def right_controller(model: Model) -> Controller:
-        if scenario.own:
-            controller = scenario.controller(model, request.seed)
-        else:
-            controller = scenario.controller(left, request.seed)
-            if matched:
-                controller = controller_for_right(controller, matched, right_start.own.ctrl)
-        if right_start.given is None:
-            return controller
-        first_ctrl = right_start.given.ctrl
-        return beginning_with(lambda _: first_ctrl, controller)
-
-    left_rerun = Rerun(
-        left,
-        left_controller,
-        seconds,
-        defaults=sides[0].defaults,
-        options={**given, **sides[0].options},
-    )
-    right_rerun = Rerun(
-        right,
-        right_controller,
-        seconds,
-        defaults=sides[1].defaults,
-        options={**given, **sides[1].options},
-    )
-    reruns = (
-        _of_scenario(_starting(left_rerun, scenario.keyframe, start), scenario, seed),
-        _of_scenario(
-            _starting(right_rerun, right_start.keyframe, right_start.given), scenario, seed
-        ),
-    )
-    notes += request.taken
-    notes += dict.fromkeys(chain(*notes_on_engines))
-    notes += read_otherwise(left, right)
-    return reruns, matched, tuple(notes)
-
-
-@dataclass(frozen=True, eq=False)
-class _RightStart:
-    """Where the right side starts.
-
-    Attributes:
-        keyframe: One of its own; None for its default state.
-        own: Its state there, for what the left has no counterpart of.
-        given: What is written over that, in terms of the right; None for nothing.
-        notes: What a reader should know of it.
-    """
-
-    keyframe: str | None
-    own: SideStart
-    given: SideStart | None
-    notes: tuple[str, ...]
-
-
-def _start_of_right(
-    keyframe: str | None,
-    start: SideStart | None,
-    left: Model,
-    right: Model,
-    matched: Matched | None,
-) -> _RightStart:
-    """Return where the right side starts, if the left starts in a keyframe, or in a state."""
-    given, notes = start, ()
-    known = [frame.name for frame in right.keyframes]
-    if keyframe is not None and matched and keyframe not in known:
-        given = start_of(left, keyframe)
-        notes = (f"{right.path.name} has no keyframe {keyframe!r}: it starts in the left's",)
-        keyframe = None
-    own = start_of(right, keyframe)
-    if matched and given:
-        given = matched.start(given, own)
-    return _RightStart(keyframe, own, given, notes)
-
-
-def _notes_on_every(every: int, left: Model, right: Model) -> list[str]:
-    """Say for how long a command holds, where that is not the same on both sides."""
-    if every <= 1 or left.timestep == right.timestep:
-        return []
-    return [
-        f"{every} steps are {milliseconds(every * left.timestep)} on the left "
-        f"and {milliseconds(every * right.timestep)} on the right"
-    ]
-
-
-def _starting(rerun: Rerun, keyframe: str | None, start: SideStart | None) -> Rerun:
-    """Return a run that starts in a keyframe, and in some other state if one is given."""
-    if start is None:
-        return replace(rerun, keyframe=keyframe)
-    return replace(rerun, keyframe=keyframe, qpos=start.qpos, qvel=start.qvel)
-
-
-def _of_scenario(rerun: Rerun, scenario: Scenario, seed: int | None) -> Rerun:
-    """Return a run whose trace says what was run."""
-    return replace(
-        rerun,
-        experiment=scenario.name,
-        says=scenario.says,
-        seed=seed,
-        writes_state=scenario.own,  # ours write nothing but ctrl
-    )
 
 
 def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
@@ -356,12 +195,12 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
     """Two traces; or one, and what comes of its ctrl on the other engine."""
     traces = [read(word) for word in request.what]
     both = len(traces) == 2
-    _refuse_of_run(request)
+    refuse_of_run(request)
     if both and request.options:
-        raise _of_a_run(next(iter(request.options)))
+        raise of_a_run(next(iter(request.options)))
     if both:
         return SidesRun(traces[0], traces[1], traces[1])
-    side, what = _other_side(request, _side_of(request, 0, traces[0])), request.what[0]
+    side, what = other_side(request, side_of_trace(request, 0, traces[0])), request.what[0]
     backend = side.chosen_backend()
     played = play(
         traces[0],
@@ -412,92 +251,3 @@ def _command(request: Request, backend: BackendChoice) -> str:
         ("--timestep", request.options.get("timestep"), None),
         ("--keyframe", request.keyframe, None),
     )
-
-
-def _check_moments(models: list[Model], seconds: float) -> None:
-    """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
-    steps = [model.timestep for model in models]
-    left, right = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
-    try:
-        common_moments(left, right, (steps[0], steps[1]))
-    except TraceError as error:
-        raise TraceError(
-            f"{error}; of a side: timestep={steps[0]:.15g} behind the right, or "
-            f"timestep={steps[1]:.15g} behind the left"
-        ) from None
-
-
-def recorded_sides(
-    request: Request,
-) -> tuple[Scenario, tuple[Side, Side], tuple[Trace, ...]]:
-    """What recorded runs were, so that their models can be run again.
-
-    Returns:
-        What was run; the two sides; and the traces: of both sides, or one whose start and commands
-        both are given.
-
-    Raises:
-        BadInputError: An option is of a run.
-        ModelFileError: The model of a trace is not here.
-    """
-    traces = tuple(read(word) for word in request.what)
-    _refuse_of_run(request)
-    sides = request.sides
-    if not sides:
-        sides = tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
-    if len(sides) == 1:
-        sides = (*sides, _other_side(request, sides[0]))
-    again = recorded_scenario(*traces)
-    options = again.options if request.sides else {}
-    return replace(again, options=options), (sides[0], sides[1]), traces
-
-
-def recorded_scenario(*traces: Trace) -> Scenario:
-    """What is done where the commands of the first of some traces are given again."""
-    header = traces[0].header
-    seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
-    return Scenario(
-        name=header.experiment,
-        says=header.says,
-        model="",
-        seconds=seconds,
-        controller=lambda _model, _seed: commands_of(traces[0]),
-        elsewhere=header.says,
-        needs=lambda _model: None,
-        options=header.options,
-    )
-
-
-def _side_of(request: Request, place: int, trace: Trace) -> Side:
-    """What a trace was recorded of."""
-    header = trace.header
-    options = {**header.options, **request.options}
-    defaults = "engine" if header.defaults == "engine" else "model"
-    if request.model:
-        return Side(request.model, header.backend, defaults, options, request.menagerie)
-    file, _ = model_file(header, request.menagerie, request.what[place])
-    return Side(str(file), header.backend, defaults, options)
-
-
-def _other_side(request: Request, own: Side) -> Side:
-    """What a trace was recorded of, on the backend of a request that is not the trace's."""
-    backends = [parse_backend(word) for word in request.backends]
-    backends.sort(key=lambda backend: backend.name == own.engine)  # another engine first
-    for backend in backends:
-        if backend != own.chosen_backend():
-            return replace(own, engine=backend.name, defaults=backend.defaults)
-    raise BadInputError(f"the trace is of {own.chosen_backend()}: name another with --backend")
-
-
-def _refuse_of_run(request: Request) -> None:
-    """Raise BadInputError for an option that has no meaning for a trace."""
-    if request.seconds is not None:
-        raise _of_a_run("seconds")
-    if request.seed != 0:
-        raise _of_a_run("seed")
-    if request.keyframe is not None:
-        raise _of_a_run("keyframe")
-
-
-def _of_a_run(option: str) -> BadInputError:
-    return BadInputError(f"{option} is of a run, and a trace is a run that was made")

@@ -16,7 +16,8 @@ from ..recordings import Trace
 from ..runs.reporter import QUIET, Reporter
 from ..why import Explanation
 from . import compare_page as compare
-from .finding import leading, name_of
+from .compared_names import name_of
+from .finding import leading
 from .requests import causes
 from .requests.causes import ExplainRequest
 from .requests.gap import CompareResult

@@ -1,33 +1,33 @@
-"""What a comparison found, in words, and what happens when: each from its figures, none a guess."""
+"""What a comparison found, in words: each from its figures, none a guess."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...measures import QUANTITIES
-from ...measures.text import capital, few, grouped, listed, quantity, rounded, short_time
+from ...measures.text import capital, quantity, short_time
 from ...show import report_template as template
-from ...show.blocks import Block, Headline, Table, TableCell
+from ...show.blocks import Block, Headline
 from ...show.report_template import if_true, slots_of
 from ..compare import Agreement, Comparison, Series
+from ..compare.chaos import Chance, ChaosFloor
 from ..compare.instead import Instead
-from ..compare.perturbed import CLEAR, Chance, ChaosFloor
-from ..compare.series import SETTLED, at_the_end
+from ..compare.series import at_the_end
 from ..compare.stillness import extent_of, nothing_moved
-from ..recordings import Trace
 from ..why.answer_page import answer, proofs
 
 if TYPE_CHECKING:
     from ..why import Explanation
+from .compared_names import name_of, named, short_labels, traces_of, window
+from .events import Event
+from .floor_words import floor_sides
 
-_NAMED = 6  # quantities in a sentence
 _STEADY = 0.1  # share by which a difference may change in the end and be called settled
-
 LEADS = {
     "same": "The two runs are the same in every figure that was compared",
     "agree": "The two runs agree for {until:g} s: nothing leaves its tolerance",
@@ -130,14 +130,6 @@ def _by_chance(
     return ""
 
 
-def floor_sides(comparison: Comparison, floor: ChaosFloor) -> str:
-    """The sides that were run again for the chaos floor: both, or the one that is not recorded."""
-    left, right = short_labels(comparison)
-    if len(floor.sides) > 1:
-        return "each side"
-    return left if floor.sides == (0,) else right
-
-
 def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
     """When the runs part; of moments farther apart than timesteps, which is the first."""
     at = parting(comparison)
@@ -154,26 +146,6 @@ def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
     body, _, ground = next(touches, "").partition(" on ")
     when = f", when {body} touches {ground}" if body else ""
     return PARTING[kind].format(time=short_time(at)) + when
-
-
-def short_labels(comparison: Comparison) -> tuple[str, str]:
-    """What the sides are called for short: their engines, or what tells two of one apart."""
-    return comparison.left.short, comparison.right.short
-
-
-def long_labels(comparison: Comparison) -> tuple[str, str]:
-    """What the sides are called: engine and version, or what tells two of one apart."""
-    return comparison.left.label, comparison.right.label
-
-
-def traces_of(comparison: Comparison) -> tuple[Trace, Trace]:
-    """The runs of both sides."""
-    return comparison.left.trace, comparison.right.trace
-
-
-def window(comparison: Comparison) -> str:
-    """What the figures of the end are a mean over."""
-    return f"the last {SETTLED * comparison.until:.3g} s"
 
 
 def _in_the_end(comparison: Comparison, lead: Agreement | None) -> str:
@@ -205,24 +177,6 @@ def _last(curve: Series, agreement: Agreement) -> float | None:
     tail = curve.difference[at_the_end(curve.time)]
     moves = float(np.ptp(tail)) > min(agreement.tolerance, _STEADY * agreement.settled)
     return float(tail[-1]) if moves else None
-
-
-def name_of(name: str) -> str:
-    """A quantity's name where names stand in a list: without a comma of its own."""
-    return name.replace(", ", " ")
-
-
-def moment(time: float | None) -> TableCell:
-    """A time of the run [s] in a cell, to which a slider can go."""
-    return TableCell("never" if time is None else f"{time:.3f}", at=time)
-
-
-def named(agreement: Agreement) -> str:
-    """A quantity within a sentence."""
-    if agreement.kind in ("joint", "slide"):
-        return f"joint {agreement.name}"
-    name, _, part = agreement.name.partition(", ")
-    return f"the {part} of {name}" if part else f"the {name}"
 
 
 def subject(
@@ -382,176 +336,3 @@ def _first_parting_of(comparison: Comparison) -> _FirstParting:
         return _FirstParting()
     first = next(a for a in comparison.agreements if a.since == at)
     return _FirstParting(named(first), short_time(at))
-
-
-def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
-    """Say how the floor was made, how high it is, and which gaps may be chance."""
-    return template.blocks(
-        "lab/questions/floor",
-        clear=f"{CLEAR:g}",
-        **slots_of(_perturbed_of(comparison, floor), _chances_of(floor)),
-    )
-
-
-@dataclass(frozen=True)
-class _Perturbed:
-    """The runs that a chaos floor is made of.
-
-    Attributes:
-        sides: What was run again.
-        recorded: The side that was not; None for none.
-        runs: How many more times each.
-        changed: By what.
-        ended: How many of the runs ended early; None for none.
-        most: How far they get from the run of their own side; None where that has no bound.
-    """
-
-    sides: str
-    recorded: str | None
-    runs: int
-    changed: str
-    ended: int | None
-    most: str | None
-
-
-def _perturbed_of(comparison: Comparison, floor: ChaosFloor) -> _Perturbed:
-    recorded = None
-    for side, label in enumerate(short_labels(comparison)):
-        if side not in floor.sides:
-            recorded = label
-    sizes = _highest(floor)
-    return _Perturbed(
-        sides=floor_sides(comparison, floor),
-        recorded=recorded,
-        runs=floor.runs,
-        changed=changed_by(floor),
-        ended=floor.ended if floor.ended else None,
-        most=listed(sizes) if sizes and not floor.ended else None,
-    )
-
-
-def _highest(floor: ChaosFloor) -> list[str]:
-    """Return the highest floor of all angles, and that of all lengths."""
-    sizes = []
-    for unit in ("rad", "m"):
-        bands = [band for band in floor.bands if band.unit == unit]
-        if bands:
-            highest = max(bands, key=lambda band: band.most)
-            sizes.append(f"{quantity(highest.most, unit)} ({name_of(highest.name)})")
-    return sizes
-
-
-@dataclass(frozen=True)
-class _Chances:
-    """Which gaps may be chance.
-
-    Attributes:
-        every_gap: "" where every gap is inside the floor all the time.
-        later: Quantities that are inside it in the end alone; None for none.
-        inside: Quantities of which nothing can be concluded; None for none.
-        between: Those of which it cannot be told; None for none.
-    """
-
-    every_gap: str | None
-    later: str | None
-    inside: str | None
-    between: str | None
-
-
-def _chances_of(floor: ChaosFloor) -> _Chances:
-    motion = [band for band in floor.bands if band.kind != "contact"]
-    everywhere = all(band.inside_from == 0 for band in motion)
-    is_chaotic = any(band.most > 0 for band in motion)
-    later = [
-        f"{name_of(band.name)} from {short_time(band.inside_from)} on"
-        for band in motion
-        if band.inside_from is not None and band.most > 0 and band.chance == "beyond"
-    ]
-    return _Chances(
-        every_gap=if_true(everywhere and is_chaotic),
-        later=few(later, _NAMED) if later else None,
-        inside=_names_with(floor, "inside"),
-        between=_names_with(floor, "cannot be told"),
-    )
-
-
-def _names_with(floor: ChaosFloor, chance: Chance) -> str | None:
-    """Return the quantities with a chance, in a sentence; None for none."""
-    names = [name_of(band.name) for band in floor.bands if band.chance == chance]
-    return few(names, _NAMED) if names else None
-
-
-def changed_by(floor: ChaosFloor) -> str:
-    """Return what was changed in the runs that it is made of."""
-    size = floor.uncertain
-    sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
-    start = f", and the start by {listed(sizes)}" if sizes else ""
-    return f"start and commands changed by rounding ({floor.rounding:g}){start}"
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happens in one of two runs, or between them.
-
-    Attributes:
-        time: Since the start [s].
-        kind: A first touch, a quantity that leaves its tolerance, a largest difference, or the
-            early end of a run.
-        text: What happens, in a few words.
-        side: 0 for the left, 1 for the right; None for what is between them.
-        what: What touches what; "" of other kinds.
-    """
-
-    time: float
-    kind: Literal["touch", "part", "largest", "end"]
-    text: str
-    side: int | None = None
-    what: str = ""
-
-
-def events_of(comparison: Comparison) -> list[Event]:
-    """Return first touches, where each quantity parts, largest differences, and early ends."""
-    events: list[Event] = []
-    for touch in comparison.touches:
-        for side, contacts in enumerate((touch.left, touch.right)):
-            if contacts.first is not None:
-                text = f"first touch: {touch.pair}"
-                events.append(Event(contacts.first, "touch", text, side, touch.pair))
-    parted = [
-        agreement
-        for agreement in comparison.agreements
-        if agreement.kind != "contact" and agreement.since is not None
-    ]
-    by_since = grouped((agreement.since, name_of(agreement.name)) for agreement in parted)
-    for since, names in by_since.items():
-        if since is not None:
-            text = f"beyond tolerance from here: {'; '.join(names)}"
-            events.append(Event(since, "part", text))
-    by_largest = grouped((agreement.at, name_of(agreement.name)) for agreement in parted)
-    for at, names in by_largest.items():
-        events.append(Event(at, "largest", f"largest difference: {'; '.join(names)}"))
-    for side, trace in enumerate(traces_of(comparison)):
-        if trace.header.ended:
-            end = (len(trace) - 1) * trace.timestep
-            events.append(Event(end, "end", f"ends early: {trace.header.ended}", side))
-    return sorted(events, key=lambda event: event.time)
-
-
-def events_table(comparison: Comparison) -> Table:
-    """Return what happens when; the same on both sides at the same time is one row."""
-    both = grouped(((event.time, event.text), event.side) for event in events_of(comparison))
-    rows = []
-    for (time, text), sides in both.items():
-        where = "both" if {0, 1} <= set(sides) else _where(sides[0], comparison)
-        rows.append((TableCell(short_time(time), at=time), capital(text), where))
-    return Table(
-        ("time", "what", "on"),
-        rows,
-        "First touches, partings, largest differences; press a time to go there",
-        words=frozenset({0, 1, 2}),
-    )
-
-
-def _where(side: int | None, comparison: Comparison) -> str:
-    """Return what a side is called; None is between the two."""
-    return "between them" if side is None else long_labels(comparison)[side]

@@ -15,9 +15,10 @@ from ...show import report_template as template
 from ...show.blocks import Interactive, Traces
 from ...show.report_template import slots_of
 from ..compare import Agreement, Comparison, Series
-from ..compare.perturbed import ChaosFloor
+from ..compare.chaos import ChaosFloor
 from ..compare.series import NORMAL, normal_forces, total_forces
-from .finding import Event, long_labels, name_of, traces_of
+from .compared_names import long_labels, name_of, traces_of
+from .events import Event
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"

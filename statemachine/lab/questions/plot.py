@@ -21,9 +21,11 @@ from ...show.blocks import Traces
 from ...show.charts import SETTINGS, SIDES, check_suffix, draw_picture, saved
 from ...show.report_template import if_true, slots_of
 from ..compare import Comparison, default_tip
-from ..compare.perturbed import ChaosFloor
+from ..compare.chaos import ChaosFloor
 from ..recordings import Trace
-from .finding import changed_by, long_labels, parting, traces_of
+from .compared_names import long_labels, traces_of
+from .finding import parting
+from .floor_words import changed_by
 from .over_time import CHARTS_SHOWN, QuantityChart, charts_of, spans
 
 FIGURE_SETTINGS = {

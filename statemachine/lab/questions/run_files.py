@@ -18,13 +18,13 @@ from ...show.drawing import Drawing, drawing_of
 from ...show.html import check_target, report, write_report
 from ..compare import Comparison
 from ..compare.alike import with_bodies_of
-from ..compare.perturbed import ChaosFloor
+from ..compare.chaos import ChaosFloor
 from ..recordings import Trace
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from . import film as films
 from . import plot
-from .compare_page import junit
+from .junit import junit
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from ..compare.alike import commands_alike
 from ..compare.series import PairContacts, Touch
 from ..recordings import Header, Trace
 from ..why.answer_page import missing
-from .finding import long_labels, moment, name_of, short_labels, traces_of, window
+from .compared_names import long_labels, moment, name_of, short_labels, traces_of, window
 
 _PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 # Of the promises that a backend may emulate, those that move the arm, in plain words.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...errors import unknown_name
 from ...interface import Model
 from ...measures import OF_A_RUN, Deviation
-from ..compare.perturbed import against_floor
+from ..compare.chaos import against_floor
 from ..runs.robot import moved_by_actuators
 from .gap import Measure, size_of, touched_at_start
 from .request import WhyRequest

@@ -14,8 +14,8 @@ from ...measures.text import NONE, capital, few, listed, percent, quantity, sent
 from ...show import report_template as template
 from ...show.blocks import Block, Items, Page, Text
 from ...show.report_template import if_true
+from ..compare.chaos import CLEAR
 from ..compare.labels import lacking
-from ..compare.perturbed import CLEAR
 from . import ADDS_UP, UNEXPLAINED, Explanation, Share
 from .answer_page import amount, answer, missing, parts, proofs, refused
 from .locate import Localisation

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ..compare.perturbed import against_floor
+from ..compare.chaos import against_floor
 
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 _MASKED = 2.0  # of the gap: a cause that takes away more has others against it

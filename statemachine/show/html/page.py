@@ -16,7 +16,7 @@ from ... import __version__
 from ...atomic_files import check_place, replace_text
 from ...errors import BadInputError
 from ...interface import Array, Ints
-from ...lab.questions.finding import long_labels, short_labels, traces_of
+from ...lab.questions.compared_names import long_labels, short_labels, traces_of
 from ...lab.questions.over_time import BothRuns, QuantityChart, spans
 from ...measures.text import figure, on, reading, short_time
 from ..blocks import Block, Interactive, Items, Page, Section, Text

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...interface import Array, Ints
 from ...lab.compare.series import world_forces
-from ...lab.questions.finding import long_labels, traces_of
+from ...lab.questions.compared_names import long_labels, traces_of
 from ...lab.questions.over_time import BothRuns
 from ...lab.recordings import Trace
 from ...measures import common_moments

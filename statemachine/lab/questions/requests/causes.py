@@ -9,8 +9,8 @@ from ....processes import checked_jobs
 from ... import why
 from ...compare.alike import for_left
 from ...compare.perturbed import EXACT, Uncertainty
+from ...compare.recorded import recorded_sides
 from ...compare.sides import Request, with_options
-from ...compare.two_sides import recorded_sides
 from ...runs.reporter import QUIET, Reporter
 from ...why.trials import Measure
 

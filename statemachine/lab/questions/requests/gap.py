@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 
 from ....errors import BadInputError, check_name
 from ....measures import QUANTITIES
-from ...compare.agreement import Comparison, WitnessResult, compare, witness
+from ...compare.agreement import Comparison, compare
+from ...compare.chaos import ChaosFloor, chaos_floor
 from ...compare.instead import Instead, instead_of
-from ...compare.perturbed import EXACT, ChaosFloor, Uncertainty, chaos_floor
+from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_model
 from ...compare.sides import Request
 from ...compare.two_sides import SidesRun, run_sides
+from ...compare.witnessed import WitnessResult, witness
 from ...runs.controllers import is_function
 from ...runs.reporter import QUIET, Reporter
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from ....errors import BadInputError
 from ...compare import one_step
+from ...compare.prepared_sides import prepare_sides
 from ...compare.sides import Request
-from ...compare.two_sides import prepare_sides
 from ...runs.reporter import QUIET, Reporter
 
 

@@ -9,8 +9,9 @@ from itertools import pairwise
 from .... import releases
 from ....errors import BadInputError
 from ...compare.agreement import Comparison, compare
+from ...compare.prepared_sides import read_otherwise
 from ...compare.sides import Request
-from ...compare.two_sides import read_otherwise, run_sides
+from ...compare.two_sides import run_sides
 from ...runs.drive import Progress, part_of, silent
 from ...runs.reporter import QUIET, Reporter
 from .one_step import check_runs

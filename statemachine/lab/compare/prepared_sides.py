@@ -1,0 +1,202 @@
+"""Both sides loaded, matched, and how each is run: what stands before the first step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import chain
+
+import numpy as np
+
+from ...engines import room
+from ...errors import TraceError
+from ...interface import Model
+from ...measures import common_moments
+from ...measures.text import milliseconds
+from ...release_names import engine_of
+from ..recordings import (
+    Rerun,
+    SideStart,
+    beginning_with,
+    read,
+    start_of,
+)
+from ..runs.drive import check_length, steps_in
+from ..runs.scenarios import Controller, Scenario
+from .alike import (
+    controller_for_right,
+    for_left,
+    match_sides,
+)
+from .matching import Matched
+from .recorded import (
+    recorded_scenario,
+    refuse_of_run,
+)
+from .sides import Request
+
+
+def read_otherwise(left: Model, right: Model) -> list[str]:
+    """Say what only one of two releases of an engine reads in the file of both sides."""
+    engines = {engine_of(model.backend) for model in (left, right)}
+    return room(engines.pop()).read_otherwise(left, right) if len(engines) == 1 else []
+
+
+def prepare_sides(
+    request: Request,
+) -> tuple[tuple[Rerun, Rerun], Matched | None, tuple[str, ...]]:
+    """Load both sides of a request, match them, and say how each is run.
+
+    What an experiment or a trace tells the left, the right is told too; a function of the user's
+    is asked on each side.
+
+    Returns:
+        How the left and the right are run; what of the left is what of the right, None if both
+        are of one file; and what a reader should know of it.
+
+    Raises:
+        StateMachineError: A side cannot be loaded, or cannot do what was asked.
+    """
+    trace = read(request.what[0]) if request.is_traces else None
+    scenario = recorded_scenario(trace) if trace else request.scenario()
+    sides = request.both_sides(scenario.model)
+    given = {**scenario.options, **request.options}
+    left, right = models = [side.load(**given) for side in sides]
+    matched = match_sides(sides, left, right, request.names)
+    seconds = scenario.seconds if trace or request.seconds is None else request.seconds
+    _check_moments(models, seconds)
+    for model in models:
+        check_length(model, seconds)
+    notes_on_engines = [room(engine_of(model.backend)).unlike_its_users(model) for model in models]
+    start, notes = None, list[str]()
+    if trace is not None:
+        refuse_of_run(request)
+        trace = for_left(trace, left, request)
+        scenario, seed = recorded_scenario(trace), trace.header.provenance.seed
+        start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
+        notes.append(
+            f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
+        )
+    else:
+        scenario = scenario.on(left)
+        seed = request.seed if scenario.seeded else None
+    right_start = _start_of_right(scenario.keyframe, start, left, right, matched)
+    notes += right_start.notes
+    notes += _notes_on_every(request.every, left, right)
+
+    def left_controller(model: Model) -> Controller:
+        return scenario.controller(model, request.seed)
+
+    def right_controller(model: Model) -> Controller:
+        if scenario.own:
+            controller = scenario.controller(model, request.seed)
+        else:
+            controller = scenario.controller(left, request.seed)
+            if matched:
+                controller = controller_for_right(controller, matched, right_start.own.ctrl)
+        if right_start.given is None:
+            return controller
+        first_ctrl = right_start.given.ctrl
+        return beginning_with(lambda _: first_ctrl, controller)
+
+    left_rerun = Rerun(
+        left,
+        left_controller,
+        seconds,
+        defaults=sides[0].defaults,
+        options={**given, **sides[0].options},
+    )
+    right_rerun = Rerun(
+        right,
+        right_controller,
+        seconds,
+        defaults=sides[1].defaults,
+        options={**given, **sides[1].options},
+    )
+    reruns = (
+        _of_scenario(_starting(left_rerun, scenario.keyframe, start), scenario, seed),
+        _of_scenario(
+            _starting(right_rerun, right_start.keyframe, right_start.given), scenario, seed
+        ),
+    )
+    notes += request.taken
+    notes += dict.fromkeys(chain(*notes_on_engines))
+    notes += read_otherwise(left, right)
+    return reruns, matched, tuple(notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _RightStart:
+    """Where the right side starts.
+
+    Attributes:
+        keyframe: One of its own; None for its default state.
+        own: Its state there, for what the left has no counterpart of.
+        given: What is written over that, in terms of the right; None for nothing.
+        notes: What a reader should know of it.
+    """
+
+    keyframe: str | None
+    own: SideStart
+    given: SideStart | None
+    notes: tuple[str, ...]
+
+
+def _start_of_right(
+    keyframe: str | None,
+    start: SideStart | None,
+    left: Model,
+    right: Model,
+    matched: Matched | None,
+) -> _RightStart:
+    """Return where the right side starts, if the left starts in a keyframe, or in a state."""
+    given, notes = start, ()
+    known = [frame.name for frame in right.keyframes]
+    if keyframe is not None and matched and keyframe not in known:
+        given = start_of(left, keyframe)
+        notes = (f"{right.path.name} has no keyframe {keyframe!r}: it starts in the left's",)
+        keyframe = None
+    own = start_of(right, keyframe)
+    if matched and given:
+        given = matched.start(given, own)
+    return _RightStart(keyframe, own, given, notes)
+
+
+def _notes_on_every(every: int, left: Model, right: Model) -> list[str]:
+    """Say for how long a command holds, where that is not the same on both sides."""
+    if every <= 1 or left.timestep == right.timestep:
+        return []
+    return [
+        f"{every} steps are {milliseconds(every * left.timestep)} on the left "
+        f"and {milliseconds(every * right.timestep)} on the right"
+    ]
+
+
+def _starting(rerun: Rerun, keyframe: str | None, start: SideStart | None) -> Rerun:
+    """Return a run that starts in a keyframe, and in some other state if one is given."""
+    if start is None:
+        return replace(rerun, keyframe=keyframe)
+    return replace(rerun, keyframe=keyframe, qpos=start.qpos, qvel=start.qvel)
+
+
+def _of_scenario(rerun: Rerun, scenario: Scenario, seed: int | None) -> Rerun:
+    """Return a run whose trace says what was run."""
+    return replace(
+        rerun,
+        experiment=scenario.name,
+        says=scenario.says,
+        seed=seed,
+        writes_state=scenario.own,  # ours write nothing but ctrl
+    )
+
+
+def _check_moments(models: list[Model], seconds: float) -> None:
+    """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
+    steps = [model.timestep for model in models]
+    left, right = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
+    try:
+        common_moments(left, right, (steps[0], steps[1]))
+    except TraceError as error:
+        raise TraceError(
+            f"{error}; of a side: timestep={steps[0]:.15g} behind the right, or "
+            f"timestep={steps[1]:.15g} behind the left"
+        ) from None
