@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.backends import on_default
+from statemachine.backends.repairs import compile_mended
 from statemachine.errors import BadInputError, EngineWarning, ModelError, UnsupportedError
-from statemachine.interface import usual_site
+from statemachine.interface.sites import usual_site
+from statemachine.lab.compare.agreement import witness
+from statemachine.lab.compare.matching import match_models
 from statemachine.lab.recordings import record, write
 from statemachine.lab.recordings.request import PlayRequest, answer_play
 from statemachine.lab.validate.fingertip import certify
@@ -268,7 +272,7 @@ def test_options_are_on_or_off(tmp_path):
 
 def test_a_binary_model_is_read_as_it_is(tmp_path):
     file = tmp_path / "arm.mjb"
-    sm.load(arm(tmp_path)).save_binary(file)  # pyright: ignore[reportAttributeAccessIssue]
+    mujoco.mj_saveModel(sm.load(arm(tmp_path)).raw, str(file))
     with pytest.warns(EngineWarning), pytest.raises(BadInputError, match="binary"):
         sm.load(file, trust_binary=True, meshes=False)
 
@@ -326,10 +330,12 @@ def test_a_release_reads_with_the_options(tmp_path, form):
             '<geom type="mesh" mesh="m"/></body></worldbody></mujoco>'
         )
     with pytest.warns(EngineWarning):
-        model = sm.load(path, backend=release(), balance_inertia=True, meshes=False)
-    assert model.ngeom == 0
-    assert model.read_options.balance_inertia
-    assert np.ptp(model.compiled.body_inertia[-1]) == 0
+        here = sm.load(path, balance_inertia=True, meshes=False)
+    with pytest.warns(EngineWarning):
+        there = sm.load(path, backend=release(), balance_inertia=True, meshes=False)
+    assert there.ngeom == 0
+    assert there.read_options == here.read_options
+    assert there.compiled.body_inertia == pytest.approx(here.compiled.body_inertia)
 
 
 def test_the_frame_behind_the_fixed_joints_of_the_shared_case():
@@ -365,3 +371,78 @@ def test_a_run_of_a_file_that_was_read_with_options_is_played_again(tmp_path):
     with pytest.warns(EngineWarning):
         again = answer_play(PlayRequest(str(file)))
     assert again.qpos.tolist() == trace.qpos.tolist()
+
+
+def test_a_model_of_another_engine_is_read_again_as_it_was(tmp_path):
+    needs("pybullet")
+    with pytest.warns(EngineWarning):
+        model = sm.load(arm(tmp_path, mesh="absent.stl"), backend="pybullet", meshes=False)
+    assert on_default(model).ngeom == 0
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_balance_inertia_reads_a_rod_without_inertia_about_its_axis(tmp_path, backend):
+    needs(backend)
+    rod = '<inertia ixx="1.2e-4" iyy="1.2e-4" izz="0" ixy="0" ixz="0" iyz="0"/>'
+    path = arm(tmp_path, lower=rod, inertia=ROUND)
+    with pytest.raises(ModelError, match="balance_inertia=True"):
+        sm.load(path, backend=backend)
+    with pytest.warns(EngineWarning, match="lower"):
+        sm.load(path, backend=backend, balance_inertia=True)
+    (repair,) = compile_mended(path).repairs
+    assert repair.used == pytest.approx((8e-5, 8e-5, 8e-5))
+
+
+@pytest.mark.slow
+def test_a_release_balances_a_rod_without_inertia_about_its_axis(tmp_path):
+    rod = '<inertia ixx="1.2e-4" iyy="1.2e-4" izz="0" ixy="0" ixz="0" iyz="0"/>'
+    path = arm(tmp_path, lower=rod)
+    with pytest.warns(EngineWarning):
+        here = sm.load(path, balance_inertia=True)
+    with pytest.warns(EngineWarning):
+        there = sm.load(path, backend=release(), balance_inertia=True)
+    assert there.compiled.body_inertia == pytest.approx(here.compiled.body_inertia)
+
+
+@pytest.mark.parametrize("suffix", ["xml", "mjcf"])
+def test_what_the_compiler_warns_of_is_one_warning_of_ours(tmp_path, suffix):
+    path = tmp_path / f"ball.{suffix}"
+    path.write_text(
+        '<mujoco><compiler settotalmass="3"/><worldbody><body><joint/><geom size="0.1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sm.load(path)
+    assert [warning.category for warning in caught] == [EngineWarning]
+    assert "settotalmass" in str(caught[0].message)
+
+
+def test_the_frame_of_a_urdf_has_a_third_party_in_a_comparison(tmp_path):
+    pytest.importorskip("pinocchio")
+    path = arm(tmp_path)
+    trace = record(sm.load(path), None, 0.05)
+    found = witness(trace, trace, path)
+    assert found is not None
+    assert (found.site, found.grade) == ("tool", "own reading")
+    assert max(found.left, found.right) < 1e-12
+
+
+def test_frames_of_links_that_are_bodies_in_the_other_file_are_not_missed(tmp_path):
+    fused, kept = tmp_path / "fused", tmp_path / "kept"
+    fused.mkdir()
+    kept.mkdir()
+    left, right = sm.load(arm(fused)), sm.load(arm(kept, compiler='fusestatic="false"'))
+    matched = match_models(left, right)
+    assert matched.only[0]["site"] == ()
+    assert [left.body_names[a] for a, _ in matched.bodies][1:] == ["upper", "lower"]
+
+
+def test_frames_are_matched_by_name_between_two_urdfs(tmp_path):
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.mkdir()
+    two.mkdir()
+    left, right = sm.load(arm(one)), sm.load(arm(two))
+    matched = match_models(left, right)
+    assert list(matched.sites) == [(k, k) for k in range(left.nsite)]
+    assert not any(matched.only[0].values())

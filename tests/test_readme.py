@@ -149,7 +149,7 @@ PRINTS = {
         "start from the same bits: True",
     ),
     "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),
-    "docs/models.md": ("13 coordinates", "True {}"),
+    "docs/models.md": ("13 coordinates", "True {}", "'gripperframe')"),
     "docs/platforms.md": ("armature: emulated", "position servo: emulated"),
     "docs/sweeps.md": ("2 done, 0 missing", "damping 1.0 None"),
     "docs/traces.md": ("101 (101, 6)",),

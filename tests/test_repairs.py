@@ -221,3 +221,19 @@ def test_what_nothing_here_mends_is_an_error(tmp_path):
     path.write_text('<mujoco><worldbody><geom size="-1"/></worldbody></mujoco>')
     with pytest.raises(ModelError, match="size"):
         compile_mended(path)
+
+
+def test_what_the_file_itself_has_balanced_is_listed_too(tmp_path):
+    path = arm(tmp_path, moving=inertial(UNBALANCED))
+    text = path.read_text().replace(
+        '<robot name="arm">',
+        '<robot name="arm"><mujoco><compiler balanceinertia="true"/></mujoco>',
+    )
+    path.write_text(text)
+    reading = compile_mended(path, fuse_static=False)
+    raw = mujoco.MjModel.from_xml_path(str(path))
+    assert [(repair.name, repair.factor) for repair in reading.repairs] == [
+        ("arm", pytest.approx(4))
+    ]
+    assert raw.nbody == 2
+    assert reading.compiled.body("arm").inertia == pytest.approx([4e-5, 4e-5, 4e-5])

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
-from ..interface.checks import as_switch, unsupported_by
-from ..interface.records import Defaults, ReadOptions
+from ..interface.checks import as_switch
+from ..interface.records import AS_WRITTEN, Defaults, ReadOptions
 from ..model_files import checked_file
 from ..models import AnyPath
 from ..release_names import is_release, version_of
@@ -206,8 +206,9 @@ def load(
         menagerie: A menagerie folder to look the name up in.
         trust_binary: Whether a binary model (.mjb) is read. MuJoCo does not check one: a damaged
             or malicious file can crash or harm the process.
-        balance_inertia: Whether an inertia whose principal moments break A + B >= C, which MuJoCo
-            refuses, is balanced: all three become their mean. An EngineWarning names each.
+        balance_inertia: Whether an inertia is balanced whose principal moments break A + B >= C, or
+            of which one is not positive, as MuJoCo refuses it: all three become their mean. An
+            EngineWarning names each.
         meshes: Whether shapes that are meshes are read. Without them a file can be read whose
             meshes are missing, or of a format that MuJoCo does not know; an EngineWarning says
             what touches nothing then.
@@ -249,10 +250,14 @@ def load(
         balance_inertia=as_switch(balance_inertia, "balance_inertia"),
         meshes=as_switch(meshes, "meshes"),
     )
-    early = _read_arguments(backend, loader, read_options)
-    takes_options = "options" in inspect.signature(loader).parameters
-    if options and takes_options:
-        early["options"] = options
+    takes = inspect.signature(loader).parameters
+    takes_options = "options" in takes
+    early: dict[str, Any] = {"options": options} if options and takes_options else {}
+    if read_options != AS_WRITTEN:
+        from ..interface.read_options import check_takes_read_options
+
+        check_takes_read_options(backend, takes, read_options)
+        early["read_options"] = read_options
     loaded = loader(path, defaults=defaults, **early)
     vars(loaded)["read_options"] = read_options
     if options and not takes_options:
@@ -260,22 +265,6 @@ def load(
     if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
-
-
-def _read_arguments(
-    backend: str, loader: Callable[..., Model], read_options: ReadOptions
-) -> dict[str, Any]:
-    """Return what a loader is told of how a file is read; nothing of one that is read as written.
-
-    Raises:
-        UnsupportedError: It reads files in its own way.
-    """
-    told = list(read_options.arguments())
-    if not told:
-        return {}
-    if "read_options" not in inspect.signature(loader).parameters:
-        raise unsupported_by(backend, told[0], "it reads files in its own way")
-    return {"read_options": read_options}
 
 
 def _of_usual_start(model: Model) -> str:
@@ -309,8 +298,8 @@ def on_default(model: Model) -> Model:
     with warnings.catch_warnings(action="ignore", category=EngineWarning):  # told of the model
         if model.backend == DEFAULT:
             return model
-        options: dict[str, Any] = {**model.read_options.arguments()}
-        return load(model.path, **options)
+        read = model.read_options
+        return load(model.path, balance_inertia=read.balance_inertia, meshes=read.meshes)
 
 
 def _find(name: str) -> str:

@@ -23,7 +23,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError, EngineWarning, ModelError, one_line, shown
+from ..errors import BadInputError, EngineWarning, ModelError, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..interface.records import AS_WRITTEN, ReadOptions
@@ -31,6 +31,7 @@ from ..models import AnyPath
 from .actuators import control_names, delay_steps, servos
 from .binary import is_binary, read_binary
 from .controls import ctrl_owners
+from .spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
 _FAR, _FAST, _DAY = 1000.0, 1e5, 1e5
@@ -46,20 +47,6 @@ _SELDOM_NEGATIVE = (
     *("dof_damping", "jnt_stiffness", "tendon_damping", "tendon_stiffness"),
     *("geom_friction", "pair_friction"),
 )
-
-
-# What MuJoCo raises where it gives up, beside the ValueError of a file that it cannot read. A
-# RuntimeError is one of C++ that the bindings do not know: of memory that cannot be had.
-ENGINE_ERRORS = (MemoryError, RuntimeError, mujoco.FatalError)
-_NO_MEMORY = ("could not allocate memory", "unknown exception", "bad_alloc")
-
-
-def reason_of(error: BaseException) -> str:
-    """Say in one line why MuJoCo gave up; where memory ended, that it did."""
-    text = one_line(error)
-    if isinstance(error, MemoryError) or any(sign in text.lower() for sign in _NO_MEMORY):
-        return f"it takes more memory than there is ({text})" if text else "out of memory"
-    return text or type(error).__name__
 
 
 def new_data(raw: mujoco.MjModel) -> mujoco.MjData:
@@ -110,16 +97,11 @@ def compile_file(path: AnyPath, options: ReadOptions = AS_WRITTEN) -> mujoco.MjM
     """
     text = os.fspath(path)
     if is_binary(text):
-        raw = _from_binary(text, read_binary(text), options)
+        raw, effects = _from_binary(text, read_binary(text), options), list[str]()
     else:
-        raw = _compile_xml(Path(text), options)
+        raw, effects = _compile_xml(Path(text), options)
     check_numbers(raw, text)
-    doubtful = list(_doubtful(raw))
-    if options != AS_WRITTEN:
-        from .reading import effects
-
-        doubtful += effects(Path(text), options)
-    if doubtful:
+    if doubtful := [*_doubtful(raw), *effects]:
         warnings.warn(f"{text}: {'; '.join(doubtful)}", EngineWarning, stacklevel=4)
     return raw
 
@@ -143,19 +125,23 @@ def _from_binary(path: str, content: bytes, options: ReadOptions) -> mujoco.MjMo
         raise ModelError(f"MuJoCo cannot read {path}: {reason_of(error)}") from error
 
 
-def _compile_xml(path: Path, options: ReadOptions) -> mujoco.MjModel:
+def _compile_xml(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list[str]]:
     """Compile an MJCF or a URDF file.
+
+    Returns:
+        The compiled model, and what the options changed, in sentences.
 
     Raises:
         ModelError: MuJoCo cannot read it, with its reason and what a user can do.
     """
     try:
         spec = read_spec(path)
-        if spec.compiler.fusestatic or options != AS_WRITTEN:
-            from .reading import prepare
+        if not spec.compiler.fusestatic and options == AS_WRITTEN:
+            return compile_spec(spec), []
+        from .reading import compile_with, effects
 
-            prepare(spec, options)
-        return spec.compile()
+        raw, repairs = compile_with(path, options)
+        return raw, list(effects(path, options, repairs))
     except (ValueError, *ENGINE_ERRORS) as error:
         from .refusals import explained
 
@@ -202,31 +188,6 @@ def check_numbers(raw: mujoco.MjModel, name: str) -> None:
         raise ModelError(f"{name} has a name that is not UTF-8: {shown(wrong)}") from None
     for problem in _problems(raw):
         raise ModelError(f"{name} has a number that nothing can be computed with: {problem}")
-
-
-def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
-    """Read an MJCF or a URDF file, and compile nothing.
-
-    Meshes of a URDF that MuJoCo would not find are looked up as `file_text` says.
-
-    Args:
-        path: The file.
-        visuals: Whether visual shapes of a URDF are read, too, which MuJoCo leaves out unless the
-            file says `discardvisual="false"`.
-
-    Raises:
-        ValueError: MuJoCo cannot read it.
-    """
-    text = None
-    if path.suffix != ".xml":
-        from .file_text import text_for
-
-        text = text_for(path, visuals)
-    if text is None:
-        return mujoco.MjSpec.from_file(str(path))
-    spec = mujoco.MjSpec.from_string(text)
-    spec.modelfiledir = str(path.parent.resolve())
-    return spec
 
 
 def _problems(raw: mujoco.MjModel) -> Iterator[str]:

@@ -15,7 +15,9 @@ each release of MuJoCo reads alike.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
@@ -54,7 +56,12 @@ def text_for(path: Path, visuals: bool = False) -> str | None:
     return f"<mujoco model={name}><include file={quoteattr(str(path.absolute()))}/></mujoco>"
 
 
-def urdf_text(path: Path, visuals: bool = False, options: ReadOptions = AS_WRITTEN) -> str | None:
+def urdf_text(
+    path: Path,
+    visuals: bool = False,
+    options: ReadOptions = AS_WRITTEN,
+    moments: Mapping[str, float] = MappingProxyType({}),
+) -> str | None:
     """Return the text of a URDF in which every mesh that is there is named so that it is found.
 
     Args:
@@ -63,6 +70,8 @@ def urdf_text(path: Path, visuals: bool = False, options: ReadOptions = AS_WRITT
             says `discardvisual="false"`.
         options: What is written into the text, too: the `balanceinertia` of its <compiler>, and
             shapes without those that are meshes.
+        moments: Moments of inertia [kg m^2] that are written in place of those of some links, about
+            each axis the same, by name of the link.
 
     Returns:
         The text; None where MuJoCo can be given the file as it is, or the file is no URDF.
@@ -80,6 +89,12 @@ def urdf_text(path: Path, visuals: bool = False, options: ReadOptions = AS_WRITT
     if options.balance_inertia:
         compiler.set("balanceinertia", "true")
         is_changed = True
+    for link in root.iter("link"):
+        inertia = link.find("inertial/inertia")
+        if inertia is not None and link.get("name", "") in moments:
+            moment = repr(moments[link.get("name", "")])
+            inertia.attrib = dict.fromkeys(("ixx", "iyy", "izz"), moment)
+            inertia.attrib |= dict.fromkeys(("ixy", "ixz", "iyz"), "0")
     if not options.meshes:
         is_changed = _drop_meshes(root) or is_changed
     if visuals and compiler.get("discardvisual") != "false":

@@ -9,36 +9,71 @@ the compiled model changes for it, but `stat.extent` and `stat.center`, of which
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..interface.records import ReadOptions
 from ..measures.text import few, listed
-from .compiled import read_spec
-from .repairs import assets_of, delete_assets, stated_moments
+from .repairs import Repair, assets_of, balance_all, delete_assets, mend_inertia
+from .spec_files import compile_spec, read_spec
 
 if TYPE_CHECKING:
     import mujoco
 
 # Viewers show the sites of groups 0 to 2; frames of links are many, and have no shape of their own.
 _FRAME_GROUP = 4
-# Moments of inertia that agree to this are the same: those of a full inertia are its eigenvalues.
-_SAME = 1e-6
 
 
-def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> None:
-    """Apply options to a specification, and keep the frames of the bodies that are to be fused.
+def compile_with(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list[Repair]]:
+    """Compile a file as its options say, and keep the frames of the bodies that are fused.
+
+    Args:
+        path: An MJCF or URDF file.
+        options: As `load` was told.
+
+    Returns:
+        The compiled model, and what the options changed.
+
+    Raises:
+        ValueError: MuJoCo cannot read it so.
+    """
+    faults: list[str] = []
+    while True:
+        spec, repairs = read_spec(path), list[Repair]()
+        if options.balance_inertia:
+            for fault in faults:
+                repairs += mend_inertia(spec, fault)
+        repairs += prepare(spec, options)
+        try:
+            if spec.compiler.fusestatic:
+                keep_frames(spec)
+            return compile_spec(spec), repairs
+        except ValueError as error:
+            # What breaks the rule by a rounding error alone, the compiler has to tell.
+            fault = str(error)
+            is_mended = options.balance_inertia and mend_inertia(read_spec(path), fault)
+            if fault in faults or not is_mended:
+                raise
+            faults.append(fault)
+
+
+def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> list[Repair]:
+    """Apply options to a specification.
 
     Args:
         spec: The specification, which was not compiled yet.
         options: As `load` was told.
+
+    Returns:
+        What they changed.
     """
-    apply_options(spec, options)
-    if spec.compiler.fusestatic:
-        keep_frames(spec)
+    repairs: list[Repair] = []
+    if options.balance_inertia:
+        repairs += balance_all(spec, "balance_inertia")
+    if not options.meshes:
+        repairs += delete_assets(spec, assets_of(spec, ["mesh"]), "meshes=False")
+    return repairs
 
 
 def keep_frames(spec: mujoco.MjSpec) -> None:
@@ -63,50 +98,37 @@ def keep_frames(spec: mujoco.MjSpec) -> None:
             spec.delete(site)
 
 
-def apply_options(spec: mujoco.MjSpec, options: ReadOptions) -> None:
-    """Write into a specification what `balance_inertia` and `meshes` ask for.
-
-    Args:
-        spec: The specification, which was not compiled yet.
-        options: As `load` was told.
-    """
-    if options.balance_inertia:
-        spec.compiler.balanceinertia = True
-    if not options.meshes:
-        delete_assets(spec, assets_of(spec, ["mesh"]), "meshes=False")
-
-
-def effects(path: Path, options: ReadOptions) -> Iterator[str]:
+def effects(path: Path, options: ReadOptions, repairs: Iterable[Repair]) -> Iterator[str]:
     """Yield what `balance_inertia` and `meshes` changed of a file, in sentences.
 
     Args:
         path: The file, which compiles with these options.
         options: As `load` was told.
+        repairs: As of `compile_with`.
     """
-    if options.balance_inertia:
-        yield from _balanced(path, options)
+    changes = [_balanced(repair) for repair in repairs if repair.quantity == "inertia"]
+    if changes:
+        yield f"balance_inertia: {few(changes, 5)}"
     if not options.meshes:
         yield from _without_meshes(path)
 
 
-def _balanced(path: Path, options: ReadOptions) -> Iterator[str]:
-    """Yield the moments of inertia that `balanceinertia` made equal."""
-    spec = read_spec(path)
-    stated = [stated_moments(body) for body in spec.bodies]
-    apply_options(spec, options)
-    spec.compiler.fusestatic = False
-    raw = spec.compile()
-    changes: list[str] = []
-    for body, moments in enumerate(stated):
-        if moments is None:
-            continue
-        used = np.sort(raw.body_inertia[body])[::-1]
-        if not np.allclose(moments, used, rtol=_SAME, atol=0):
-            name = raw.body(body).name or f"body {body}"
-            before = ", ".join(f"{moment:.4g}" for moment in moments)
-            changes.append(f"{name} had moments {before} kg m², has {used[0]:.4g} three times")
-    if changes:
-        yield f"balance_inertia: {few(changes, 5)}"
+def balanced_moments(path: Path) -> dict[str, float]:
+    """Return the moment [kg m^2] of each body that `balance_inertia` balances, by name."""
+    moments: dict[str, float] = {}
+    for repair in balance_all(read_spec(path), "balance_inertia"):
+        if isinstance(repair.used, tuple):
+            moments[repair.name] = repair.used[0]
+    return moments
+
+
+def _balanced(repair: Repair) -> str:
+    """Return how a balanced inertia was stated, and what is used instead."""
+    stated, used = repair.stated, repair.used
+    if not isinstance(stated, tuple) or not isinstance(used, tuple):
+        return repair.name
+    before = ", ".join(f"{moment:.4g}" for moment in stated)
+    return f"{repair.name} had moments {before} kg m², has {used[0]:.4g} three times"
 
 
 def _without_meshes(path: Path) -> Iterator[str]:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..interface.records import ReadOptions
 from ..models import what_is_there
-from .compiled import ENGINE_ERRORS, read_spec, reason_of
-from .reading import prepare
+from .reading import compile_with
+from .spec_files import ENGINE_ERRORS, reason_of
 
 _OPENED = re.compile(r"opening file '(.*)'")
 
@@ -78,9 +78,7 @@ def _options_that_read(path: Path, options: ReadOptions) -> str:
 def _compiles(path: Path, options: ReadOptions) -> bool:
     """Return whether MuJoCo compiles a file with some options."""
     try:
-        spec = read_spec(path)
-        prepare(spec, options)
-        spec.compile()
+        compile_with(path, options)
     except (ValueError, *ENGINE_ERRORS):
         return False
     return True

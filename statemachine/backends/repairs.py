@@ -16,7 +16,8 @@ that it accepts, and it is asked again, until it compiles:
 - a mesh, height field, texture or skin that cannot be read is deleted, and with it the geoms of its
   shape, and pairs and sensors of these; a site of its shape stays, as a sphere.
 
-Nothing is changed in a file that compiles.
+Nothing is changed in a file that compiles, but what its own `balanceinertia` asks for: that is
+listed in the same way.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ import numpy as np
 
 from ..errors import ModelError, one_line
 from ..interface import Array
-from .compiled import ENGINE_ERRORS, read_spec, reason_of
+from .spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 
 # The mass [kg] and the moment of inertia [kg m^2] that a body gets which moves and has none. MuJoCo
 # refuses what is not above 1e-15 (mjMINVAL).
 LEAST = 1e-12
 _SMALLEST = 1e-15
+# What an eigenvalue of an inertia must be at least (mjEPS) [kg m^2].
+_LEAST_EIGENVALUE = 1e-14
 # How MuJoCo names a fault, and the element that has it.
 _UNBALANCED, _NOT_POSITIVE = "must satisfy A + B >= C", "must have positive eigenvalues"
 _NO_MASS = "must be larger than mjMINVAL"
@@ -147,10 +150,12 @@ def compile_mended(
         if fuse_static is not None:
             spec.compiler.fusestatic = fuse_static
         repairs: list[Repair] = []
+        if spec.compiler.balanceinertia:
+            repairs += balance_all(spec, "balanceinertia of the <compiler>")
         for fault in faults:
             repairs += _mend(spec, fault)
         try:
-            compiled = spec.compile()
+            compiled = compile_spec(spec)
         except (ValueError, *ENGINE_ERRORS) as error:
             fault = str(error)
             if fault in faults or not _mend(read_spec(path, visuals), fault):
@@ -228,6 +233,38 @@ def stated_moments(body: Any) -> Array | None:
     if not body.explicitinertial:
         return None
     return np.sort(body.inertia)[::-1]
+
+
+def balance_all(spec: mujoco.MjSpec, reason: str) -> list[Repair]:
+    """Balance every inertia that breaks A + B >= C, or that has a moment which is not positive.
+
+    Args:
+        spec: The specification, which was not compiled yet.
+        reason: Why.
+
+    Returns:
+        A record of each.
+    """
+    repairs: list[Repair] = []
+    for body in spec.bodies:
+        moments = stated_moments(body)
+        if moments is None or not moments.any():
+            continue
+        largest, middle, smallest = moments.tolist()
+        if largest > middle + smallest or smallest < _LEAST_EIGENVALUE:
+            repairs += _balance(spec, body, _Fault(reason, body.name, None, None))
+    return repairs
+
+
+def mend_inertia(spec: mujoco.MjSpec, message: str) -> list[Repair]:
+    """Balance the inertia that MuJoCo refuses; none where its fault is another one.
+
+    Args:
+        spec: The specification, which was not compiled yet.
+        message: What MuJoCo says.
+    """
+    is_of_inertia = _UNBALANCED in message or _NOT_POSITIVE in message
+    return _mend(spec, message) if is_of_inertia else []
 
 
 def _balance(spec: mujoco.MjSpec, body: Any, fault: _Fault) -> list[Repair]:

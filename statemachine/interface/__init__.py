@@ -6,6 +6,8 @@ A simulator is a state machine. A `Model` never changes; a `Data` holds all that
 - `records`: what a backend says of itself, and what it hands out
 - `checks`: what is checked of an argument before an engine sees it
 - `options`: what `Model.replace` takes
+- `read_options`: which options act only while a file is read
+- `sites`: which site stands for the fingertip
 - `model`: the constants of a simulation
 - `turns`: one thread at a time
 - `data`: what changes, and what follows from it
@@ -32,7 +34,6 @@ from .records import (
     Keyframe,
     State,
     read_only,
-    usual_site,
 )
 from .verbs import forward, get_state, make_data, reset, set_state, step
 
@@ -62,5 +63,4 @@ __all__ = [
     "reset",
     "set_state",
     "step",
-    "usual_site",
 ]

@@ -16,6 +16,7 @@ from ..release_names import engine_of
 from .checks import TINY, index_of, unsupported, whole_number
 from .records import (
     AS_WRITTEN,
+    READ_OPTIONS,
     Array,
     Capabilities,
     Ints,
@@ -23,7 +24,6 @@ from .records import (
     Keyframe,
     Sizes,
     StateLayout,
-    moving_sites,
     read_only,
 )
 
@@ -165,6 +165,8 @@ class Model(ABC):
     @property
     def moving_sites(self) -> tuple[bool, ...]:
         """Whether joints move each site."""
+        from .sites import moving_sites
+
         parents, jointed = self.body_parentid.tolist(), self.jnt_bodyid.tolist()
         return moving_sites(self.site_bodyid.tolist(), parents, jointed)
 
@@ -230,9 +232,13 @@ class Model(ABC):
             UnsupportedError: This backend has no such option.
             BadInputError: The value has the wrong shape, kind or size.
         """
-        from .options import checked_options, without_read_options
+        from .options import checked_options
 
-        checked = checked_options(self, without_read_options(self, options))
+        if not options.keys().isdisjoint(READ_OPTIONS):
+            from .read_options import without_read_options
+
+            options = without_read_options(self, options)
+        checked = checked_options(self, options)
         return self._replace(checked)._started_as(self, checked)
 
     def with_compiled(self, compiled: Any) -> Model:

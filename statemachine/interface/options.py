@@ -17,7 +17,7 @@ from .checks import (
     as_vector,
     unsupported,
 )
-from .records import OPTIONS, READ_OPTIONS, Array, Ints, JointType, ReadOptions
+from .records import OPTIONS, Array, Ints, JointType
 
 OptionValue = bool | int | float | str | Sequence[float] | Array  # of what `replace` takes
 # One number for each degree of freedom.
@@ -58,34 +58,6 @@ class OptionFacts(HasCapabilities, Protocol):
     def actuator_kp(self) -> Array: ...
     @property
     def actuator_names(self) -> tuple[str, ...]: ...
-
-
-class WasRead(HasCapabilities, Protocol):
-    """A Model, as far as options of `load` are concerned."""
-
-    @property
-    def read_options(self) -> ReadOptions: ...
-
-
-def without_read_options(of: WasRead, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options without those that act only while a file is read.
-
-    Args:
-        of: The Model that others are to be given to.
-        options: Values by name, as the caller gave them.
-
-    Raises:
-        UnsupportedError: One of those has another value than when the file of the Model was read.
-        BadInputError: One of those is not on or off.
-    """
-    others: dict[str, Any] = {}
-    for name, value in options.items():
-        if name not in READ_OPTIONS:
-            others[name] = value
-        elif as_switch(value, name) is not getattr(of.read_options, name):
-            reason = f"it acts only while a file is read: load(…, {name}={value})"
-            raise unsupported(of, name, reason)
-    return others
 
 
 def checked_options(of: OptionFacts, options: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, Literal
@@ -81,23 +81,14 @@ class ReadOptions:
     """How the file of a Model is read, beside what it says itself: options of `load` alone.
 
     Attributes:
-        balance_inertia: Whether principal moments of an inertia that break A + B >= C, which
-            MuJoCo refuses, all become their mean.
+        balance_inertia: Whether principal moments of an inertia that break A + B >= C, or of which
+            one is not positive, all become their mean: MuJoCo refuses such an inertia.
         meshes: Whether shapes that are meshes are read; without them the file needs none of
             their files, and nothing touches, or weighs, what they alone gave shape.
     """
 
     balance_inertia: bool = False
     meshes: bool = True
-
-    def arguments(self) -> dict[str, bool]:
-        """Return those that `load` must be told, by name: all that are not as by default."""
-        told: dict[str, bool] = {}
-        for name in READ_OPTIONS:
-            value = getattr(self, name)
-            if value is not getattr(AS_WRITTEN, name):
-                told[name] = value
-        return told
 
 
 AS_WRITTEN = ReadOptions()
@@ -278,40 +269,3 @@ class State:
     def time(self) -> float:
         """Simulated time [s]."""
         return float(self["time"][0])
-
-
-def usual_site(names: Sequence[str], moving: Sequence[bool] | None = None) -> int | None:
-    """Return the number of the site that stands for the fingertip where nobody names one.
-
-    The one that is called gripperframe, else the last that joints move; None if there is none.
-
-    Args:
-        names: Of the sites.
-        moving: Whether joints move each; None where that is not known.
-    """
-    if "gripperframe" in names:
-        return names.index("gripperframe")
-    for site in reversed(range(len(names))):
-        if moving is None or moving[site]:
-            return site
-    return None
-
-
-def moving_sites(
-    site_bodyid: Iterable[int], body_parentid: Sequence[int], jnt_bodyid: Collection[int]
-) -> tuple[bool, ...]:
-    """Return whether joints move each site.
-
-    Args:
-        site_bodyid: The body of each site.
-        body_parentid: The parent of each body, in any order.
-        jnt_bodyid: The body of each joint.
-    """
-    moving: list[bool] = []
-    for owner in site_bodyid:
-        body, above = owner, set[int]()
-        while body not in jnt_bodyid and body not in above:
-            above.add(body)
-            body = body_parentid[body]
-        moving.append(body in jnt_bodyid)
-    return tuple(moving)

@@ -25,8 +25,8 @@ from ..interface import (
     make_data,
     reset,
     step,
-    usual_site,
 )
+from ..interface.sites import usual_site
 from ..lab.recordings import Trace
 from ..measures import Gap, distances, joint_gap
 

@@ -23,23 +23,18 @@ import numpy as np
 from ...errors import EngineError, EngineWarning, ModelError, one_line
 from ...interface import Capabilities
 from ...interface.checks import unsupported_by
+from ...interface.read_options import told
 from ...interface.records import AS_WRITTEN, Arrays, Defaults, ReadOptions
 from ...models import AnyPath
 from ...release_names import is_release, version_of
 from ...releases import python_of
 from ..binary import is_binary
-from ..compiled import (
-    ENGINE_ERRORS,
-    check_numbers,
-    compiler_warnings,
-    facts,
-    fastest,
-    read_spec,
-)
+from ..compiled import check_numbers, compiler_warnings, facts, fastest
 from ..edits import put
 from ..hidden_data import HiddenModel
 from ..mujoco_backend import MujocoModel
 from ..mujoco_backend import load as load_installed
+from ..spec_files import ENGINE_ERRORS, read_spec
 from ..unshared import UnsharedElement, unshared_elements
 from . import release_child as child
 from .engine_process import AnswerError, LoadedModel, LostError, ServedEngine, ServedWorld, Server
@@ -170,12 +165,17 @@ def _source(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineSou
     if path.suffix.lower() == ".urdf":
         from ..file_text import urdf_text
 
-        text = urdf_text(path, options=options)
+        moments: dict[str, float] = {}
+        if options.balance_inertia:
+            from ..reading import balanced_moments
+
+            moments = balanced_moments(path)
+        text = urdf_text(path, options=options, moments=moments)
         return EngineSource() if text is None else EngineSource(text)
     if options == AS_WRITTEN:
         return EngineSource()
     if not is_release(engine.name):
-        wanted = next(iter(options.arguments()))
+        wanted = next(iter(told(options)))
         raise unsupported_by(engine.name, wanted, "it reads an MJCF as it is written")
     return EngineSource(read=asdict(options))
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ...backends.binary import is_binary
-from ...backends.compiled import ENGINE_ERRORS, read_spec, reason_of
-from ...backends.reading import prepare
+from ...backends.reading import keep_frames, prepare
+from ...backends.spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 from ...errors import ModelError
 from ...installed import require
 from ...interface.records import ReadOptions
@@ -62,6 +62,8 @@ def with_parts(
     try:
         to, of = read_spec(taker), read_spec(giver)
         prepare(to, options)
+        if to.compiler.fusestatic:
+            keep_frames(to)
     except (ValueError, *ENGINE_ERRORS) as error:
         reason = reason_of(error)
         raise ModelError(f"{taker.name} with parts of {giver.name}: {reason}") from error
@@ -77,7 +79,7 @@ def with_parts(
         for geom in filter(_is_floor, of.worldbody.geoms):
             _copy(to.worldbody.add_geom(name=geom.name), geom)
     try:
-        return to.compile()
+        return compile_spec(to)
     except (ValueError, *ENGINE_ERRORS) as error:
         reason = reason_of(error)
         raise ModelError(f"{taker.name} with parts of {giver.name}: {reason}") from error

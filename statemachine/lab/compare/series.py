@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...interface import Array, Ints, JointType, usual_site
+from ...interface import Array, Ints, JointType
+from ...interface.sites import usual_site
 from ...measures import QUANTITIES, SAME, common_moments, distances, same_pairs
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings import Header, Trace

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ...backends import load
-from ...errors import StateMachineError
+from ...errors import ModelError, StateMachineError
 from ...installed import WITNESS
-from ...kinematics import Kinematics, shared_joints
+from ...kinematics import Kind, Kinematics, shared_joints
 from ...measures import (
     distances,
 )
@@ -88,15 +88,31 @@ def _readable(file: Path, header: Header, site: str) -> Kinematics:
             names = [header.joints[k] for k in shared_joints(kinematics, header.joints)]
         except StateMachineError:
             continue
-        if site in kinematics.site_names:
+        if _kind_of(kinematics, site) is not None:
             return kinematics if kinematics.joint_names == tuple(names) else Kinematics(path, names)
     return Kinematics.same_reading(load(file))
 
 
+def _kind_of(kinematics: Kinematics, site: str) -> Kind | None:
+    """Return as what a witness knows a site; of a URDF a site is the frame of a link.
+
+    Args:
+        kinematics: Of the witness.
+        site: Its name.
+    """
+    if site in kinematics.site_names:
+        return "site"
+    is_urdf = kinematics.path.suffix.lower() == ".urdf"
+    return "body" if is_urdf and site in kinematics.body_names else None
+
+
 def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
-    header = trace.header
+    """Return how far a site is from where the witness puts it, at most [m]."""
+    header, kind = trace.header, _kind_of(kinematics, site)
+    if kind is None:
+        raise ModelError(f"{kinematics.path.name} has no site named {site!r}")
     joints = [header.joint_labels[k] for k in shared_joints(kinematics, header.joints)]
     qpos = [trace.qpos[:, joint_columns(header, name).qpos] for name in joints]
-    theirs = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site).pos
+    theirs = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site, kind).pos
     ours, _ = trace.site(site)
     return float(distances(ours, theirs).max())

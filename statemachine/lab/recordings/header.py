@@ -14,7 +14,8 @@ from ...errors import TraceError
 from ...interface import OPTIONS, JointType
 from ...interface.checks import HUGE
 from ...interface.options import OptionValue
-from ...interface.records import READ_OPTIONS, moving_sites
+from ...interface.records import READ_OPTIONS
+from ...interface.sites import moving_sites
 from ...release_names import engine_of
 from ..runs.provenance import Provenance
 

@@ -37,6 +37,7 @@ from ...interface import (
 )
 from ...interface.checks import HUGE
 from ...interface.options import OptionValue
+from ...interface.read_options import told
 from ...interface.records import Arrays, Defaults
 from ..runs.drive import Controller, Progress, drive, part_of, silent, steps_in
 from ..runs.provenance import provenance
@@ -166,7 +167,7 @@ def _header(
     model: Model, controller: Controller | None, start: RunStart, metadata: RunMetadata
 ) -> Header:
     """Return what is known of a run before it begins."""
-    options: dict[str, OptionValue] = {**model.read_options.arguments()}
+    options: dict[str, OptionValue] = {**told(model.read_options)}
     options |= {name: _plain(value) for name, value in metadata.options.items()}
     return Header(
         experiment=_experiment(metadata, controller),

@@ -26,7 +26,7 @@ from ...errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ...installed import DEFAULT, silence
 from ...interface import Array, Data, Model, forward, make_data, reset
 from ...interface.options import OptionValue
-from ...interface.records import usual_site
+from ...interface.sites import usual_site
 from ...measures import ContactNames
 from ...measures.text import listed
 from ...models import resolve

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from ...errors import BadInputError, DivergedError, TraceError
-from ...interface import Array, Ints, JointType, Model, usual_site
+from ...interface import Array, Ints, JointType, Model
+from ...interface.sites import usual_site
 from ...measures import (
     QUANTITIES,
     SAME,

@@ -1,0 +1,64 @@
+"""Options that act only while a file is read, where they stand beside others."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any, Protocol
+
+from .checks import HasCapabilities, as_switch, unsupported, unsupported_by
+from .records import AS_WRITTEN, READ_OPTIONS, ReadOptions
+
+
+class WasRead(HasCapabilities, Protocol):
+    """A Model, as far as options of `load` are concerned."""
+
+    @property
+    def read_options(self) -> ReadOptions: ...
+
+
+def told(options: ReadOptions) -> dict[str, bool]:
+    """Return the options that `load` must be told, by name: all that are not as by default."""
+    named: dict[str, bool] = {}
+    for name in READ_OPTIONS:
+        value = getattr(options, name)
+        if value is not getattr(AS_WRITTEN, name):
+            named[name] = value
+    return named
+
+
+def check_takes_read_options(
+    backend: str, parameters: Collection[str], options: ReadOptions
+) -> None:
+    """Check that the loader of a backend can be told how a file is read.
+
+    Args:
+        backend: Its name.
+        parameters: Names of what its loader takes.
+        options: One at least is not as by default.
+
+    Raises:
+        UnsupportedError: It reads files in its own way.
+    """
+    if "read_options" not in parameters:
+        raise unsupported_by(backend, next(iter(told(options))), "it reads files in its own way")
+
+
+def without_read_options(of: WasRead, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options without those that act only while a file is read.
+
+    Args:
+        of: The Model that others are to be given to.
+        options: Values by name, as the caller gave them.
+
+    Raises:
+        UnsupportedError: One of those has another value than when the file of the Model was read.
+        BadInputError: One of those is not on or off.
+    """
+    others: dict[str, Any] = {}
+    for name, value in options.items():
+        if name not in READ_OPTIONS:
+            others[name] = value
+        elif as_switch(value, name) is not getattr(of.read_options, name):
+            reason = f"it acts only while a file is read: load(…, {name}={value})"
+            raise unsupported(of, name, reason)
+    return others
