@@ -518,7 +518,7 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
         *("place (x) of lower", "place (z) of lower"),
         *("inertia (diaginertia[1]) of lower", "inertia (diaginertia[2]) of lower"),
         *("range (lower end) of shoulder", "range (upper end) of shoulder"),
-        *("gains (kp) of shoulder", "gains (biasprm[2]) of shoulder"),
+        *("gains (kp) of shoulder", "gains (kv) of shoulder"),
         *("gravity (x)", "gravity (z)"),
     }
     assert is_brought(found)

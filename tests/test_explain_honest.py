@@ -141,7 +141,7 @@ ONE_CAUSE: dict[str, tuple[dict[str, str], dict[str, str], str, str, tuple[Any, 
         {"actuator": MUSCLE.format("-.2")},
         "wave",
         "length range of m",
-        ("lengthrange", [-0.5, 0.5], [-0.2, 0.5], ""),
+        ("lengthrange", [-0.5, 0.5], [-0.2, 0.5], "rad"),
         1,
     ),
     "a start at another time": (

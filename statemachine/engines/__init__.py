@@ -15,7 +15,7 @@ import functools
 import importlib
 import importlib.metadata
 from abc import abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from types import ModuleType
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         Edit,
         EngineTerm,
         ModelDifference,
+        SpecEdit,
         UncommandedJoint,
         WayBack,
     )
@@ -303,6 +304,30 @@ class RawEngine:
     @abstractmethod
     def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
         """A copy of a compiled model with these edits, and all that follows from them."""
+
+    @_needed
+    @abstractmethod
+    def can_be_respecified(self, path: Path) -> bool:
+        """Whether a file has a description that can be compiled anew; a binary one has none."""
+
+    @_needed
+    @abstractmethod
+    def respecified(self, path: Path, raw: Any, edits: Sequence[SpecEdit]) -> Any:
+        """The compiled model of a file with some elements set otherwise.
+
+        Args:
+            path: The file.
+            raw: What was compiled of it, with the options that were set since then.
+            edits: What is set.
+
+        Raises:
+            ModelError: It cannot be compiled so.
+        """
+
+    @_needed
+    @abstractmethod
+    def in_places_of(self, before: Any, after: Any, edits: Iterable[Edit]) -> tuple[Edit, ...]:
+        """Edits of one compiled model as those of another, from `respecified`."""
 
     @_needed
     @abstractmethod

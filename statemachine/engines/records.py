@@ -144,6 +144,39 @@ Edit = tuple[str, tuple[int | slice, ...], Any]
 
 
 @dataclass(frozen=True)
+class ElementReference:
+    """An element of a compiled model, which another one refers to by its name.
+
+    Attributes:
+        kind: "joint", "site", "tendon", "body", …
+        element: Its id.
+    """
+
+    kind: str
+    element: int
+
+
+@dataclass(frozen=True)
+class SpecEdit:
+    """What is set in the description of a model, which is then compiled anew.
+
+    So is undone what no edit of a compiled model can undo, such as another size of the state.
+
+    Attributes:
+        kind: Of the element: "actuator", "body".
+        element: Its id in the compiled model.
+        attribute: Its name in MuJoCo's MjSpec, as "dyntype"; "activations" of an actuator are
+            its entries of act in all keyframes, one keyframe after the other.
+        value: What is to stand there: a number, some, or an element that is referred to.
+    """
+
+    kind: str
+    element: int
+    attribute: str
+    value: float | tuple[float, ...] | ElementReference
+
+
+@dataclass(frozen=True)
 class DifferingQuantity:
     """One quantity in which two sides differ.
 
@@ -173,6 +206,9 @@ class ModelDifference:
         edits: What brings the second model to the first.
         edits_one: What brings the first to the second, where only it can be changed.
         refused: Why neither can be brought to the other; "" if one can.
+        spec_edits: What brings the second to the first where it has to be compiled anew; needs a
+            file that can be.
+        spec_edits_one: What brings the first to the second so, where the second's file cannot.
         only_read: Whether the engine does not use it, so that nothing depends on it but a function
             of the user's that reads it.
     """
@@ -184,6 +220,8 @@ class ModelDifference:
     edits: tuple[Edit, ...] = ()
     edits_one: tuple[Edit, ...] = ()
     refused: str = ""
+    spec_edits: tuple[SpecEdit, ...] = ()
+    spec_edits_one: tuple[SpecEdit, ...] = ()
     only_read: bool = False
 
     @property

@@ -4,15 +4,31 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...backends.controls import ctrl_owners
 from ...installed import require
-from ..records import Counterparts, DifferingQuantity, Edit, ModelDifference
-from ._sides import Sides, name_of, plain, quantity_of, same, word_in, zeros
+from ..records import (
+    Counterparts,
+    DifferingQuantity,
+    Edit,
+    ElementReference,
+    ModelDifference,
+    SpecEdit,
+)
+from ._gains import (
+    dynamics,
+    gains,
+    has_own_state,
+    in_units_of,
+    is_filter,
+    motion_of,
+    unit_of_ctrl,
+)
+from ._sides import Sides, copies, name_of, same, word_in, zeros
 
 ORDER_OF_SENSORS = "order of sensordata"
 # mjtTrn: what an actuator acts on, and from which site it measures.
@@ -24,9 +40,18 @@ _DRIVES = {
     4: ("site", "site"),
     5: ("body",),
 }
+# mjtTrn: the attributes of an MjSpec's actuator that refer to what it acts on.
+_REFERENCES = {
+    0: ("target",),
+    1: ("target",),
+    3: ("target",),
+    4: ("target", "refsite"),
+    5: ("target",),
+}
 _SO3 = 6  # mjtTrn: of a ball joint, or of a site in the frame of another
 # Where the law of an actuator's own state is another, these are one thing with it.
-_OF_A_LAW = ("gains", "dynamics", "range of its activation", "length range")
+_OF_A_FILTER = ("dynamics", "range of its activation")
+_OF_A_LAW = ("gains", *_OF_A_FILTER, "length range")
 _STILL = (
     *("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
     *("actuator_armature", "actuator_damping"),
@@ -42,49 +67,144 @@ def drives(sides: Sides) -> Iterator[ModelDifference]:
     for a, b in actuators:
         yield from _laws(sides, a, b)
         yield from _delay(sides, a, b)
-        targets = [_targets(sides, side, k) for side, k in enumerate((a, b))]
-        if targets[0][0] != targets[1][0]:
-            values = (DifferingQuantity("drives", *(words for _, words in targets)),)
-            yield sides.tell(
-                "transmission",
-                "actuator",
-                a,
-                values,
-                refused="it drives another thing, or in another way",
-            )
+        yield from _transmission(sides, a, b)
     if left.opt.disableactuator or right.opt.disableactuator:
         yield from sides.rows("actuator", actuators, "group")
     for a, b in places:
-        name = name_of(left, "actuator", int(owners[0][a]))
-        yield from sides.rows("actuator", [(a, b)], "control", name)
+        actuator = int(owners[0][a])
+        name = name_of(left, "actuator", actuator)
+        for row in sides.rows("actuator", [(a, b)], "control", name):
+            values = tuple(
+                replace(value, unit=unit_of_ctrl(left, actuator)) for value in row.values
+            )
+            yield replace(row, values=values)
     yield from sides.extras("actuator", actuators, lambda raw, k: zeros(_STILL, raw, k))
 
 
 def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """Rows of an actuator; together, where its own state moves by another law."""
-    laws = _law(sides.left, a), _law(sides.right, b)
-    sized = laws[0][1:] == laws[1][1:]
-    rows = list(sides.rows("actuator", [(a, b)]))
-    values = (quantity_of("actuator_dyntype", laws[0][0], laws[1][0]),)
-    if not sized:
-        why = "its own state has another size"
-        rows = [row for row in rows if row.subject != "dynamics"]
-        rows.append(sides.tell("law of its state", "actuator", a, values, refused=why))
-    elif laws[0] != laws[1]:
-        of_law = [row for row in rows if row.subject in _OF_A_LAW]
-        edits: list[Edit] = [("actuator_dyntype", (b,), laws[0][0])]
-        edits += [edit for row in of_law for edit in row.edits]
-        values += tuple(value for row in of_law for value in row.values)
-        yield sides.tell("law", "actuator", a, values, edits)
-        rows = [row for row in rows if row not in of_law]
-    yield from rows
+    rows = list(_rows(sides, a, b))
+    ours, theirs = _Law.of(sides.left, a), _Law.of(sides.right, b)
+    if ours == theirs:
+        yield from rows
+        return
+    filters = all(is_filter(raw, k) or not has_own_state(raw, k) for raw, k in _both(sides, a, b))
+    together = _OF_A_FILTER if filters else _OF_A_LAW
+    if ours.size != theirs.size:
+        together = _OF_A_FILTER
+    of_law = [row for row in rows if row.subject in together]
+    values = list(dynamics(sides.left, a, sides.right, b))
+    told = {value.quantity for value in values}
+    for row in of_law:
+        values += [value for value in row.values if value.quantity not in told]
+    subject = "filter" if filters else "law"
+    if ours.size == theirs.size:
+        edits = [edit for row in of_law for edit in row.edits]
+        own = copies(("actuator_dyntype", "actuator_dynprm", "actuator_actearly"), sides.left, a, b)
+        edits += [edit for edit in own if edit[0] not in {name for name, _, _ in edits}]
+        yield sides.tell(subject, "actuator", a, values, edits)
+    elif ours.controls != theirs.controls:
+        why = "it takes other numbers of ctrl"
+        yield sides.tell(subject, "actuator", a, values, refused=why)
+    else:
+        difference = sides.tell(subject, "actuator", a, values)
+        yield replace(
+            difference,
+            spec_edits=_given_law(sides.raws, (a, b), to=1),
+            spec_edits_one=_given_law(sides.raws, (a, b), to=0),
+        )
+    yield from (row for row in rows if row not in of_law)
 
 
-def _law(raw: Any, k: int) -> tuple[int, ...]:
-    """How an actuator's own state moves, how long it is, and which numbers of ctrl it takes."""
-    number = int(raw.actuator_ctrlnum[k])
-    spec = int(raw.actuator_ctrlspec[k]) if number > 1 else 0  # of one it follows from the gains
-    return int(raw.actuator_dyntype[k]), int(raw.actuator_actnum[k]), number, spec
+def _both(sides: Sides, a: int, b: int) -> tuple[tuple[Any, int], tuple[Any, int]]:
+    return (sides.left, a), (sides.right, b)
+
+
+def _rows(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """Rows of an actuator, gains and parameters by the names that they have in an MJCF."""
+    left, right = sides.raws
+    for row in sides.rows("actuator", [(a, b)]):
+        if row.subject == "gains":
+            values = gains(left, a, right, b)
+            if values:  # else the law does not read the parameters that differ
+                yield replace(row, values=values)
+        elif row.subject == "dynamics":
+            values = dynamics(left, a, right, b)
+            if values:
+                yield replace(row, values=values)
+        else:
+            yield in_units_of(motion_of(left, a), row)
+
+
+@dataclass(frozen=True)
+class _Law:
+    """How the own state of an actuator moves.
+
+    Attributes:
+        kind: By which law: an entry of mjtDyn.
+        length: How many numbers the state has.
+        controls: How many numbers of ctrl it takes.
+        meaning: What these mean; 0 of one, whose meaning follows from the gains.
+    """
+
+    kind: int
+    length: int
+    controls: int
+    meaning: int
+
+    @classmethod
+    def of(cls, raw: Any, k: int) -> _Law:
+        """Read that of an actuator."""
+        controls = int(raw.actuator_ctrlnum[k])
+        meaning = int(raw.actuator_ctrlspec[k]) if controls > 1 else 0
+        return cls(int(raw.actuator_dyntype[k]), int(raw.actuator_actnum[k]), controls, meaning)
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """What no edit of a compiled model can change."""
+        return self.length, self.controls, self.meaning
+
+
+def _given_law(
+    raws: tuple[Any, Any], actuators: tuple[int, int], *, to: int
+) -> tuple[SpecEdit, ...]:
+    """Return what gives an actuator of one side the law of its counterpart.
+
+    Args:
+        raws: Both mjModels.
+        actuators: The ids of the actuator in each.
+        to: The side that is changed, 0 or 1.
+    """
+    source, target = raws[1 - to], raws[to]
+    k, there = actuators[1 - to], actuators[to]
+    states = has_own_state(source, k)
+    limited = states and bool(source.actuator_actlimited[k])
+    kept = tuple(source.actuator_actrange[k].tolist()) if limited else (0.0, 0.0)
+    usual = int(source.actuator_dyntype[k]) != int(require("mujoco").mjtDyn.mjDYN_USER)
+    values: dict[str, float | tuple[float, ...]] = {
+        "dyntype": int(source.actuator_dyntype[k]),
+        "dynprm": tuple(source.actuator_dynprm[k].tolist()),
+        "actearly": bool(source.actuator_actearly[k]),
+        "actlimited": int(limited),
+        "actrange": kept,
+        "actdim": -1 if usual else int(source.actuator_actnum[k]),
+        "activations": _activations(source, k, target),
+    }
+    return tuple(SpecEdit("actuator", there, name, value) for name, value in values.items())
+
+
+def _activations(source: Any, k: int, target: Any) -> tuple[float, ...]:
+    """Return what an actuator has of act in each keyframe of another model, by its name; else 0."""
+    start, number = int(source.actuator_actadr[k]), int(source.actuator_actnum[k])
+    names = [source.key(key).name for key in range(source.nkey)]
+    values: list[float] = []
+    for key in range(target.nkey):
+        name = target.key(key).name
+        if name in names and number:
+            values += source.key_act[names.index(name), start : start + number].tolist()
+        else:
+            values += [0.0] * number
+    return tuple(values)
 
 
 def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
@@ -93,15 +213,61 @@ def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     sizes = left.actuator_history[a], right.actuator_history[b]
     back = bool(sizes[0][0] and not sizes[1][0])
     yield from sides.rows("actuator", [(a, b)], "delay", back=back)
-    if left.actuator_delay[a] and right.actuator_delay[b] and not same(*sizes):
-        values = (DifferingQuantity("history", plain(sizes[0]), plain(sizes[1])),)
-        yield sides.tell(
-            "memory of commands",
-            "actuator",
-            a,
-            values,
-            refused="it keeps another number of commands, or reads between them in another way",
-        )
+    if not (left.actuator_delay[a] and right.actuator_delay[b]) or same(*sizes):
+        return
+    values: list[DifferingQuantity] = []
+    for name, ours, theirs in zip(("nsample", "interp"), sizes[0], sizes[1], strict=True):
+        if ours != theirs:
+            values.append(DifferingQuantity(name, int(ours), int(theirs)))
+    difference = sides.tell("memory of commands", "actuator", a, values)
+    yield replace(
+        difference,
+        spec_edits=_given_memory(b, sizes[0]),
+        spec_edits_one=_given_memory(a, sizes[1]),
+    )
+
+
+def _given_memory(actuator: int, history: Any) -> tuple[SpecEdit, ...]:
+    """Return what gives an actuator a memory of so many commands, read so: (2,) as `history`."""
+    return (
+        SpecEdit("actuator", actuator, "nsample", int(history[0])),
+        SpecEdit("actuator", actuator, "interp", int(history[1])),
+    )
+
+
+def _transmission(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """What an actuator drives, and from which site it measures."""
+    ours, theirs = _targets(sides, 0, a), _targets(sides, 1, b)
+    if ours[0] == theirs[0]:
+        return
+    value = DifferingQuantity("drives", ours[1], theirs[1])
+    edits = _given_transmission(sides, a, b)
+    why = "" if edits else "it drives another thing, or in another way"
+    difference = sides.tell("transmission", "actuator", a, (value,), refused=why)
+    yield replace(difference, spec_edits=edits)
+
+
+def _given_transmission(sides: Sides, a: int, b: int) -> tuple[SpecEdit, ...]:
+    """Return what lets the second's actuator drive what the first's does; () if it has no such."""
+    kind, targets = int(sides.left.actuator_trntype[a]), _named_targets(sides, 0, a)
+    if kind not in _REFERENCES or any(there < 0 for _, there in targets):
+        return ()
+    edits = [SpecEdit("actuator", b, "trntype", kind)]
+    for attribute, (target, there) in zip(_REFERENCES[kind], targets, strict=False):
+        edits.append(SpecEdit("actuator", b, attribute, ElementReference(target, there)))
+    return tuple(edits)
+
+
+def _named_targets(sides: Sides, side: int, k: int) -> list[tuple[str, int]]:
+    """Return what an actuator refers to: kinds, and ids of the second model."""
+    raw = sides.raws[side]
+    kinds = _DRIVES.get(int(raw.actuator_trntype[k]), ())
+    ids = raw.actuator_trnid[k].tolist()
+    return [
+        (kind, sides.there(side, kind, number))
+        for kind, number in zip(kinds, ids, strict=False)
+        if number >= 0
+    ]
 
 
 def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:

@@ -11,9 +11,9 @@ import numpy as np
 from ...installed import require
 from ...interface import Array, JointType
 from ...measures.text import grouped
-from ...rotations import HERE, Placement, matrix_from_quat
-from ..description.records import OF_A_SLIDE
-from ..records import DifferingQuantity, Edit, ModelDifference
+from ...rotations import HERE, Placement, angle_between, matrix_from_quat
+from ..records import TURNED, DifferingQuantity, Edit, ModelDifference
+from ._gains import Motion, in_units_of, motion_of_tendon
 from ._geoms import NO_TOUCH, touches
 from ._sides import Pairs, Sides, name_of, plain, quantity_of, quat_of, same, zeros
 
@@ -26,6 +26,7 @@ _SLACK = (
     *("tendon_frictionloss", "tendon_armature"),
 )
 _CONNECT, _WELD, _JOINT, _TENDON = range(4)  # mjtEq
+_KINDS_OF_COUPLING = {_JOINT: "joint", _TENDON: "tendon"}
 _BODY = 1  # mjtObj
 _KEEPS = {_BODY: "body", 3: "joint", 5: "geom", 6: "site", 18: "tendon"}  # mjtObj
 _NEAR = 1e-9  # [m], and of entries of matrices: as a file with ten digits leaves it
@@ -43,7 +44,9 @@ def elements(sides: Sides) -> Iterator[ModelDifference]:
     tendons = sorted(sides.ids["tendon"].items())
     for a, b in tendons:
         yield from _path(sides, a, b)
-    yield from sides.rows("tendon", tendons)
+    for a, b in tendons:
+        for row in sides.rows("tendon", [(a, b)]):
+            yield in_units_of(motion_of_tendon(sides.left, a), row)
     yield from sides.extras("tendon", tendons, lambda raw, k: zeros(_SLACK, raw, k))
 
 
@@ -74,15 +77,8 @@ def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         edits = tuple(edit for difference in rows for edit in difference.edits)
         differences.append(replace(rows[0], edits=edits))
     for difference in differences:
-        yield _of_a_slide(difference) if kind == JointType.SLIDE else difference
-
-
-def _of_a_slide(difference: ModelDifference) -> ModelDifference:
-    """Give a difference of a joint the units that its quantities have of a slide."""
-    values = tuple(
-        replace(value, unit=OF_A_SLIDE.get(value.unit, "")) for value in difference.values
-    )
-    return replace(difference, values=values)
+        motion: Motion = "translation" if kind == JointType.SLIDE else "rotation"
+        yield in_units_of(motion, difference)
 
 
 def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDifference]:
@@ -131,23 +127,65 @@ def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]
 
 
 def equalities(sides: Sides) -> Iterator[ModelDifference]:
-    """Equalities; the two bodies of a connect or a weld have no order."""
+    """Equalities; the two things that one keeps together have no order, where it can be read so."""
     pairs = sorted(_match(sides))
     yield from sides.rows("equality", pairs)
     for a, b in pairs:
-        if not _is_of_bodies(sides, a):
-            yield from sides.rows("equality", [(a, b)], "kept")
-            continue
-        wanted, there = _wanted(sides, a, b), np.array(sides.right.eq_data[b])
-        used = 6 if int(sides.right.eq_type[b]) == _CONNECT else 11
-        off = np.abs(wanted - there)[:used]
-        if used == 11:  # a quaternion and its negative turn alike
-            turns = [matrix_from_quat(_unit(data[6:10])) for data in (wanted, there)]
-            off = np.append(off[[*range(6), 10]], np.abs(turns[0] - turns[1]).max())
-        if off.max() > _NEAR:
-            value = quantity_of("eq_data", wanted[:used], there[:used])
-            yield sides.tell("parameters", "equality", a, (value,), [("eq_data", (b,), wanted)])
+        wanted = _wanted(sides, a, b)
+        values = list(_of_parameters(sides, b, wanted))
+        if values:
+            edits = [("eq_data", (b,), wanted)]
+            yield sides.tell("parameters", "equality", a, values, edits)
+        if _is_exchanged(sides, a, b) and not same(abs(float(sides.left.eq_data[a][1])), 1.0):
+            yield _softened_by_another(sides, a, b)
     yield from sides.extras("equality", pairs, _deactivated)
+
+
+# Of an equality of bodies, where in its data a figure is, and what that is called; a connect has
+# the first two, in the other order.
+_RELPOSE = slice(6, 10)
+_POINTS = {
+    _CONNECT: (("anchor in body 1", slice(0, 3)), ("anchor in body 2", slice(3, 6))),
+    _WELD: (("anchor in body 2", slice(0, 3)), ("anchor in body 1", slice(3, 6))),
+}
+_POLYNOMIAL = slice(0, 5)
+
+
+def _of_parameters(sides: Sides, b: int, wanted: Array) -> Iterator[DifferingQuantity]:
+    """Yield what an equality of the second model keeps otherwise than its data `wanted` say."""
+    data, kind = np.array(sides.right.eq_data[b]), int(sides.right.eq_type[b])
+    for name, span in _POINTS.get(kind, ()):
+        if np.abs(wanted[span] - data[span]).max() > _NEAR:
+            yield DifferingQuantity(name, plain(wanted[span]), plain(data[span]), "m")
+    if kind == _WELD:
+        turns = [matrix_from_quat(_unit(each[_RELPOSE])) for each in (wanted, data)]
+        if np.abs(turns[0] - turns[1]).max() > _NEAR:  # a quaternion and its negative turn alike
+            yield DifferingQuantity(TURNED, 0.0, float(angle_between(*turns)), "rad")
+        if abs(wanted[10] - data[10]) > _NEAR:
+            yield DifferingQuantity("torquescale", float(wanted[10]), float(data[10]))
+    elif kind in (_JOINT, _TENDON):
+        if np.abs(wanted[_POLYNOMIAL] - data[_POLYNOMIAL]).max() > _NEAR:
+            yield quantity_of("eq_polycoef", wanted[_POLYNOMIAL], data[_POLYNOMIAL])
+    elif kind not in _POINTS and not same(wanted, data):
+        yield quantity_of("eq_data", wanted, data)
+
+
+def _softened_by_another(sides: Sides, a: int, b: int) -> ModelDifference:
+    """Tell that a coupling with a factor is counted in the positions of the other joint.
+
+    What it keeps is the same, but it gives way in these: MuJoCo's softness is one for a whole
+    radian, or metre, of the first joint.
+    """
+    left, kind = sides.left, _KINDS_OF_COUPLING[int(sides.left.eq_type[a])]
+    firsts = int(left.eq_obj1id[a]), int(sides.right.eq_obj1id[b])
+    names = name_of(left, kind, firsts[0]), name_of(sides.right, kind, firsts[1])
+    edits: tuple[Edit, ...] = (
+        ("eq_obj1id", (b,), int(sides.right.eq_obj2id[b])),
+        ("eq_obj2id", (b,), int(sides.right.eq_obj1id[b])),
+        ("eq_data", (b,), np.array(left.eq_data[a])),
+    )
+    value = DifferingQuantity(f"{kind}1", *names)
+    return sides.tell("softness by", "equality", a, (value,), edits)
 
 
 def _deactivated(raw: Any, k: int) -> tuple[Edit, ...]:
@@ -163,7 +201,7 @@ def _match(sides: Sides) -> Iterator[tuple[int, int]]:
         unlike = {
             b: float(np.abs(_wanted(sides, a, b) - sides.right.eq_data[b]).max())
             for b in free
-            if _keeps(sides, 1, b) == ours
+            if _keeps(sides, 1, b) == ours or _is_exchanged(sides, a, b)
         }
         if unlike:
             best = min(unlike, key=unlike.__getitem__)
@@ -175,9 +213,21 @@ def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
     """How an equality keeps things, and which, as ids of the second model."""
     raw = sides.raws[side]
     kind, of = int(raw.eq_type[k]), int(raw.eq_objtype[k])
-    target = {_JOINT: "joint", _TENDON: "tendon"}.get(kind, _KEEPS.get(of))
+    target = _KINDS_OF_COUPLING.get(kind, _KEEPS.get(of))
     ids = [sides.there(side, target, int(end[k])) for end in (raw.eq_obj1id, raw.eq_obj2id)]
     return kind, of, *(sorted(ids) if kind in (_CONNECT, _WELD) else ids)
+
+
+def _is_exchanged(sides: Sides, a: int, b: int) -> bool:
+    """Tell whether a linear coupling of two joints, or tendons, is said the other way round."""
+    kind, of, *ours = _keeps(sides, 0, a)
+    other_kind, other_of, *theirs = _keeps(sides, 1, b)
+    if kind not in _KINDS_OF_COUPLING or (kind, of) != (other_kind, other_of):
+        return False
+    if ours[0] == ours[1] or min(ours) < 0 or ours != theirs[::-1]:
+        return False
+    _, factor, *rest = sides.left.eq_data[a][_POLYNOMIAL]
+    return bool(factor) and not any(rest)
 
 
 def _is_of_bodies(sides: Sides, a: int) -> bool:
@@ -193,6 +243,10 @@ def _wanted(sides: Sides, a: int, b: int) -> Array:
     in that of body 1.
     """
     left, data = sides.left, np.array(sides.left.eq_data[a])
+    if _is_exchanged(sides, a, b):
+        offset, factor = data[:2]
+        data[:2] = -offset / factor, 1 / factor
+        return data
     if not _is_of_bodies(sides, a):
         return data
     bodies = [int(left.eq_obj1id[a]), int(left.eq_obj2id[a])]

@@ -55,7 +55,11 @@ LIMITED = {
     "tendon_actfrcrange": "tendon_actfrclimited",
 }
 
-# What is compared entry by entry: of an element of some kind, or of another index of it.
+# The flags of these.
+LIMITS = frozenset(LIMITED.values())
+
+# What is compared entry by entry: of an element of some kind, or of another index of it. Units of
+# joints, tendons and actuators are those of a rotation.
 ROWS: dict[str, tuple[FieldRow, ...]] = {
     "joint": (
         FieldRow("range", ("jnt_limited", "jnt_range"), "rad"),
@@ -95,49 +99,66 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
             "gains",
             ("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
         ),
-        FieldRow("gear", ("actuator_gear", "actuator_cranklength")),
+        FieldRow("gear", ("actuator_gear", "actuator_cranklength"), units={"cranklength": "m"}),
         FieldRow("force range", ("actuator_forcelimited", "actuator_forcerange"), "N·m"),
         FieldRow("dynamics", ("actuator_dynprm", "actuator_actearly"), when="actuator_dyntype"),
         FieldRow("range of its activation", ("actuator_actlimited", "actuator_actrange")),
-        FieldRow("rotor", ("actuator_armature",)),
-        FieldRow("damping", ("actuator_damping", "actuator_dampingpoly")),
+        FieldRow("rotor", ("actuator_armature",), "kg m²"),
         FieldRow(
-            "length range", ("actuator_lengthrange",), when="actuator_gaintype actuator_biastype"
+            "damping",
+            ("actuator_damping", "actuator_dampingpoly"),
+            "N·m·s",
+            units={"dampingpoly": ""},
+        ),
+        FieldRow(
+            "length range",
+            ("actuator_lengthrange",),
+            "rad",
+            when="actuator_gaintype actuator_biastype",
         ),
     ),
     "delay": (FieldRow("delay", ("actuator_delay",), "s"),),
     "group": (FieldRow("group", ("actuator_group",)),),
     "control": (FieldRow("range of ctrl", ("actuator_ctrllimited", "actuator_ctrlrange")),),
     "tendon": (
-        FieldRow("range", ("tendon_limited", "tendon_range"), "m"),
+        FieldRow("range", ("tendon_limited", "tendon_range"), "rad"),
         FieldRow(
             "stop",
             ("tendon_solref_lim", "tendon_solimp_lim", "tendon_margin"),
             when="tendon_limited",
-            units={"margin": "m"},
+            units={"margin": "rad"},
         ),
-        FieldRow("spring", ("tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield")),
+        FieldRow(
+            "spring",
+            ("tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield"),
+            "N·m/rad",
+            units={"stiffnesspoly": "", "springyield": ""},
+        ),
         FieldRow(
             "slack length",
             ("tendon_lengthspring",),
-            "m",
+            "rad",
             when="tendon_stiffness tendon_stiffnesspoly",
         ),
-        FieldRow("damping", ("tendon_damping", "tendon_dampingpoly")),
-        FieldRow("dry friction", ("tendon_frictionloss",)),
+        FieldRow(
+            "damping",
+            ("tendon_damping", "tendon_dampingpoly"),
+            "N·m·s",
+            units={"dampingpoly": ""},
+        ),
+        FieldRow("dry friction", ("tendon_frictionloss",), "N·m"),
         FieldRow(
             "softness of dry friction",
             ("tendon_solref_fri", "tendon_solimp_fri"),
             when="tendon_frictionloss",
         ),
-        FieldRow("armature", ("tendon_armature",)),
-        FieldRow("force limit", ("tendon_actfrclimited", "tendon_actfrcrange")),
+        FieldRow("armature", ("tendon_armature",), "kg m²"),
+        FieldRow("force limit", ("tendon_actfrclimited", "tendon_actfrcrange"), "N·m"),
     ),
     "equality": (
         FieldRow("active", ("eq_active0",)),
         FieldRow("softness", ("eq_solref", "eq_solimp")),
     ),
-    "kept": (FieldRow("parameters", ("eq_data",)),),  # by an equality
     "pair": (
         FieldRow("friction", ("pair_friction", "pair_dim")),
         FieldRow("softness", ("pair_solref", "pair_solimp", "pair_solreffriction")),
@@ -203,7 +224,7 @@ FLAGS_OF_ELEMENTS = frozenset(
 )
 # Arrays of an element of which a file may write the first numbers alone.
 BEGINNINGS = (
-    *("*_solref*", "*_solimp*", "*_friction", "*poly", "*prm", "actuator_gear", "eq_data"),
+    *("*_solref*", "*_solimp*", "*_friction", "*poly", "*prm", "actuator_gear", "eq_*"),
     *("opt.o_solref", "opt.o_solimp", "opt.o_friction", "geom_surfacevel", "fluidcoef"),
 )
 FLAGS = ("disableflags", "enableflags")
@@ -235,10 +256,10 @@ FATES = {
         "jnt_pos jnt_axis jnt_bodyid qpos0 qpos_spring geom_type geom_size geom_pos geom_quat "
         "geom_dataid geom_bodyid geom_fluid site_pos site_quat site_bodyid actuator_trntype "
         "actuator_trnid actuator_dyntype actuator_ctrlspec actuator_actnum actuator_ctrlnum "
-        "actuator_outnum eq_type eq_obj1id eq_obj2id eq_objtype wrap_objid wrap_prm wrap_type "
-        "tendon_adr tendon_num pair_geom1 pair_geom2 exclude_signature mesh_vert mesh_vertadr "
-        "mesh_vertnum mesh_face mesh_faceadr mesh_facenum hfield_data hfield_size hfield_nrow "
-        "hfield_ncol hfield_adr"
+        "actuator_outnum eq_data eq_type eq_obj1id eq_obj2id eq_objtype wrap_objid wrap_prm "
+        "wrap_type tendon_adr tendon_num pair_geom1 pair_geom2 exclude_signature mesh_vert "
+        "mesh_vertadr mesh_vertnum mesh_face mesh_faceadr mesh_facenum hfield_data hfield_size "
+        "hfield_nrow hfield_ncol hfield_adr"
     ),
     # Compared whole: a model that has any can be compared, but is not brought to another.
     "whole": (

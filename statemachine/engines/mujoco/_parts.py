@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain, product
 from typing import Any
@@ -13,7 +13,8 @@ from ...installed import require
 from ...interface import Array, JointType
 from ...rotations import HERE, angle_between
 from ..description.records import Inertial, motion
-from ..records import TURNED, BodyPair, DifferingQuantity, Edit, ModelDifference
+from ..records import TURNED, BodyPair, DifferingQuantity, Edit, ModelDifference, SpecEdit
+from ._fields import word_of
 from ._sides import NEAR, Sides, apart, copies, plain, quat_of, same, zeros
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
@@ -25,7 +26,6 @@ _WEIGHS = {
 }
 _TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal have of rounding
 _EQUAL = 1e-6  # of the largest moment: two that are nearer to each other are equal
-_DIAGONAL = "its mass matrix is stored as a diagonal"
 
 
 def weights(sides: Sides) -> Iterator[ModelDifference]:
@@ -132,16 +132,18 @@ def _of_body(
     fits = not right.body_simple[target] or simple
     back_fits = not simple and align is HERE
     for subject, values in _differing(wanted, sides.solids[1].inertial(target)).items():
-        arrays, edits, back, why = _WEIGHS[subject], (), (), ""
+        arrays, edits, back = _WEIGHS[subject], (), ()
+        spec_edits: tuple[SpecEdit, ...] = ()
         if subject == "mass" or fits:
             edits = _weighs(sides, subject, target, wanted)
             if subject == "inertia" and exact:
                 edits = copies(arrays, left, pair.left, target)
         elif back_fits:
             back = copies(arrays, right, pair.right, pair.left)
-        else:
-            why = _DIAGONAL
-        yield sides.tell(subject, "body", pair.left, values, edits, back, why)
+        else:  # its mass matrix is stored as a diagonal
+            spec_edits = _specified(_weighs(sides, subject, target, wanted))
+        difference = sides.tell(subject, "body", pair.left, values, edits, back)
+        yield replace(difference, spec_edits=spec_edits)
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
@@ -163,10 +165,21 @@ def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) ->
     fixed = (body for body in bodies if body != pair.right)
     emptied = [zeros(("body_mass", "body_inertia"), sides.right, body) for body in fixed]
     filled = [_weighs(sides, figure, pair.right, there) for figure in _WEIGHS]
-    why = _DIAGONAL if sides.right.body_simple[pair.right] else ""
-    edits = () if why else chain(*emptied, *filled)
+    edits = (*chain(*emptied), *chain(*filled))
     values = chain(*differing.values())
-    return sides.tell(subject, "body", pair.left, values, edits, refused=why)
+    if sides.right.body_simple[pair.right]:  # its mass matrix is stored as a diagonal
+        difference = sides.tell(subject, "body", pair.left, values)
+        return replace(difference, spec_edits=_specified(edits))
+    return sides.tell(subject, "body", pair.left, values, edits)
+
+
+def _specified(edits: Iterable[Edit]) -> tuple[SpecEdit, ...]:
+    """Return edits of what bodies weigh as those of a description that is compiled anew."""
+    spec_edits: list[SpecEdit] = []
+    for array, (body, *_), value in edits:
+        assert isinstance(body, int)
+        spec_edits.append(SpecEdit("body", body, word_of(array), plain(value)))
+    return tuple(spec_edits)
 
 
 def _principal(tensor: Array) -> tuple[Array, Array]:

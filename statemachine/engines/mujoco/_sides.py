@@ -85,11 +85,23 @@ def differing(
         left: For each of its arrays the entry of the first model's element.
         right: Those of the second's.
     """
-    return tuple(
-        quantity_of(array, ours, theirs, row.unit_of(array))
-        for array, ours, theirs in zip(row.fields, left, right, strict=True)
-        if not same(ours, theirs)
-    )
+    values: list[DifferingQuantity] = []
+    for array, ours, theirs in zip(row.fields, left, right, strict=True):
+        if array in fields.LIMITS:
+            continue  # a range that is not there says so
+        one, other = _is_unlimited(array, ours), _is_unlimited(array, theirs)
+        if one or other:
+            if one != other:
+                ends = None if one else plain(ours), None if other else plain(theirs)
+                values.append(DifferingQuantity(fields.word_of(array), *ends, row.unit_of(array)))
+        elif not same(ours, theirs):
+            values.append(quantity_of(array, ours, theirs, row.unit_of(array)))
+    return tuple(values)
+
+
+def _is_unlimited(array: str, entry: Any) -> bool:
+    """Tell whether an entry is a range without its flag, which says nothing."""
+    return array in fields.LIMITED and bool(np.isinf(entry).all())
 
 
 def copies(names: Iterable[str], raw: Any, a: int, b: int) -> tuple[Edit, ...]:

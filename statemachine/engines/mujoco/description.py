@@ -32,6 +32,7 @@ from ..description.records import (
     moved,
 )
 from . import _shapes as shapes
+from ._gains import kind_of_gains
 from ._sides import inertial_of, name_of, placed
 from .differences import settings_of
 
@@ -299,12 +300,4 @@ def _actuator_kind(raw: Any, i: int) -> str:
     """Return the kind of an actuator: position, velocity, motor, or general."""
     if raw.actuator_dyntype[i] or raw.actuator_gaintype[i]:
         return "general"
-    gain, bias = raw.actuator_gainprm[i], raw.actuator_biasprm[i]
-    form = int(raw.actuator_biastype[i])  # mjtBias: none, affine, …
-    if form == 0:
-        return "motor"
-    if form == 1 and not bias[0] and bias[1] == -gain[0]:
-        return "position"
-    if form == 1 and not bias[:2].any() and bias[2] == -gain[0]:
-        return "velocity"
-    return "general"
+    return kind_of_gains(raw, i)

@@ -194,6 +194,8 @@ def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
 
 
 _GAINS = ("actuator_gainprm", "actuator_biasprm")
+# What these entries are of a position servo: its kp stands in two places, which are one entry.
+_SERVO_GAINS = {"gainprm[0]": "kp", "biasprm[1]": "kp", "biasprm[2]": "kv"}
 _ENDS, _EACH = ("lower end", "upper end"), ("{}[{}]",)
 # Fields whose entries mean something one by one, and what each is called; a name with {} is of all.
 _SPLIT: dict[str, Sequence[str]] = {
@@ -245,13 +247,15 @@ def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, .
         return (difference,)
     changes: list[tuple[str, _Entry]] = []
     is_servo = _changes_a_servo(right, edits)
-    units = {value.quantity: value.unit for value in difference.values}
-    units |= _UNITS_OF_ARRAYS
+    named = {value.quantity: value for value in difference.values}
+    units = {name: value.unit for name, value in named.items()} | _UNITS_OF_ARRAYS
     for edit in edits:
         for entry in _by_entry(right, edit, units.get(_word(edit[0]), "")):
-            # The gain of a servo stands in two places, which are one entry.
-            is_gain = is_servo and entry.name in ("gainprm[0]", "biasprm[1]")
-            changes.append(("kp" if is_gain else entry.name, entry))
+            name = _SERVO_GAINS.get(entry.name, "") if is_servo else ""
+            if name in named:
+                value = named[name]
+                entry = replace(entry, left=value.left, right=value.right, unit=value.unit)  # noqa: PLW2901
+            changes.append((name or entry.name, entry))
     parts = grouped(changes)
     if len(parts) < 2:
         return (difference,)

@@ -61,6 +61,7 @@ _SUBJECTS: dict[str, dict[str, str]] = {
     "actuator": {
         "gains": "drive",
         "law": "drive",
+        "filter": "drive",
         "gear": "drive",
         "force range": "drive",
         "range of ctrl": "drive",

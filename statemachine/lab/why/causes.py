@@ -6,17 +6,18 @@ A cause is one difference, or several that are the same change of different elem
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...engines import room
-from ...engines.records import DifferingQuantity, Edit, ModelDifference
+from ...engines.records import DifferingQuantity, Edit, ModelDifference, SpecEdit
 from ...installed import DEFAULT
 from ...interface import Model
 from ...measures.text import few, listed
 from ..compare.matching import Matched
 
+_NOT_COMPILED_ANEW = "its file is binary: it cannot be compiled anew"
 EXTRA_ACTUATOR = "extra actuator"
 # The subjects that the mass of a geom changes in its body.
 MASS_SUBJECTS = frozenset({"mass", "centre of mass", "inertia"})
@@ -51,6 +52,13 @@ class Cause:
         """Why it cannot be equalized; "" if it can."""
         return next((row.refused for row in self.differences if row.refused), "")
 
+    def spec_edits(self, side: int) -> tuple[SpecEdit, ...]:
+        """Return what is set in the description of the first (0) or the second (1) model."""
+        edits: list[SpecEdit] = []
+        for row in self.differences:
+            edits += row.spec_edits if side else row.spec_edits_one
+        return tuple(edits)
+
     def edits(self, side: int) -> tuple[Edit, ...]:
         """Return what is done to the first (0) or the second (1) compiled model."""
         edits: list[Edit] = []
@@ -78,7 +86,10 @@ def differences_of(
         readable: Whether that counts on which nothing but a function of the user's depends.
     """
     own = room(DEFAULT)
-    rows = list(own.differences(left.compiled, right.compiled, matched, world=world))
+    rows = [
+        _specified(row, left, right)
+        for row in own.differences(left.compiled, right.compiled, matched, world=world)
+    ]
     if readable:
         rows += readable_of(matched)
     if finer:
@@ -87,6 +98,21 @@ def differences_of(
     rows += [_extra_joint(name, "there", None) for name in only_left.get("joint", ())]
     rows += [_extra_joint(name, None, "there") for name in only_right.get("joint", ())]
     return tuple(rows)
+
+
+def _specified(row: ModelDifference, left: Model, right: Model) -> ModelDifference:
+    """Return a difference with the edits of the one description that is compiled anew, if any.
+
+    That is the right's, unless its file has none.
+    """
+    if not (row.spec_edits or row.spec_edits_one):
+        return row
+    own = room(DEFAULT)
+    if row.spec_edits and own.can_be_respecified(right.path):
+        return replace(row, spec_edits_one=())
+    if row.spec_edits_one and own.can_be_respecified(left.path):
+        return replace(row, spec_edits=())
+    return replace(row, spec_edits=(), spec_edits_one=(), refused=_NOT_COMPILED_ANEW)
 
 
 def _extra_joint(name: str, left: str | None, right: str | None) -> ModelDifference:
@@ -117,15 +143,24 @@ def readable_of(matched: Matched) -> list[ModelDifference]:
     return [*sensors_of(matched), *data_of(matched)]
 
 
-def built(model: Model, edits: tuple[Edit, ...]) -> Model:
+def built(model: Model, edits: tuple[Edit, ...], spec_edits: tuple[SpecEdit, ...] = ()) -> Model:
     """Return a Model whose compiled model was edited.
 
+    Args:
+        model: The Model.
+        edits: Of its compiled model.
+        spec_edits: Of the description in its file, which is then compiled anew.
+
     Raises:
-        UnsupportedError, ModelError: As `Model.with_compiled`.
+        UnsupportedError, ModelError: As `Model.with_compiled`, and as `respecified` of a room.
     """
-    if not edits:
+    own, compiled = room(DEFAULT), model.compiled
+    if spec_edits:
+        compiled = own.respecified(model.path, compiled, spec_edits)
+        edits = own.in_places_of(model.compiled, compiled, edits)
+    if not (edits or spec_edits):
         return model
-    return model.with_compiled(room(DEFAULT).edited(model.compiled, edits))
+    return model.with_compiled(own.edited(compiled, edits))
 
 
 def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:

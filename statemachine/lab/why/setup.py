@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...engines import room
-from ...engines.records import DifferingQuantity, ModelDifference
+from ...engines.records import DifferingQuantity, Edit, ModelDifference, SpecEdit
 from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.alike import commands_alike, controller_for_right, translated
@@ -242,7 +242,7 @@ class Setup:
 
     def _acts_on(self, side: int, cause: Cause) -> bool:
         """Tell whether a side is changed where a cause is equalized."""
-        if cause.edits(side):
+        if cause.edits(side) or cause.spec_edits(side):
             return True
         if cause.kind == "engine" and self._own_settings[side]:
             return True
@@ -261,10 +261,12 @@ class Setup:
             UnsupportedError, ModelError, EngineError: It cannot be made.
         """
         own = self._own_settings[run.side]
-        edits = tuple(
-            edit for name in sorted(run.equalized) for edit in self._causes[name].edits(run.side)
-        )
-        model = built(self.models[run.side], edits)
+        edits: list[Edit] = []
+        spec_edits: list[SpecEdit] = []
+        for name in sorted(run.equalized):
+            edits += self._causes[name].edits(run.side)
+            spec_edits += self._causes[name].spec_edits(run.side)
+        model = built(self.models[run.side], tuple(edits), tuple(spec_edits))
         if run.side and not own:
             options = self._options_of_left(run.equalized & self._by_option)
             model = model.replace(**options) if options else model
@@ -272,7 +274,8 @@ class Setup:
             model = model.replace(integrator=run.integrator)
         settings = self._settings_in(run.equalized)
         if own and (settings or run.without):
-            return own.build(model, built(own.emulated, edits), settings, run.without)
+            emulated = built(own.emulated, tuple(edits), tuple(spec_edits))
+            return own.build(model, emulated, settings, run.without)
         return leave_out(model, run.without)
 
     def _options_of_left(self, names: frozenset[str]) -> dict[str, Any]:
