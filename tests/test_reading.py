@@ -11,8 +11,8 @@ from statemachine.backends import on_default
 from statemachine.backends.repairs import compile_mended
 from statemachine.errors import BadInputError, EngineWarning, ModelError, UnsupportedError
 from statemachine.interface.sites import usual_site
-from statemachine.lab.compare.agreement import witness
 from statemachine.lab.compare.matching import match_models
+from statemachine.lab.compare.witnessed import witness
 from statemachine.lab.recordings import record, write
 from statemachine.lab.recordings.request import PlayRequest, answer_play
 from statemachine.lab.validate.fingertip import certify
