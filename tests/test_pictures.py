@@ -33,7 +33,6 @@ from statemachine.lab.questions.film import (
     write_film,
 )
 from statemachine.lab.questions.film_overlay import STRIP, Overlay
-from statemachine.lab.questions.over_time import charts_of
 from statemachine.lab.questions.plot import (
     FIGURE_SETTINGS,
     draw,
@@ -42,6 +41,7 @@ from statemachine.lab.questions.plot import (
     of_trace,
     write_plot,
 )
+from statemachine.lab.questions.stage.quantity_chart import charts_of
 from statemachine.lab.recordings import RunMetadata, Trace, record, shipped, write
 from statemachine.lab.recordings.header import INPUTS
 from statemachine.show.drawing.scene import Camera, Shot, compose, framed, smaller

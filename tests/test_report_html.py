@@ -30,8 +30,12 @@ from statemachine.lab.questions.compare_page import PageParts
 from statemachine.lab.questions.compare_page import page as compared
 from statemachine.lab.questions.events import events_of
 from statemachine.lab.questions.finding import headline, leading, subject
-from statemachine.lab.questions.over_time import CHARTS_SHOWN, charts_of
 from statemachine.lab.questions.sides_page import commanded
+from statemachine.lab.questions.stage.bones import bones_of
+from statemachine.lab.questions.stage.page import report
+from statemachine.lab.questions.stage.poses import rows_at
+from statemachine.lab.questions.stage.quantity_chart import CHARTS_SHOWN, charts_of
+from statemachine.lab.questions.stage.scene import Look, moments_of
 from statemachine.lab.recordings import Trace, record_scenario, shipped
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.lab.why import Explanation, Share
@@ -52,9 +56,8 @@ from statemachine.show.blocks import (
     Verdict,
 )
 from statemachine.show.drawing import drawing_of
-from statemachine.show.html import Look, check_target, report, write_report
-from statemachine.show.html.geometry import bones_of, mesh_as_data, mesh_of
-from statemachine.show.html.scene import moments_of, rows_at
+from statemachine.show.html import check_target, write_report
+from statemachine.show.html.geometry import mesh_as_data, mesh_of
 
 from .support.browser import Tab, browser
 from .support.claims import assert_has, assert_in, refused
@@ -959,7 +962,7 @@ def test_a_page_without_matplotlib_says_where_its_charts_are(
     hold: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "statemachine.show.html.blocks.chart",
+        "statemachine.show.html.chart.chart",
         Mock(side_effect=MissingEngineError("a figure needs matplotlib")),
     )
     text = page_of(hold)
@@ -983,7 +986,7 @@ def test_a_mesh_keeps_its_surface_and_too_many_triangles_are_made_fewer() -> Non
 
 def test_normals_are_those_of_the_faces(tab: Tab) -> None:
     mesh = mesh_of(drawing_of(sm.load("so101/scene")))
-    code = (ROOT / "statemachine" / "report" / "html" / "gl.js").read_text("utf-8")
+    code = (ROOT / "statemachine" / "show" / "html" / "gl.js").read_text("utf-8")
     found = tab.evaluate(
         f"(mesh) => {{ {code}; const made = creased(mesh);"
         "  return [[...made.points], [...made.normals]]; }",

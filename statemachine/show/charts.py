@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import importlib
 import io
 import math
@@ -357,3 +358,13 @@ def _size_of(picture: Drawn) -> tuple[float, float]:
         case Pipeline(stages=stages):
             longest = max(len(content) for _, content in stages)
             return 7.5, 0.26 * longest + 1.6
+
+
+def data_url(content: bytes, kind: str) -> str:
+    """Return a picture as a URL that has it within itself.
+
+    Args:
+        content: Of its file.
+        kind: Of its file, as media types name it: "svg+xml" or "webp".
+    """
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,1 +1,1 @@
-"""Results and pages made visible: text for a terminal, JSON for a program, progress."""
+"""What `compare` and `trace` are asked: a Request and its answer each, its page, its film, its figure."""

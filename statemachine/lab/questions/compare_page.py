@@ -16,7 +16,6 @@ from ..why import page as why
 from .compared_names import long_labels, traces_of
 from .events import Event, events_of, events_table
 from .finding import headline, in_words, leading, subject
-from .over_time import BothRuns, charts_of
 from .sides_page import (
     also_open,
     commanded,
@@ -26,6 +25,8 @@ from .sides_page import (
     provenance,
     unmatched,
 )
+from .stage.both_runs import BothRuns
+from .stage.quantity_chart import charts_of
 
 if TYPE_CHECKING:
     from ..why import Explanation

@@ -6,7 +6,6 @@ WebP, or a few seconds of a run.
 
 from __future__ import annotations
 
-import base64
 import io
 import math
 from collections.abc import Generator, Iterator, Sequence
@@ -31,7 +30,7 @@ from ..compare import Comparison, labels_of
 from ..recordings import Trace
 from ..runs.drive import Progress, silent
 from .film_overlay import Overlay
-from .over_time import charts_of
+from .stage.quantity_chart import charts_of
 
 SUFFIX = ".webp"
 FILM_SIZE = (640, 480)  # width and height [pixels]
@@ -294,12 +293,12 @@ def drawn_picture(picture: Picture) -> tuple[bytes, str]:
 
 
 def inline(picture: Picture) -> str:
-    """A picture as a data address; "" without what draws it."""
+    """Return a picture as a data URL; "" without what draws it."""
     try:
         content, kind = drawn_picture(picture)
     except MissingEngineError:
         return ""
-    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+    return figures.data_url(content, kind)
 
 
 def _close(camera: Camera, sides: list[Motion], body: int) -> Camera:

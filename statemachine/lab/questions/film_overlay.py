@@ -12,7 +12,7 @@ from ...interface import Array
 from ...measures.text import quantity
 from ...show.charts import INK, SETTINGS, draw_picture, saved
 from ...show.drawing.scene import GHOST
-from .over_time import QuantityChart
+from .stage.quantity_chart import QuantityChart
 
 _ORANGE = "#e69f00"  # of the solid side's mark
 STRIP = 0.18  # of the film's height

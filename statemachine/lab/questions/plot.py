@@ -26,7 +26,7 @@ from ..recordings import Trace
 from .compared_names import long_labels, traces_of
 from .finding import parting
 from .floor_words import changed_by
-from .over_time import CHARTS_SHOWN, QuantityChart, charts_of, spans
+from .stage.quantity_chart import CHARTS_SHOWN, QuantityChart, charts_of, spans
 
 FIGURE_SETTINGS = {
     **SETTINGS,

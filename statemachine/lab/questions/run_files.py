@@ -15,7 +15,7 @@ from ...models import AnyPath
 from ...show.blocks import Page
 from ...show.charts import check_suffix, require_matplotlib
 from ...show.drawing import Drawing, drawing_of
-from ...show.html import check_target, report, write_report
+from ...show.html import check_target, write_report
 from ..compare import Comparison
 from ..compare.alike import with_bodies_of
 from ..compare.chaos import ChaosFloor
@@ -25,6 +25,7 @@ from ..runs.reporter import QUIET, Reporter
 from . import film as films
 from . import plot
 from .junit import junit
+from .stage.page import report
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,21 @@
 """A page as one self-contained HTML file.
 
-    text = report(page, looks=(look, look))
+    text = report(page)
     write_report("hold.html", text)
 
-Made in Python: words, tables, and curves as SVG, which read without a script. The script, ours
-and without a library, draws both runs in WebGL and moves the cursor. No word about what was found
-is made here.
+Made in Python: words, tables, and curves as SVG, which read without a script. What moves, and the
+script that moves it, come with an `Interaction`. No word about what was found is made here.
 """
 
 from __future__ import annotations
 
-from .page import SUFFIXES, check_target, report, write_report
-from .scene import Look
+from .page import NOTHING_MOVES, SUFFIXES, Interaction, check_target, report, write_report
 
-__all__ = ["SUFFIXES", "Look", "check_target", "report", "write_report"]
+__all__ = [
+    "NOTHING_MOVES",
+    "SUFFIXES",
+    "Interaction",
+    "check_target",
+    "report",
+    "write_report",
+]

@@ -1,25 +1,11 @@
-"""The blocks of a page as HTML: each kind in one way, whatever the page is about.
-
-The charts of a quantity over time have a cursor that follows the slider. What is not markup already
-is escaped: no name of a trace can be an element.
-"""
+"""The blocks of a page as HTML: each kind in one way, whatever the page is about."""
 
 from __future__ import annotations
 
-import html
-import json
-import re
-from collections.abc import Iterable, Mapping
-from importlib import resources
-from typing import Any
-
-import numpy as np
+from collections.abc import Callable, Iterable
 
 from ...errors import MissingEngineError
-from ...lab.questions.film import inline
-from ...lab.questions.over_time import QuantityChart
-from ...measures import largest
-from ...measures.text import figure, reading
+from .. import charts
 from ..blocks import (
     Bars,
     Block,
@@ -28,7 +14,6 @@ from ..blocks import (
     Headline,
     Interactive,
     Items,
-    Markdown,
     Section,
     Table,
     TableCell,
@@ -36,44 +21,40 @@ from ..blocks import (
     Traces,
     Verdict,
 )
-from ..charts import INK, SIDES, chart
-from ..markdown import inline_html
 from ..terminal import non_breaking
+from .markup import Html, joined, prose, tag
+
+# Draws an interactive block: what it shows is known where its kind is defined.
+DrawInteractive = Callable[[Interactive], Html]
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
-_ROWS = 21  # of the table under a chart
-_ROUNDING = 1e-6  # of a tolerance
 _DIGEST = 64  # characters of a SHA-256
-_SIZE = (4.0, 1.3)  # inches
-_BOX = (0.12, 0.18, 0.85, 0.75)  # of its axes: left, bottom, width, height
-# So that the theme of the page changes the colours.
-_COLOURS = {
-    INK: "var(--ink)",
-    SIDES[0]["color"]: "var(--one)",
-    SIDES[1]["color"]: "var(--two)",
-    "#f0f0f0": "var(--shade)",
-}
 
 
-def drawn(blocks: Iterable[Block], stage: Html, level: int = 2) -> Html:
-    """Blocks one after the other.
+def no_interaction(_block: Interactive) -> Html:
+    """Draw nothing: a page without a script has nothing that moves."""
+    return Html("")
+
+
+def drawn(
+    blocks: Iterable[Block], interactive: DrawInteractive = no_interaction, level: int = 2
+) -> Html:
+    """Return blocks one after the other.
 
     Args:
         blocks: Of a page.
-        stage: The scene with its slider, where both runs stand.
+        interactive: Draws those that are looked at by moving a slider.
         level: Of a section's heading.
     """
-    return joined(_block(block, stage, level) for block in blocks)
+    return joined(_block(block, interactive, level) for block in blocks)
 
 
-def _block(block: Block, stage: Html, level: int) -> Html:
+def _block(block: Block, interactive: DrawInteractive, level: int) -> Html:
     match block:
         case Section():
-            return _section(block, stage, level)
-        case QuantityChart():
-            return quantity_row(block)
+            return _section(block, interactive, level)
         case Interactive():
-            return stage
+            return interactive(block)
         case Table():
             return table(block)
         case Bars() | Traces():
@@ -102,17 +83,20 @@ def _words(block: Block) -> Html:
 
 
 def _picture(picture: Bars | Traces) -> Html:
-    """What matplotlib draws, as an image within the page; nothing where it is not installed."""
-    source = inline(picture)
+    """Return what matplotlib draws, within the page; nothing where it is not installed."""
+    try:
+        content = charts.drawn([picture], "svg")
+    except MissingEngineError:
+        return Html("")
+    source = charts.data_url(content, "svg+xml")
     image = tag("img", src=source, alt=picture.title)
-    figure = tag("figure", image, tag("figcaption", picture.title), class_="drawn")
-    return figure if source else Html("")
+    return tag("figure", image, tag("figcaption", picture.title), class_="drawn")
 
 
-def _section(block: Section, stage: Html, level: int) -> Html:
+def _section(block: Section, interactive: DrawInteractive, level: int) -> Html:
     if not block.heading:
-        return drawn(block.blocks, stage, level)
-    inside = drawn(block.blocks, stage, level + 1)
+        return drawn(block.blocks, interactive, level)
+    inside = drawn(block.blocks, interactive, level + 1)
     if block.folded:
         return tag("details", tag("summary", block.heading), inside)
     if not block.name:
@@ -200,163 +184,3 @@ def _bar(share: float, text: str, signed: bool) -> Html:
         tag("span", non_breaking(text), class_="percent"),
         class_="measure",
     )
-
-
-def quantity_row(quantity: QuantityChart) -> Html:
-    """Return a row of a quantity: how far apart, both sides, and the figures on demand."""
-    verdict = badge(quantity.agreement.verdict)
-    parts = [tag("h3", tag("span", quantity.title, class_="quantity"), verdict), _charts(quantity)]
-    if quantity.foot:
-        parts.append(tag("p", quantity.foot, class_="foot"))
-    summary = tag("summary", f"The figures of {quantity.title}")
-    parts.append(tag("details", summary, data_table(quantity), class_="data"))
-    return tag("section", *parts, class_="quantity-row")
-
-
-def _charts(quantity: QuantityChart) -> Html:
-    """Return how far apart a quantity is over time, and, where it has values, both sides."""
-    caption = f"how far apart, {quantity.unit}; log axis; dotted: the tolerance"
-    if quantity.floor is not None:
-        caption += "; grey: the chaos floor"
-    charts = [_figure(quantity.gap(), caption, quantity.said)]
-    values = quantity.values()
-    if values is not None:
-        left, right = quantity.labels
-        keys = tag("i", class_="key one"), f"{left} ", tag("i", class_="key two"), right
-        charts.append(_figure(values, joined((f"{values.title}: ", *keys)), values.title))
-    return tag("div", *charts, class_="charts")
-
-
-def _figure(picture: Traces, caption: str, said: str) -> Html:
-    """A chart with the cursor of time over its axes; a line where matplotlib is not installed."""
-    try:
-        text = chart(picture, _SIZE, _BOX)
-    except MissingEngineError as error:
-        return tag("p", f"No chart: {error}.", class_="foot")
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r' id="[a-z]+[\d_]+"', "", text)
-    text = re.sub(r"(\d\.\d)\d{3,}", r"\1", text)  # tenths of a point are seen, no more
-    for colour, name in _COLOURS.items():
-        text = text.replace(colour, name)
-    left, bottom, width, height = (100 * share for share in _BOX)
-    place = f"left:{left:g}%;width:{width:g}%;bottom:{bottom:g}%;height:{height:g}%"
-    area = tag("div", tag("i", class_="cursor"), class_="area", style=place)
-    return tag(
-        "figure",
-        tag("figcaption", caption),
-        tag("div", Html(text), area, class_="plot", role="img", aria_label=said),
-    )
-
-
-def data_table(quantity: QuantityChart) -> Html:
-    """The figures of its charts: moments evenly spaced, and that of the largest difference."""
-    time, tolerance = quantity.curve.time, quantity.agreement.tolerance
-    rows = np.linspace(0, len(time) - 1, min(_ROWS, len(time))).round().astype(int)
-    worst = largest(quantity.curve.difference)[1]
-    rows = np.unique([*rows, worst])
-    values = quantity.values()
-    columns = {} if values is None else dict(values.curves)
-    columns |= quantity.gap().curves
-    scale = reading(quantity.curve.unit)[0]
-    cells = []
-    for row in rows.tolist():
-        figures = [_number(float(y[row]), tolerance * scale) for _, y in columns.values()]
-        cells.append((f"{time[row]:.3f}", *figures))
-    title = f"{quantity.title}: {len(rows)} of {len(time)} moments, the largest difference bold"
-    heads = ("time, s", *(f"{name}, {quantity.unit}" for name in columns))
-    largest_row = frozenset(np.flatnonzero(rows == worst).tolist())
-    return table(Table(heads, cells, title, emphasis=largest_row))
-
-
-def _number(value: float, tolerance: float) -> str:
-    if 0 < abs(value) < _ROUNDING * tolerance:
-        return "≈ 0"
-    return f"{value:.4f}" if abs(value) >= 1e-3 or value == 0 else figure(value)
-
-
-_SPOKEN = ("aria_label", "aria_valuetext", "title")
-# What turns the text around, and halves of pairs of characters.
-_TURNS = re.compile("[\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-
-
-class Html(str):
-    """Text that is markup already."""
-
-    __slots__ = ()
-
-
-def escaped(text: object) -> Html:
-    """A text as markup that shows it; markup stays as it is."""
-    if isinstance(text, Html):
-        return text
-    return Html(html.escape(_printable(with_minus(str(text)))))
-
-
-def with_minus(text: str) -> str:
-    """A text whose figures have the sign minus, not a hyphen."""
-    return re.sub(r"(?<![\w\-–)\].])-(?=\d)|(?<=\de)-(?=\d)", "−", text)
-
-
-def prose(text: str) -> str:
-    """A text whose figures stay on one line with their units; of Markdown its markup."""
-    if not isinstance(text, Markdown):
-        return non_breaking(text)
-    return Html(inline_html(Markdown(non_breaking(with_minus(text)))))
-
-
-def literal(text: object) -> Html:
-    """A text as it is, for what may be typed or copied."""
-    return Html(html.escape(_printable(str(text))))
-
-
-def tag(name: str, *content: object, **attributes: object) -> Html:
-    """An element.
-
-    Args:
-        name: Of the element.
-        *content: Texts, which are escaped, and markup; None is left out.
-        **attributes: `class_` is class, `aria_label` aria-label; True is an attribute
-            without a value, None and False are left out.
-    """
-    said = ""
-    for key, value in attributes.items():
-        if value is None or value is False:
-            continue
-        said += " " + key.rstrip("_").replace("_", "-")
-        if value is not True:
-            text = with_minus(str(value)) if key in _SPOKEN else str(value)
-            said += f'="{html.escape(_printable(text))}"'
-    if name == "img":  # the only one without an end
-        return Html(f"<{name}{said}>")
-    if name in ("code", "pre"):
-        content = tuple(p if isinstance(p, Html) or p is None else literal(p) for p in content)
-    inner = "".join(escaped(part) for part in content if part is not None)
-    return Html(f"<{name}{said}>{inner}</{name}>")
-
-
-def joined(parts: Iterable[object]) -> Html:
-    """Parts one after the other."""
-    return Html("".join(escaped(part) for part in parts))
-
-
-def filled(name: str, slots: Mapping[str, object]) -> Html:
-    """A template of this folder, with texts, which are escaped, and markup in its slots."""
-    text = template(name)
-    return Html(re.sub(r"\{\{(\w+)\}\}", lambda slot: escaped(slots[slot[1]]), text))
-
-
-def template(name: str) -> str:
-    """The text of a file of this folder."""
-    return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
-
-
-def data_of(value: Any) -> Html:
-    """A value as JSON that can stand in a script element, which "<" could end."""
-    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
-    return Html(text.replace("<", "\\u003c"))
-
-
-def _printable(text: str) -> str:
-    """Without characters that a browser refuses, or that turn the text around."""
-    return _TURNS.sub(" ", "".join(c if c >= " " else " " for c in text))

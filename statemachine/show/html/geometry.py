@@ -9,12 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...interface import Array
-from ...lab.recordings import Trace
-from ...rotations import matrix_from_quat
-from ..drawing import Drawing, Part, lathe
-
-_GREY = (0.6, 0.6, 0.6, 1.0)
+from ..drawing import Drawing, Part
 
 
 @dataclass(frozen=True)
@@ -97,46 +92,6 @@ def _snapped(part: Part, cell: float) -> tuple[Any, Any]:
     faces = faces[(a != b) & (b != c) & (c != a)]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     return means / count[:, None], faces[np.sort(first)]
-
-
-def bones_of(trace: Trace) -> Drawing:
-    """A stick figure of a trace whose model cannot be had: a bone to each body from its parent.
-
-    It is what the trace itself tells: where the bodies are in the first row.
-    """
-    header, pos = trace.header, trace["xpos"][0]
-    turn = matrix_from_quat(unit_quat(trace["xquat"][0]))
-    moving = [(k, parent) for k, parent in enumerate(header.body_parentid) if k and parent]
-    bones = [(parent, turn[parent].T @ (pos[body] - pos[parent])) for body, parent in moving]
-    size = max([0.05, *(float(np.linalg.norm(end)) for _, end in bones)])
-    # The last of a chain, or one that is alone, has a knob.
-    knobs = sorted(set(range(1, len(header.bodies))) - {parent for _, parent in moving})
-    bones += [(body, np.array([0.0, 0.0, 0.12 * size])) for body in knobs]
-    parts = tuple(Part("bone", -1, body, *_bone(end, 0.12 * size), _GREY) for body, end in bones)
-    x, y, z = pos[1:].mean(axis=0).tolist() if len(pos) > 1 else (0.0, 0.0, 0.0)
-    extent = max(size, float(np.ptp(pos, axis=0).max()))
-    return Drawing(parts, (x, y, z), extent, azimuth=-90.0, elevation=-15.0)
-
-
-def _bone(end: Array, thick: float) -> tuple[Any, Any]:
-    """Two pyramids on one square, near the thicker end."""
-    length = float(np.linalg.norm(end))
-    if length < 1e-6:
-        end, length = np.array([0.0, 0.0, thick]), thick
-    along = end / length
-    aside = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
-    aside /= np.linalg.norm(aside)
-    wide = min(0.5 * thick, 0.25 * length)
-    shape = lathe([0.0, wide, 0.0], [0.0, 0.2 * length, length], around=4)
-    turned = shape.vertices @ np.array([aside, np.cross(along, aside), along])
-    return turned.astype(np.float32), shape.faces
-
-
-def unit_quat(quat: Array) -> Array:
-    """Quaternions (..., 4) of unit length; the identity for what is not a rotation."""
-    quat = np.nan_to_num(quat)
-    length = np.linalg.norm(quat, axis=-1, keepdims=True)
-    return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
 
 
 def packed(array: Any, kind: str) -> str:

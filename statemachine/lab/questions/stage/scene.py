@@ -10,16 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ...interface import Array, Ints
-from ...lab.compare.series import world_forces
-from ...lab.questions.compared_names import long_labels, traces_of
-from ...lab.questions.over_time import BothRuns
-from ...lab.recordings import Trace
-from ...measures import common_moments
-from .. import report_template as template
-from ..drawing import Drawing
-from ..drawing.scene import Camera, Motion, camera_for
-from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised, unit_quat
+from ....interface import Array, Ints
+from ....measures import common_moments
+from ....show import report_template as template
+from ....show.drawing import Drawing
+from ....show.drawing.scene import Camera, Motion, camera_for
+from ....show.html.geometry import mesh_as_data, mesh_of, packed, quantised
+from ...compare.series import world_forces
+from ...recordings import Trace
+from ..compared_names import long_labels, traces_of
+from .bones import bones_of
+from .both_runs import BothRuns
+from .poses import last_finite, orientations_between, positions_between, rows_at
 
 # What a side is drawn as; or why that cannot be had, a sentence without its end.
 Look = Drawing | str
@@ -74,16 +76,6 @@ def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[A
     return time, max(0, len(common) - len(time))
 
 
-def rows_at(trace: Trace, times: Array) -> tuple[Ints, Array]:
-    """The row (n,) at or before each moment, and how far (n,) it has to go to the next, 0 to 1."""
-    elapsed = trace.time - trace.time[0]
-    row = np.searchsorted(elapsed, times + 1e-9, side="right") - 1
-    following = np.minimum(row + 1, len(elapsed) - 1)
-    width = np.where(following > row, elapsed[following] - elapsed[row], np.inf)
-    share = np.clip((times - elapsed[row]) / width, 0.0, 1.0)
-    return row, np.where(share < 1e-6, 0.0, share)
-
-
 def scene_of(
     runs: BothRuns, looks: Sequence[Look], times: Array, left_out: int = 0, start: int = 0
 ) -> Scene:
@@ -110,12 +102,15 @@ def scene_of(
     ]
     extent = max(drawing.extent for drawing in drawings)
     places = [rows_at(trace, times) for trace in traces]
-    poses = [_between(trace["xpos"], *place) for trace, place in zip(traces, places, strict=True)]
+    poses = [
+        positions_between(trace["xpos"], *place)
+        for trace, place in zip(traces, places, strict=True)
+    ]
     box = _box(poses, drawings[0], extent)
     if box is None:
         return Scene(None, ["No pose of a body is a finite number: there is nothing to draw."])
     motions = [
-        Motion(drawing, box.clipped(pos), _turned(trace["xquat"], *place))
+        Motion(drawing, box.clipped(pos), orientations_between(trace["xquat"], *place))
         for drawing, pos, trace, place in zip(drawings, poses, traces, places, strict=True)
     ]
     tips = _tips(traces, places, site)
@@ -131,7 +126,7 @@ def scene_of(
         side |= _way(traces[k], site, times)
         sides.append(side)
     notes += template.texts(
-        "show/html/scene",
+        "lab/questions/stage/scene",
         other=labels[1] if places[1][1].any() else None,
         hidden=left_out if left_out else None,
         few=few if any(of_side.more for of_side in contacts) else None,
@@ -164,7 +159,7 @@ class _Box:
 
     def clipped(self, pos: Array) -> Array:
         """Return positions (n, nbody, 3) that are finite, within the box."""
-        return np.clip(_held(pos), self.low, self.low + self.span)
+        return np.clip(last_finite(pos), self.low, self.low + self.span)
 
     def as_data(self) -> dict[str, list[float]]:
         """Return it for the script."""
@@ -235,35 +230,12 @@ def _drawings(
         drawings.append(bones_of(trace) if isinstance(look, str) else look)
         left_out = drawings[-1].left_out
         notes += template.texts(
-            "show/html/scene_side",
+            "lab/questions/stage/scene_side",
             left_out=", ".join(left_out) if left_out else None,
             label=label,
             why_not=why_not,
         )
     return notes, drawings
-
-
-def _held(pos: Array) -> Array:
-    """Positions that are not finite are those of the last moment that were."""
-    row, good = np.arange(len(pos))[:, None], np.isfinite(pos).all(axis=2)
-    last = np.maximum.accumulate(np.where(good, row, 0))
-    held = pos[last, np.arange(pos.shape[1])]
-    return np.where(np.isfinite(held), held, 0.0)
-
-
-def _between(values: Array, rows: Ints, share: Array) -> Array:
-    """Rows of values, each gone a share of the way to the next."""
-    share = share.reshape(-1, *[1] * (values.ndim - 1))
-    after = values[np.minimum(rows + 1, len(values) - 1)]
-    return np.where(share > 0, (1 - share) * values[rows] + share * after, values[rows])
-
-
-def _turned(quat: Array, rows: Ints, share: Array) -> Array:
-    """The same of orientations, the shorter way, of unit length."""
-    after = quat[np.minimum(rows + 1, len(quat) - 1)]
-    same = (quat[rows] * after).sum(axis=-1, keepdims=True) >= 0
-    weight = share[:, None, None]
-    return unit_quat((1 - weight) * quat[rows] + weight * np.where(same, after, -after))
 
 
 def _tips(
@@ -272,7 +244,8 @@ def _tips(
     if any("site_xpos" not in trace or tip not in trace.header.sites for trace in traces):
         return None
     left, right = (
-        _between(trace.site(tip)[0], *place) for trace, place in zip(traces, places, strict=True)
+        positions_between(trace.site(tip)[0], *place)
+        for trace, place in zip(traces, places, strict=True)
     )
     return (left, right) if np.isfinite([left, right]).all() else None
 

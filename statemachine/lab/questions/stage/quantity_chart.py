@@ -1,4 +1,4 @@
-"""What a page shows of two runs over time, where it has a slider: the scene, and charts."""
+"""A quantity of two runs over time: how far apart it is, and both sides, as a chart each."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...interface import Array
-from ...measures import distances, same_pairs
-from ...measures.text import figure, quantity, reading, short_time
-from ...show import report_template as template
-from ...show.blocks import Interactive, Traces
-from ...show.report_template import slots_of
-from ..compare import Agreement, Comparison, Series
-from ..compare.chaos import ChaosFloor
-from ..compare.series import NORMAL, normal_forces, total_forces
-from .compared_names import long_labels, name_of, traces_of
-from .events import Event
+from ....interface import Array
+from ....measures import distances, same_pairs
+from ....measures.text import figure, quantity, reading, short_time
+from ....show import report_template as template
+from ....show.blocks import Interactive, Traces
+from ....show.report_template import slots_of
+from ...compare import Agreement, Comparison, Series
+from ...compare.chaos import ChaosFloor
+from ...compare.series import NORMAL, normal_forces, total_forces
+from ..compared_names import long_labels, name_of, traces_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"
@@ -105,25 +104,6 @@ class QuantityChart(Interactive):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class BothRuns(Interactive):
-    """Two runs in one picture, moment by moment.
-
-    Attributes:
-        comparison: Of the two: the left one is drawn solid, the right one as a ghost over it.
-        start: The moment to begin at [s].
-        events: First touches among them are marked.
-        charts: What is followed.
-        lead: Of these, the ones that are spoken, by number.
-    """
-
-    comparison: Comparison
-    start: float
-    events: tuple[Event, ...]
-    charts: tuple[QuantityChart, ...]
-    lead: tuple[int, ...]
-
-
 def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[QuantityChart, ...]:
     """A chart for each quantity that is a number throughout; of many, those most beyond."""
     agreements = {agreement.name: agreement for agreement in comparison.agreements}
@@ -152,7 +132,7 @@ def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[
 
 @dataclass(frozen=True)
 class _FootSlots:
-    """The slots of the template "over_time"; a line with a slot that is None is left out.
+    """The slots of the template "quantity_chart"; a line with a slot that is None is left out.
 
     Attributes:
         by: What computed the energies.
@@ -195,7 +175,7 @@ def foot_of(curve: Series, comparison: Comparison) -> str:
         )
     else:
         return ""
-    return " ".join(template.texts("lab/questions/over_time", **slots_of(slots)))
+    return " ".join(template.texts("lab/questions/stage/quantity_chart", **slots_of(slots)))
 
 
 def _strongest(pair: str, left: Mapping[str, Array], right: Mapping[str, Array]) -> tuple[str, str]:
