@@ -21,7 +21,7 @@ from statemachine.course.grading import answers_in
 from statemachine.errors import BadInputError, EngineWarning, ModelError, ModelFileError, TraceError
 from statemachine.kinematics import Kinematics
 from statemachine.lab.recordings import read
-from statemachine.lab.robots.records import read_table
+from statemachine.lab.robots.table import read_table
 from statemachine.lab.runs import controllers
 from statemachine.lab.sweep import read_manifest
 from statemachine.model_files import check_model_file, checked_file

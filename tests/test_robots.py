@@ -35,7 +35,7 @@ from statemachine.lab.robots import (
     gaps,
 )
 from statemachine.lab.robots.page import page
-from statemachine.lab.robots.records import read_table, write_table
+from statemachine.lab.robots.table import read_table, write_table
 from statemachine.lab.runs.provenance import model_files
 from statemachine.lab.runs.scenarios import scenario
 

@@ -1,1 +1,1 @@
-"""What `compare` and `trace` are asked: a Request and its answer each, its page, its film, its figure."""
+"""What `compare` and `trace` are asked: Requests and answers, pages, films, figures."""

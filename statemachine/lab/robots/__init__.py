@@ -38,10 +38,9 @@ from .records import (
     ModelFile,
     RunGap,
     WitnessRow,
-    read_table,
-    write_table,
 )
 from .survey import EngineTally, RefusedFeature, Survey
+from .table import read_table, write_table
 
 __all__ = [
     "BackendRow",

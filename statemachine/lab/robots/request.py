@@ -11,8 +11,8 @@ from ...models import AnyPath
 from ...processes import checked_jobs
 from ..runs.reporter import QUIET, Reporter
 from . import SECONDS, check_settings, examine_all, find
-from .records import SUFFIXES
 from .survey import Survey
+from .table import SUFFIXES
 
 
 @dataclass(frozen=True)
