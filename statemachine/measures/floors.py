@@ -4,7 +4,7 @@ A tolerance that is a share of the quantity itself says nothing where that quant
 8e-34 N·m a millionth is less still. So nothing is called a difference that is below a share of the
 robot's own weight and size. There are two shares.
 
-Of a run, of the forces of its contacts and of its energy, it is 2⁻²³, a ten-millionth: what a
+Of a run, of the forces of its contacts and of its energy, it is 2^-23, a ten-millionth: what a
 number in single precision keeps, in which many simulators hold their state. A force of that share
 of its weight moves a robot by 2 µm in 2 s, whatever the weight is; 0.1 g more on an arm of 6 N
 weighs a thousand times as much.

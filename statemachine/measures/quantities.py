@@ -185,7 +185,7 @@ def _not_below(floor: float, share: Tolerance, times: str, scale: RobotScale | N
     of = f"the robot's weight, {rounded(scale.weight, 'N')}"
     if times:
         of += f", {times}, {rounded(scale.size, 'm')}"
-    return Tolerance(floor, f"a ten-millionth (2⁻²³) of {of}: less moves nothing")
+    return Tolerance(floor, f"a ten-millionth (2^-23) of {of}: less moves nothing")
 
 
 def _change(energies: Array) -> float:

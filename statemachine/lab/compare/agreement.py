@@ -22,11 +22,11 @@ from ...measures.text import on
 from ..recordings import Trace
 from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
-from .motion import Motion, Motions, least_motions, motion_of, with_efforts
+from .motion import LeastMotion, MotionExtent, least_motions, motion_of, with_efforts
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
-Outcome = Literal["agrees", "differs", "ended", "nothing moved"]
+ComparisonOutcome = Literal["agrees", "differs", "ended", "nothing moved"]
 
 
 @dataclass(frozen=True)
@@ -155,12 +155,12 @@ class Comparison:
     until: float
     agreements: tuple[Agreement, ...]
     notes: tuple[str, ...]
-    motion: Motion
+    motion: MotionExtent
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> ComparisonOutcome:
         """What came of it.
 
         "ended" where a side ended before its time; "differs" where a quantity does not agree at
@@ -176,7 +176,7 @@ class Comparison:
     def agrees(self) -> bool:
         """Whether something moved, every quantity agrees always, and both runs came to their end.
 
-        Forces of contacts and changes of energy count as motion, see `Motion`.
+        Forces of contacts and changes of energy count as motion, see `MotionExtent`.
         """
         return self.outcome == "agrees"
 
@@ -256,7 +256,7 @@ def compare(
     )
 
 
-def _motion(left: Trace, right: Trace, least: Motions, until: float) -> Motion:
+def _motion(left: Trace, right: Trace, least: LeastMotion, until: float) -> MotionExtent:
     """Return how far the joints move that both runs have.
 
     Args:

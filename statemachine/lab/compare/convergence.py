@@ -21,7 +21,7 @@ from ...measures import common_moments
 from ..recordings import Trace
 from ..runs.drive import Progress, silent
 from .labels import labels_of
-from .motion import SEEN, Motion, motion_of
+from .motion import SEEN, MotionExtent, motion_of
 from .series import Series, default_tip, series
 
 FINER = (1, 2, 4, 8, 16)  # engine steps to one of the first runs; from 8 on, where it is unclear
@@ -88,7 +88,7 @@ class Convergence:
     touch: float | None
     before: tuple[GapLimit, ...]
     whole: tuple[GapLimit, ...]
-    motion: Motion
+    motion: MotionExtent
 
     @property
     def is_still(self) -> bool:

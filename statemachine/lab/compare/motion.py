@@ -14,20 +14,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...interface import Array, Ints, JointType
-from ...measures import QUANTITIES, RobotScale, distances, largest_or_inf
+from ...measures import OF_A_RUN, QUANTITIES, RobotScale, distances, largest_or_inf
 from ...measures.floors import energy_floor, force_floor
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings import Trace
 from .series import SCALARS, Series, joint_columns
 
-Motions = Mapping[str, float]
+LeastMotion = Mapping[str, float]
 # What two runs have to move by so that a gap that is rounding says that they move alike: 100 times
-# what the arithmetic of an engine makes of a run.
-SEEN: Motions = {"joint": 1e-6, "slide": 1e-7, "body": 1e-7, "body rotation": 1e-6}
+# what the arithmetic of an engine makes of a run, 1e-6 rad and 1e-7 m.
+SEEN: LeastMotion = {
+    kind: 100 * OF_A_RUN[quantity.unit] for kind, quantity in QUANTITIES.items() if quantity.own
+}
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionExtent:
     """How far two runs move from where they start: the largest of either side.
 
     Attributes:
@@ -57,8 +59,8 @@ class Motion:
 
 
 def motion_of(
-    sides: Sequence[tuple[Trace, Sequence[str]]], least: Motions, seconds: float
-) -> Motion:
+    sides: Sequence[tuple[Trace, Sequence[str]]], least: LeastMotion, seconds: float
+) -> MotionExtent:
     """Return how far the coordinates of two runs move.
 
     Args:
@@ -74,7 +76,7 @@ def motion_of(
                 largest[kind] = max(extent, largest.get(kind, 0.0))
     turned = [extent for kind, extent in largest.items() if QUANTITIES[kind].unit == "rad"]
     slid = [extent for kind, extent in largest.items() if QUANTITIES[kind].unit == "m"]
-    return Motion(
+    return MotionExtent(
         seconds=seconds,
         angle=max(turned, default=None),
         length=max(slid, default=None),
@@ -85,7 +87,9 @@ def motion_of(
     )
 
 
-def with_efforts(motion: Motion, curves: Sequence[Series], robot: RobotScale | None) -> Motion:
+def with_efforts(
+    motion: MotionExtent, curves: Sequence[Series], robot: RobotScale | None
+) -> MotionExtent:
     """Return a motion, and what energies and contact forces were compared besides.
 
     Args:
@@ -100,7 +104,7 @@ def with_efforts(motion: Motion, curves: Sequence[Series], robot: RobotScale | N
     return replace(motion, energy=energy, force=force, loaded=changes or presses)
 
 
-def least_motions(tolerances: Mapping[str, float] | None) -> Motions:
+def least_motions(tolerances: Mapping[str, float] | None) -> LeastMotion:
     """Return what is no motion [rad or m] by kind of coordinate: its tolerance.
 
     A tolerance that is wider than ours lets more pass as agreement, but moves nothing less.

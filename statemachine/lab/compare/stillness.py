@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...measures.text import quantity
 from .instead import Instead
-from .motion import Motion
+from .motion import MotionExtent
 
 STILL = "Nothing moved ({most} in {seconds:g} s{energy}), so nothing was compared: {instead}"
 TRY = "try {experiment}, which moves {file}"
@@ -19,7 +19,7 @@ NONE_MOVES = (
 UNKNOWN = "try waves, which moves whatever has an actuator"
 
 
-def nothing_moved(motion: Motion, instead: Instead | None = None) -> str:
+def nothing_moved(motion: MotionExtent, instead: Instead | None = None) -> str:
     """Say that nothing moved, and what to run instead; a sentence without its end.
 
     Args:
@@ -34,7 +34,7 @@ def nothing_moved(motion: Motion, instead: Instead | None = None) -> str:
     )
 
 
-def extent_of(motion: Motion) -> str:
+def extent_of(motion: MotionExtent) -> str:
     """Return how far both sides move at most, as text: "0°", "0.001° and 0 mm"."""
     extents: list[str] = []
     if motion.angle is not None:

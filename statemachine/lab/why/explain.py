@@ -18,7 +18,7 @@ from ..compare import perturbed
 from ..compare.instead import instead_of
 from ..compare.labels import files_apart
 from ..compare.matching import Matched, match_alike, match_models, missing_parts
-from ..compare.motion import SEEN, Motion, motion_of
+from ..compare.motion import SEEN, MotionExtent, motion_of
 from ..recordings import Trace
 from ..runs.drive import Progress, silent
 from ..runs.provenance import provenance
@@ -144,7 +144,7 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
     )
 
 
-def _motion(trials: Trials, matched: Matched) -> Motion:
+def _motion(trials: Trials, matched: Matched) -> MotionExtent:
     """Return how far the joints move that both sides have, as they come."""
     sides: list[tuple[Trace, list[str]]] = []
     for side, trace in enumerate(trials.traces):

@@ -10,7 +10,7 @@ from ...engines.records import DifferingQuantity
 from ...measures import Deviation
 from ..compare.instead import Instead
 from ..compare.matching import Only
-from ..compare.motion import Motion
+from ..compare.motion import MotionExtent
 from ..runs.provenance import Provenance
 from .gap import FirstTouch, Measure
 from .locate import Localisation
@@ -130,7 +130,7 @@ class Explanation:
     notes: tuple[str, ...]
     unread: tuple[str, ...]
     still: tuple[str, ...]
-    motion: Motion
+    motion: MotionExtent
     instead: Instead | None
     touch: FirstTouch | None
     moments: int
