@@ -97,7 +97,13 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     )
 
 
-def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matching:
+def match(
+    left: GroupTree,
+    right: GroupTree,
+    *,
+    one_world: bool = False,
+    root_align: Placement | None = None,
+) -> Matching:
     """Pairs of rigid groups.
 
     Args:
@@ -105,6 +111,7 @@ def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matc
         right: Another.
         one_world: Whether two worlds are laid on each other as they are, and not so that what is
             fixed to them coincides: gravity, and what floats, is told in the frame of the world.
+        root_align: The frame of the first base in that of the second; None where it is looked for.
     """
     pairs: dict[int, Pair] = {}
     taken: set[int] = set()
@@ -112,7 +119,9 @@ def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matc
 
     def add(a: Group, b: Group, by: str, moved: bool = False) -> None:
         above, choices = pairs.get(a.parent), [HERE]
-        if by == "root" and not (one_world and a.number == b.number == 0):
+        if by == "root" and root_align is not None:
+            choices = [root_align]
+        elif by == "root" and not (one_world and a.number == b.number == 0):
             choices = _of_root(left, right, a, b)
         elif by != "root" and above is not None and not moved:
             # One frame, or two of a solid that is in one place.

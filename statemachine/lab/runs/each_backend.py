@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+from ...backends import BackendChoice
 from ...backends.chosen import ALL, chosen_backends
 from ...errors import MissingEngineError, ModelError, StateMachineError, UnsupportedError
 from ...interface import Model
@@ -15,6 +16,11 @@ from .reporter import Reporter
 R = TypeVar("R")  # what is computed on a backend
 
 
+def load_on(backend: BackendChoice, model: AnyPath, menagerie: AnyPath | None) -> Model:
+    """Load a model on a backend, as `load_to_run` does."""
+    return backend.load_to_run(model, menagerie=menagerie)
+
+
 def on_each_backend(
     backends: Sequence[str],
     what: str,
@@ -22,6 +28,7 @@ def on_each_backend(
     menagerie: AnyPath | None,
     compute: Callable[[Model, str, Progress], R],
     reporter: Reporter,
+    load: Callable[[BackendChoice, AnyPath, AnyPath | None], Model] = load_on,
 ) -> dict[str, R]:
     """Return results by backend; of "all", one whose engine is missing is noted and left out.
 
@@ -33,6 +40,7 @@ def on_each_backend(
         compute: Called with the Model, the backend as it is typed, and what is told the fraction
             that is done.
         reporter: Told how it gets on.
+        load: Loads the model on a backend, given the menagerie folder.
 
     Raises:
         MissingEngineError: An engine that is named is missing, or all are.
@@ -42,7 +50,7 @@ def on_each_backend(
     missing: dict[str, StateMachineError] = {}  # by its text: several may say the same
     for backend in dict.fromkeys(chosen_backends(backends)):
         try:
-            loaded = backend.load_to_run(model, menagerie=menagerie)
+            loaded = load(backend, model, menagerie)
         except (MissingEngineError, ModelError, UnsupportedError) as error:
             if ALL not in backends:
                 raise

@@ -46,6 +46,18 @@ class _OfEngines:
         return self.result.has_one_tip and self.result.has_other_names
 
     @property
+    def balanced(self) -> tuple[str, ...]:
+        """Bodies whose inertia was balanced."""
+        repairs = self.result.repairs
+        return tuple(repair.name for repair in repairs if repair.quantity == "inertia")
+
+    @property
+    def left_out_meshes(self) -> tuple[str, ...]:
+        """Meshes that were left out."""
+        repairs = self.result.repairs
+        return tuple(repair.name for repair in repairs if repair.kind == "mesh")
+
+    @property
     def renamed_joints(self) -> tuple[str, ...]:
         """Joints of other names for the witness, each with that name."""
         pairs = self.result.renamed_joints
@@ -109,6 +121,7 @@ def _reading_of(result: FingertipResult) -> Hashable:
     tips = result.site if result.has_one_tip else len(result.tips)
     read = (result.grade, result.reason, result.witness_file, result.prepared)
     pairs = (result.relative_to, result.renamed_joints, result.left_out)
+    pairs += (result.refusal, result.repairs)
     return tips, read, pairs, result.poses, result.provenance.seed
 
 

@@ -8,12 +8,14 @@ it is refused instead of being measured.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import BadInputError, ModelError, UnknownNameError
 from ...installed import WITNESS
 from ...interface import Array, Model
+from ...interface.records import AS_WRITTEN
 from ...kinematics import Kinematics
 from ...models import AnyPath
 from ...rotations import Placement, angle_between
@@ -25,6 +27,9 @@ from .fingertip_poses import checked_poses, engine_poses, random_qpos, relative
 from .fingertip_result import SAME_FRAME, TOLERANCE, FingertipResult, FrameOffset, TipGap
 from .witness_parts import WitnessFrame, WitnessParts
 from .witness_places import witness_parts
+
+if TYPE_CHECKING:
+    from ...backends.repairs import Repair
 
 __all__ = [
     "FingertipResult",
@@ -81,7 +86,7 @@ def certify(
     left_out = tuple(tip.name for tip in tips if tip not in asked.tips)
     renamed_joints = tuple(parts.renamed_joints())
     versions = {WITNESS: known.version}
-    return FingertipResult(
+    result = FingertipResult(
         tips=tuple(gaps),
         left_out=left_out,
         relative_to=parts.relative_to,
@@ -94,6 +99,17 @@ def certify(
         prepared=known.prepared,
         provenance=provenance(model, seed, **versions),
     )
+    return replace(result, repairs=_repairs(model))
+
+
+def _repairs(model: Model) -> tuple[Repair, ...]:
+    """Return what was changed of a model's file so that the engine reads it."""
+    if model.compiled is None or model.read_options == AS_WRITTEN:
+        return ()
+    from ...backends.reading import compile_with  # it imports an engine
+
+    _, repairs = compile_with(model.path, model.read_options)
+    return tuple(repairs)
 
 
 @dataclass(frozen=True)

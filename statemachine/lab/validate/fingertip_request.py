@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 
+from ...backends import BackendChoice
 from ...backends.chosen import chosen_backends
-from ...errors import BadInputError
+from ...errors import BadInputError, EngineWarning, ModelError, StateMachineError
 from ...installed import DEFAULT
 from ...interface import Model
 from ...models import AnyPath
 from ..runs.drive import Progress
-from ..runs.each_backend import on_each_backend
+from ..runs.each_backend import load_on, on_each_backend
 from ..runs.reporter import QUIET, Reporter
 from .fingertip import certify
 from .fingertip_poses import checked_poses
 from .fingertip_result import FingertipResult
+
+_ADVICE = "; load("  # what an error says to type, which is done here
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,27 @@ class FingertipRequest:
 def answer(request: FingertipRequest, reporter: Reporter = QUIET) -> dict[str, FingertipResult]:
     """Return a certificate for each backend.
 
+    Places need no masses, inertias or meshes: a file that is refused for one of them is read all
+    the same, and the certificate says so.
+
     Raises:
         MissingEngineError: An engine that is named is not installed here, or the witness is not.
         StateMachineError: The model cannot be loaded, or as `certify` does.
     """
+    refusals: dict[str, str] = {}
 
-    def compute(model: Model, _backend: str, progress: Progress) -> FingertipResult:
-        return certify(
+    def load(backend: BackendChoice, model: AnyPath, menagerie: AnyPath | None) -> Model:
+        try:
+            return load_on(backend, model, menagerie)
+        except ModelError as error:
+            mended = _load_for_places(backend, model, menagerie)
+            if mended is None:
+                raise
+            refusals[str(backend)] = str(error).partition(_ADVICE)[0]
+            return mended
+
+    def compute(model: Model, backend: str, progress: Progress) -> FingertipResult:
+        result = certify(
             model,
             poses=request.poses,
             seed=request.seed,
@@ -67,7 +85,30 @@ def answer(request: FingertipRequest, reporter: Reporter = QUIET) -> dict[str, F
             witness_frame=request.witness_frame,
             progress=progress,
         )
+        return replace(result, refusal=refusals.get(backend, ""))
 
     return on_each_backend(
-        request.backends, "fingertip", request.model, request.menagerie, compute, reporter
+        request.backends,
+        "fingertip",
+        request.model,
+        request.menagerie,
+        compute,
+        reporter,
+        load,
     )
+
+
+def _load_for_places(
+    backend: BackendChoice, model: AnyPath, menagerie: AnyPath | None
+) -> Model | None:
+    """Return a refused model with its inertias balanced and without its meshes; None if it cannot.
+
+    What that changes is in the certificate, so no warning tells of it.
+    """
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):
+        try:
+            return backend.load_to_run(
+                model, menagerie=menagerie, balance_inertia=True, meshes=False
+            )
+        except StateMachineError:
+            return None

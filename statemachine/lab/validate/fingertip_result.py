@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from ...measures import largest_or_inf
 from ...show.blocks import only_on_pages
 from ...witness import OWN_READING
 from ..runs.provenance import Provenance
+
+if TYPE_CHECKING:  # it imports an engine
+    from ...backends.repairs import Repair
 
 TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
@@ -127,6 +130,9 @@ class FingertipResult:
         reason: Why it is not an own reading; "" if it is.
         prepared: What was done to the file's text before Pinocchio read it.
         provenance: What it was computed with, the seed of the poses included.
+        repairs: Inertias of the file that were balanced and meshes that were left out so that the
+            engine reads it; they have no part in places.
+        refusal: Why the engine refuses the file as it is; "" where it does not.
     """
 
     tips: tuple[TipGap, ...]
@@ -140,6 +146,8 @@ class FingertipResult:
     reason: str
     prepared: tuple[str, ...]
     provenance: Provenance
+    repairs: tuple[Repair, ...] = ()
+    refusal: str = ""
 
     @property
     @only_on_pages

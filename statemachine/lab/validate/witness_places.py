@@ -71,10 +71,10 @@ class PartsByPlace(WitnessParts):
         theirs = describe(kinematics, _joint_labels(kinematics, "the witness"))
         self._left, self._right = GroupTree(ours), GroupTree(theirs)
         has_two_worlds = ours.rooted and theirs.rooted
-        matching = match(self._left, self._right, one_world=has_two_worlds)
-        root = matching.pairs[0]
-        base = _best_base(matching, _bases(self._left, self._right, root, has_two_worlds))
-        self._aligned = _aligned(matching, base.align)
+        root = match(self._left, self._right, one_world=has_two_worlds).pairs[0]
+        bases = _bases(self._left, self._right, root, has_two_worlds)
+        base, matching = _best_base(self._left, self._right, bases)
+        self._aligned = {pair.left.number: pair.align for pair in matching.pairs}
         self._counterparts = {pair.left.number: pair.right.number for pair in matching.pairs}
         self._frame_names = frame_names(self._left, self._right)
         is_of_worlds = root.left.number == 0 and root.right.number == 0
@@ -202,10 +202,11 @@ def _bases(left: GroupTree, right: GroupTree, root: Pair, has_two_worlds: bool) 
         names += [*common, first]
     else:  # one of them floats: a common name says best which bodies are one
         names = [*common, first, *names]
-    bases = []
+    bases: list[_Base] = []
     for body, witness_body in names:
         align = others[witness_body] @ places[body].inverse
-        bases.append(_Base(body, witness_body, align))
+        if not any(_are_one_place(align, base.align) for base in bases):
+            bases.append(_Base(body, witness_body, align))
     return bases
 
 
@@ -216,53 +217,38 @@ def _first_link(tree: GroupTree, group: Group) -> str:
     return group.name
 
 
-def _best_base(matching: Matching, bases: Sequence[_Base]) -> _Base:
-    """Return the first base with which the places of the joints fit nearly best."""
-    misfits = [_misfit(matching, base.align) for base in bases]
-    least = min(misfits)
-    for base, misfit in zip(bases, misfits, strict=True):
-        if misfit <= least + _CLEARLY:
-            return base
-    return bases[0]
-
-
-def _misfit(matching: Matching, base: Placement) -> float:
-    """Return how badly the places of joints fit; each counts 1 at most."""
-    aligned = _aligned(matching, base)
-    sum_of_misfits = 0.0
-    for pair in matching.pairs:
-        above = aligned.get(pair.left.parent)
-        if pair.by == "root" or pair.moved or above is None:
-            continue
-        hung = _as_it_hangs(pair, above)
-        gap = hung.distance(aligned[pair.left.number])
-        gap += hung.angle(aligned[pair.left.number]) / 10
-        sum_of_misfits += gap / (gap + _ODD)
-    return sum_of_misfits
-
-
-def _aligned(matching: Matching, base: Placement) -> dict[int, Placement]:
-    """Return the frame of each rigid part of the engine in that of its counterpart, by number.
+def _best_base(left: GroupTree, right: GroupTree, bases: Sequence[_Base]) -> tuple[_Base, Matching]:
+    """Return the first base with which most parts are paired, and their joints fit nearly best.
 
     Args:
-        matching: Which part is which.
-        base: The frame of the base.
+        left: The engine's robot.
+        right: The witness's.
+        bases: Ways to lay the one on the other.
     """
-    aligned: dict[int, Placement] = {}
+    matchings = [match(left, right, root_align=base.align) for base in bases]
+    most = max(len(matching.pairs) for matching in matchings)
+    fitting = [
+        (base, matching)
+        for base, matching in zip(bases, matchings, strict=True)
+        if len(matching.pairs) == most
+    ]
+    misfits = [_misfit(matching) for _, matching in fitting]
+    least = min(misfits)
+    best = next(k for k, misfit in enumerate(misfits) if misfit <= least + _CLEARLY)
+    return fitting[best]
+
+
+def _misfit(matching: Matching) -> float:
+    """Return how badly the places of joints fit; each counts 1 at most."""
+    sum_of_misfits = 0.0
     for pair in matching.pairs:
-        above = aligned.get(pair.left.parent)
-        align = pair.align
-        if pair.by == "root":
-            align = base
-        elif align is not HERE and above is not None and not pair.moved:
-            align = _as_it_hangs(pair, above)
-        aligned[pair.left.number] = align
-    return aligned
-
-
-def _as_it_hangs(pair: Pair, above: Placement) -> Placement:
-    """Return the frame of a part in that of its counterpart, by how both hang on their parents."""
-    return pair.right.place.inverse @ above @ pair.left.place
+        above = matching.of(pair.left.parent)
+        if pair.by == "root" or pair.moved or above is None:
+            continue
+        hung = pair.right.place.inverse @ above.align @ pair.left.place
+        gap = hung.distance(pair.align) + hung.angle(pair.align) / 10
+        sum_of_misfits += gap / (gap + _ODD)
+    return sum_of_misfits
 
 
 def _are_one_place(frame: Placement, other: Placement) -> bool:
