@@ -14,9 +14,7 @@ from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, cast
-
-import mujoco
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from ..errors import EngineWarning
 from ..installed import engine_version
@@ -49,6 +47,9 @@ from .compiled import (
     fastest,
 )
 from .hidden_data import HiddenModel
+
+if TYPE_CHECKING:
+    from .compiled_types import MjModel
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -218,7 +219,7 @@ class FileFacts:
     backend: str = "pybullet"
 
     @classmethod
-    def of(cls, raw: mujoco.MjModel, capabilities: Capabilities) -> FileFacts:
+    def of(cls, raw: MjModel, capabilities: Capabilities) -> FileFacts:
         """Take them from a compiled model."""
         known = facts(raw)
         wanted = {field.name: known[field.name] for field in fields(cls) if field.name in known}
@@ -306,10 +307,10 @@ class PybulletModel(HiddenModel):
         )
 
     @property
-    def compiled(self) -> mujoco.MjModel:
+    def compiled(self) -> MjModel:
         return self.plan.raw
 
-    def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
+    def with_compiled(self, compiled: MjModel) -> PybulletModel:
         check_numbers(compiled, str(self.path))
         plan = Plan(compiled, weighed=self.plan.weighed)
         if self.plan.file:

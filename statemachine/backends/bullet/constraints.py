@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...interface import Array
 from ...rotations import INVERSE, matrix_from_quat, times
 from .. import dense
+from ..compiled_kinds import SITE, EqualityKind
+from ..compiled_stages import compute_tendons
 from .soft import Soft, SoftRow, bounds_of, shortest_time, soft, soft_row
-from .ties import PLACES, SITE, ends_of, linear_sum, movers, moving
+from .ties import PLACES, ends_of, linear_sum, movers, moving
 from .world import Tree, World
 
-_EQ = mujoco.mjtEq
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
 
 
-def _related(raw: mujoco.MjModel, dofs: Any) -> Any:
+def _related(raw: MjModel, dofs: Any) -> Any:
     """(n, n): of which pairs of degrees of freedom one carries the other."""
     carriers = np.eye(raw.nv, dtype=bool)
     for dof, parent in enumerate(raw.dof_parentid.tolist()):  # what carries comes first
@@ -50,9 +52,7 @@ class Tendons:
         stiff, limited, rubs: Whether any has a spring, a limit, dry friction.
     """
 
-    def __init__(
-        self, raw: mujoco.MjModel, world: World, tree: Tree, off: Mapping[str, bool]
-    ) -> None:
+    def __init__(self, raw: MjModel, world: World, tree: Tree, off: Mapping[str, bool]) -> None:
         self._raw, self._world, self._tree = raw, world, tree
         self.ids = ids = [
             tendon
@@ -100,8 +100,7 @@ class Tendons:
             return None
         raw, data = self._raw, self._world.still
         data.qpos[self._tree.qpos] = q
-        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon):
-            stage(raw, data)
+        compute_tendons(raw, data)
         for place in self.bent:
             start, count = raw.ten_J_rowadr[self.ids[place]], raw.ten_J_rownnz[self.ids[place]]
             row = np.zeros(raw.nv)
@@ -178,7 +177,7 @@ class Equalities:
 
     def __init__(
         self,
-        raw: mujoco.MjModel,
+        raw: MjModel,
         world: World,
         tree: Tree,
         tendons: Tendons,
@@ -193,19 +192,19 @@ class Equalities:
             bodies = ends_of(raw, eq)
             if tree.links.keys().isdisjoint(moving(raw, bodies)):
                 continue
-            kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
+            kind, ends = EqualityKind(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
             style = raw.eq_solref[[eq]], raw.eq_solimp[[eq]]
             if kind in PLACES:
                 weights = raw.body_invweight0[bodies].sum(axis=0)
                 move, turn = (soft(*style, weights[[k]], shortest) for k in (0, 1))
                 kinds = move * 3
-                if kind == _EQ.mjEQ_WELD:
+                if kind == EqualityKind.WELD:
                     kinds += turn * 3
                 places = [TiedPlace(raw, eq, side, body) for side, body in enumerate(bodies)]
                 self._places.append(TiedPlaces(eq, kinds, places))
                 continue
             ends = [int(end) for end in ends if end >= 0]
-            if kind == _EQ.mjEQ_JOINT:
+            if kind == EqualityKind.JOINT:
                 dofs = raw.jnt_dofadr[ends]
                 moments = [(tree.dofs == dof).astype(np.float64) for dof in dofs]
                 zero, weight = raw.qpos0[raw.jnt_qposadr[ends]], raw.dof_invweight0[dofs]
@@ -309,9 +308,9 @@ class TiedPlace:
         still: Whether no joint moves the body.
     """
 
-    def __init__(self, raw: mujoco.MjModel, eq: int, side: int, body: int) -> None:
+    def __init__(self, raw: MjModel, eq: int, side: int, body: int) -> None:
         number, data = int((raw.eq_obj1id, raw.eq_obj2id)[side][eq]), raw.eq_data[eq]
-        weld = raw.eq_type[eq] == int(_EQ.mjEQ_WELD)
+        weld = raw.eq_type[eq] == EqualityKind.WELD
         self.body, self.quat = body, np.array([1.0, 0.0, 0.0, 0.0])
         if raw.eq_objtype[eq] == SITE:
             self.offset, self.quat = raw.site_pos[number], raw.site_quat[number]

@@ -11,19 +11,22 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ...interface import Array, Contacts
 from ...rotations import matrix_from_quat
 from .. import dense
+from ..compiled_flags import DisableFlag
+from ..compiled_kinds import GeomKind
 from ..contact_rules import bodies_meet, mixed
 
-PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
-NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
+
+NO_CONTACT = int(DisableFlag.CONTACT | DisableFlag.CONSTRAINT)
 _MOST = 10.0  # PyBullet's largest friction of a pair
 _CLOSE = 0.01  # a friction is the model's if it is within this part of it
 
@@ -92,7 +95,7 @@ class Surfaces:
         differences: Where friction is not the model's, in words.
     """
 
-    def __init__(self, raw: mujoco.MjModel) -> None:
+    def __init__(self, raw: MjModel) -> None:
         self._raw = raw
         meets = _meets(raw)
         touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
@@ -189,7 +192,7 @@ class Surfaces:
         return np.maximum(np.round(frictions, 12), 0.0)
 
 
-def _meets(raw: mujoco.MjModel) -> NDArray[np.bool_]:
+def _meets(raw: MjModel) -> NDArray[np.bool_]:
     """(ngeom, ngeom): which geoms may touch."""
     if raw.opt.disableflags & NO_CONTACT:
         return np.zeros((raw.ngeom, raw.ngeom), dtype=bool)
@@ -203,9 +206,7 @@ def _meets(raw: mujoco.MjModel) -> NDArray[np.bool_]:
     return meets
 
 
-def _solids(
-    raw: mujoco.MjModel, meets: NDArray[np.bool_], touching: NDArray[np.bool_]
-) -> list[Solid]:
+def _solids(raw: MjModel, meets: NDArray[np.bool_], touching: NDArray[np.bool_]) -> list[Solid]:
     """Return the solids of a model, planes first: geoms of a body that meet the same are one.
 
     Args:
@@ -213,7 +214,7 @@ def _solids(
         meets: (ngeom, ngeom) which geoms may touch.
         touching: (ngeom,) which may touch any other.
     """
-    planes = touching & (raw.geom_type == PLANE)
+    planes = touching & (raw.geom_type == GeomKind.PLANE)
     solids = [
         Solid(int(raw.geom_bodyid[g]), (g,), plane=True) for g in np.flatnonzero(planes).tolist()
     ]
@@ -225,7 +226,7 @@ def _solids(
     return solids
 
 
-def _mixed(raw: mujoco.MjModel, a: int, b: int) -> tuple[int, Array, Array]:
+def _mixed(raw: MjModel, a: int, b: int) -> tuple[int, Array, Array]:
     """The condim, friction (3,) and solref (2,) of a contact of two geoms."""
     ends = np.sort([raw.pair_geom1, raw.pair_geom2], axis=0).T
     named = np.flatnonzero((ends == sorted((a, b))).all(axis=1))
@@ -236,13 +237,13 @@ def _mixed(raw: mujoco.MjModel, a: int, b: int) -> tuple[int, Array, Array]:
     return mixed(raw, a, b)[:3]
 
 
-def _friction(raw: mujoco.MjModel, a: int, b: int) -> Array:
+def _friction(raw: MjModel, a: int, b: int) -> Array:
     """Sliding, spinning and rolling friction of a pair, zero where its condim leaves it out."""
     condim, friction, _ = _mixed(raw, a, b)
     return friction * (condim > np.array([1, 3, 4]))
 
 
-def damping_ratios(raw: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
+def damping_ratios(raw: MjModel, pairs: list[tuple[int, int]]) -> Array:
     """Of contacts of geoms (n, 2), by their solref."""
     first, second = np.array([_mixed(raw, a, b)[2] for a, b in pairs]).T
     # Negated, they are stiffness and damping.
@@ -250,7 +251,7 @@ def damping_ratios(raw: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
 
 
 def contacts_of(
-    raw: mujoco.MjModel,
+    raw: MjModel,
     points: Iterable[Any],
     geoms: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]],
     turns_of_geoms: Mapping[int, Array],
@@ -327,7 +328,7 @@ def _axes(normal: Array) -> Array:
     return np.array([normal, first, np.cross(normal, first)])
 
 
-def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> float:
+def _distance(raw: MjModel, geom: int, turn: Array, point: Array) -> float:
     """Signed distance of a point, in the body's frame, from the surface of its geom [m].
 
     Args:
@@ -338,10 +339,10 @@ def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> floa
     """
     local = dense.times(turn, point - raw.geom_pos[geom])
     size, kind, box = raw.geom_size[geom], int(raw.geom_type[geom]), raw.geom_aabb[geom]
-    if kind in (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE)):
+    if kind in (GeomKind.SPHERE, GeomKind.CAPSULE):
         # From the middle, or the middle line; a sphere has no second size.
         return float(math.hypot(*local[:2], max(abs(local[2]) - size[1], 0.0)) - size[0])
-    if kind == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+    if kind == GeomKind.CYLINDER:
         beyond = np.array([np.hypot(local[0], local[1]) - size[0], abs(local[2]) - size[1]])
     else:  # a mesh by the box around it
         beyond = np.abs(local - box[:3]) - box[3:]

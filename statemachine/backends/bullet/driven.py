@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 from weakref import proxy
 
-import mujoco
 import numpy as np
 
-from ...interface import DERIVED, POSES, Array
+from ...interface import DERIVED, POSES, Array, JointType
 from ...interface.records import Arrays
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
 from .. import dense
@@ -27,6 +26,9 @@ from .drives import in_force
 from .joint_dynamics import Law
 from .plan import Plan
 from .world import Tree, World
+
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
 
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
 Act = Callable[[World], None]  # sets something in a world that was opened
@@ -203,7 +205,7 @@ class DrivenWorld(HiddenWorld):
 class Motors:
     """One tree of joints as PyBullet's users drive it: POSITION_CONTROL to ctrl."""
 
-    def __init__(self, world: World, tree: Tree, raw: mujoco.MjModel) -> None:
+    def __init__(self, world: World, tree: Tree, raw: MjModel) -> None:
         self._world, self.tree = world, tree
         joints = raw.dof_jntid[tree.dofs[tree.base :]].tolist()
         self._driven: list[int] = []  # PyBullet's index of each joint that is driven
@@ -283,7 +285,7 @@ class Ghost(World):
         for tree, centres in zip(self.trees, self._states(qpos), strict=True):
             bodies = list(tree.links)
             xpos[bodies], xquat[bodies] = self.frames(bodies, *centres)
-        for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
+        for joint in np.flatnonzero(raw.jnt_type == JointType.FREE):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
             quat = qpos[start + 3 : start + 7]
             xpos[body], xquat[body] = qpos[start : start + 3], quat / math.hypot(*quat)
@@ -331,7 +333,7 @@ class Ghost(World):
             return self._known[sites]
 
 
-def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
+def free_dynamics(raw: MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
     """Mass matrix (6, 6) and bias (6,) of a free body, in MuJoCo's coordinates.
 
     Newton's and Euler's equations about the centre of mass, whose velocity is J·qvel.

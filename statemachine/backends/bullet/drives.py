@@ -11,31 +11,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...interface import Array
 from ...rotations import matrix_from_quat
 from .. import dense
 from ..compiled import gravity
+from ..compiled_actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
+from ..compiled_flags import DisableFlag
+from ..compiled_kinds import SMALLEST
+from ..compiled_stages import MuscleCurves, muscle_curves
 from .constraints import Tendons
 from .soft import bounds_of
 from .world import Tree, World
 
-_OFF, _DYN = mujoco.mjtDisableBit, mujoco.mjtDyn
-DYNAMICS = [
-    int(kind)
-    for kind in (
-        _DYN.mjDYN_INTEGRATOR,
-        _DYN.mjDYN_FILTER,
-        _DYN.mjDYN_FILTEREXACT,
-        _DYN.mjDYN_MUSCLE,
-    )
-]
-MUSCLE = int(mujoco.mjtGain.mjGAIN_MUSCLE)
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
+
+DYNAMICS = (
+    ActivationKind.INTEGRATOR,
+    ActivationKind.FILTER,
+    ActivationKind.FILTEREXACT,
+    ActivationKind.MUSCLE,
+)
 _NUDGE = 1e-5  # [m/s] of speed, for the slope of a muscle's gain: pieces of parabolas
 
 
@@ -64,7 +64,7 @@ class Drives:
 
     def __init__(
         self,
-        raw: mujoco.MjModel,
+        raw: MjModel,
         tree: Tree,
         tendons: Tendons,
         off: Mapping[str, bool],
@@ -82,9 +82,9 @@ class Drives:
             inertia: (2, n, n) of the tree's joints: what constraints feel, and what moves.
         """
         joints = raw.dof_jntid[tree.dofs]
-        on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+        on_tendon = raw.actuator_trntype == TransmissionKind.TENDON
         target = raw.actuator_trnid[:, 0]
-        on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+        on_joint = raw.actuator_trntype == TransmissionKind.JOINT
         driven = np.isin(target, tendons.ids) & on_tendon | np.isin(target, joints) & on_joint
         ids = np.flatnonzero(driven & (not off["actuation"]) & in_force(raw))
         self._ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
@@ -102,7 +102,7 @@ class Drives:
             if on_tendon[a] and (tendon := tendons.ids.index(target[a])) in tendons.bent:
                 gear = float(raw.actuator_gear[raw.actuator_outadr[a], 0])
                 self._paths.append(PathDrive(column, gear, tendon))
-        affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        affine = raw.actuator_biastype[ids] == BiasKind.AFFINE
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
         self._bias = bias
@@ -120,25 +120,21 @@ class Drives:
         own = ids[stateful]
         self.places, self.act = raw.actuator_actadr[own], np.zeros(len(own))
         kinds, h = raw.actuator_dyntype[own], float(raw.opt.timestep)
-        times = np.maximum(raw.actuator_dynprm[own, 0], mujoco.mjMINVAL)
+        times = np.maximum(raw.actuator_dynprm[own, 0], SMALLEST)
         exact = [-math.expm1(-h / time) for time in times.tolist()]
         # What a step adds of the command, and of the activation.
-        filtered = np.where(kinds == int(_DYN.mjDYN_FILTEREXACT), exact, h / times)
-        integrated = kinds == int(_DYN.mjDYN_INTEGRATOR)
+        filtered = np.where(kinds == ActivationKind.FILTEREXACT, exact, h / times)
+        integrated = kinds == ActivationKind.INTEGRATOR
         self._gains = np.where(integrated, h, filtered), np.where(integrated, 0.0, -filtered)
         self._act_range = bounds_of(
             raw.actuator_actrange[own], raw.actuator_actlimited[own].astype(bool)
         )
         self._early = raw.actuator_actearly[own].astype(bool)
-        # Of each muscle: its column, its place in act, and how its gain, its bias and act change.
-        self._muscles = list[tuple[int, int, Any, Any, Any]]()
+        # Of each muscle: its column, its place in act, and its curves.
+        self._muscles = list[tuple[int, int, MuscleCurves]]()
         for slot, (column, a) in enumerate(zip(stateful.tolist(), own, strict=True)):
-            if raw.actuator_gaintype[a] == MUSCLE:
-                known = {"lengthrange": raw.actuator_lengthrange[a], "acc0": raw.actuator_acc0[a]}
-                gain = partial(mujoco.mju_muscleGain, prm=raw.actuator_gainprm[a, :9], **known)
-                rest = partial(mujoco.mju_muscleBias, prm=raw.actuator_biasprm[a, :9], **known)
-                grow = partial(mujoco.mju_muscleDynamics, prm=raw.actuator_dynprm[a, :3])
-                self._muscles.append((column, slot, gain, rest, grow))
+            if raw.actuator_gaintype[a] == GainKind.MUSCLE:
+                self._muscles.append((column, slot, muscle_curves(raw, a)))
         self._timestep = h
 
     def _with_slope(self, free: Array) -> Array:
@@ -166,10 +162,10 @@ class Drives:
             length[column] = gear * self._tendons.lengths[tendon]
         least, per_length, damping = self._bias.T.copy()
         feedback = least + per_length * length + damping * rate
-        for k, _, gain, rest, _ in self._muscles:
+        for k, _, muscle in self._muscles:
             at, moving = float(length[k]), float(rate[k])
-            self._gain[k], feedback[k] = gain(at, moving), rest(at)
-            rise = gain(at, moving + _NUDGE) - gain(at, moving - _NUDGE)
+            self._gain[k], feedback[k] = muscle.gain(at, moving), muscle.bias(at)
+            rise = muscle.gain(at, moving + _NUDGE) - muscle.gain(at, moving - _NUDGE)
             damping[k] = rise / (2 * _NUDGE) * acting[k]
         self._slope = -self._later * self._gear * damping
         self._unsaturated = self._with_slope(np.ones(len(damping)))
@@ -186,8 +182,8 @@ class Drives:
         acting = self._ctrl
         if len(self.places):
             step = self._gains[0] * acting[self._stateful] + self._gains[1] * self.act
-            for k, slot, _, _, grow in self._muscles:
-                step[slot] = self._timestep * grow(float(acting[k]), float(self.act[slot]))
+            for k, slot, muscle in self._muscles:
+                step[slot] = self._timestep * muscle.rate(float(acting[k]), float(self.act[slot]))
             self._next = np.clip(self.act + step, *self._act_range)
             acting = acting.copy()
             acting[self._stateful] = np.where(self._early, self._next, self.act)
@@ -216,9 +212,7 @@ class Medium:
         bodies: Those on which something acts.
     """
 
-    def __init__(
-        self, raw: mujoco.MjModel, world: World, tree: Tree, off: Mapping[str, bool]
-    ) -> None:
+    def __init__(self, raw: MjModel, world: World, tree: Tree, off: Mapping[str, bool]) -> None:
         self._raw, self._world, self._tree = raw, world, tree
         wet = bool(raw.opt.density or raw.opt.viscosity)
         self._lift = -gravity(raw) * (raw.body_mass * raw.body_gravcomp)[:, None]
@@ -230,8 +224,8 @@ class Medium:
         ]
         self._wet = wet
         i, j, k = raw.body_inertia.T
-        mass = np.maximum(raw.body_mass, mujoco.mjMINVAL)
-        sides = [np.maximum(two, mujoco.mjMINVAL) for two in (j + k - i, i + k - j, i + j - k)]
+        mass = np.maximum(raw.body_mass, SMALLEST)
+        sides = [np.maximum(two, SMALLEST) for two in (j + k - i, i + k - j, i + j - k)]
         a, b, c = boxes = np.sqrt(6.0 * np.array(sides) / mass)
         width, density = boxes.mean(axis=0), float(raw.opt.density)
         spin = [a * (b**4 + c**4), b * (a**4 + c**4), c * (a**4 + b**4)]
@@ -263,8 +257,8 @@ class Medium:
         return force, slope
 
 
-def in_force(raw: mujoco.MjModel) -> Any:
+def in_force(raw: MjModel) -> Any:
     """(nactuator,) bool: which actuators the model's file does not turn off."""
     groups = raw.actuator_group
     off = (groups >= 0) & (groups < 31) & ((raw.opt.disableactuator >> (groups & 31)) & 1 > 0)
-    return ~off & (not raw.opt.disableflags & int(_OFF.mjDSBL_ACTUATION))
+    return ~off & (not raw.opt.disableflags & DisableFlag.ACTUATION)

@@ -27,15 +27,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from operator import ge, le
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from ...interface import Array
 from ...interface.records import Arrays
 from ...rotations import matrix_from_quat
 from .. import dense
+from ..compiled_flags import DisableFlag, IntegratorKind
 from .constraints import Equalities, Tendons
 from .drives import Drives, Medium
 from .soft import (
@@ -52,9 +52,11 @@ from .soft import (
 )
 from .world import Tree, World
 
-_OFF = mujoco.mjtDisableBit
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
+
 _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
-_EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
+_EXPLICIT = (IntegratorKind.EULER, IntegratorKind.RK4)
 
 
 class Law:
@@ -66,11 +68,11 @@ class Law:
         friction: (n,) the dry friction of the last step [N·m or N].
     """
 
-    def __init__(self, raw: mujoco.MjModel, world: World, tree: Tree, ghost: World) -> None:
+    def __init__(self, raw: MjModel, world: World, tree: Tree, ghost: World) -> None:
         """Of a tree in a world that is stepped; the ghost has the true arm."""
         self._true = next(other for other in ghost.trees if other.root == tree.root)
         self._ghost, self._world, self.tree = ghost, world, tree
-        off = {name: bool(raw.opt.disableflags & int(bit)) for name, bit in _FLAGS.items()}
+        off = {name: bool(raw.opt.disableflags & bit) for name, bit in _FLAGS.items()}
         dofs = tree.dofs
         joints = raw.dof_jntid[dofs]
         self._timestep = h = float(raw.opt.timestep)
@@ -103,7 +105,7 @@ class Law:
         damped[:, len(dofs) : -1] = np.diag(self._rub_b)
         self._linear = np.vstack([passive, damped, self.drives.feedback])
 
-    def _take_constraints(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> None:
+    def _take_constraints(self, raw: MjModel, joints: Any, off: Mapping[str, bool]) -> None:
         """What is known of the dry friction and the limits of joints."""
         dofs = self.tree.dofs
         rub = not (off["friction"] or off["constraint"])
@@ -317,13 +319,13 @@ class Law:
 
 
 _FLAGS = {
-    "damper": _OFF.mjDSBL_DAMPER,
-    "spring": _OFF.mjDSBL_SPRING,
-    "friction": _OFF.mjDSBL_FRICTIONLOSS,
-    "limit": _OFF.mjDSBL_LIMIT,
-    "equality": _OFF.mjDSBL_EQUALITY,
-    "constraint": _OFF.mjDSBL_CONSTRAINT,
-    "actuation": _OFF.mjDSBL_ACTUATION,
-    "refsafe": _OFF.mjDSBL_REFSAFE,
-    "eulerdamp": _OFF.mjDSBL_EULERDAMP,
+    "damper": DisableFlag.DAMPER,
+    "spring": DisableFlag.SPRING,
+    "friction": DisableFlag.FRICTIONLOSS,
+    "limit": DisableFlag.LIMIT,
+    "equality": DisableFlag.EQUALITY,
+    "constraint": DisableFlag.CONSTRAINT,
+    "actuation": DisableFlag.ACTUATION,
+    "refsafe": DisableFlag.REFSAFE,
+    "eulerdamp": DisableFlag.EULERDAMP,
 }

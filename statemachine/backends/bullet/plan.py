@@ -11,22 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache, cached_property, lru_cache, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import proxy
 
-import mujoco
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from ...interface import Array
+from ...interface import Array, JointType
 from ..compiled import new_data
+from ..compiled_bytes import compile_text
+from ..compiled_kinds import GeomKind
+from ..compiled_stages import compute_kinematics, jacobian, mass_matrix
 from . import urdf
 from .contacts import Solid, Surfaces
 from .file import MOST_LINKS, UrdfFile
 from .ties import ends_of, mechanisms, movers
 
-_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+if TYPE_CHECKING:
+    from ..compiled_types import MjData, MjModel
+
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
@@ -34,8 +38,7 @@ _YIELDS = 0.02
 
 Faces = NDArray[np.int64]  # (m, 3) numbers of vertices
 
-_MESH, ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
-HULLS = (_MESH, ELLIPSOID)
+HULLS = (GeomKind.MESH, GeomKind.ELLIPSOID)
 MARGIN = 1e-3  # [m] PyBullet's, around each hull that it reads from a file
 _THINNEST = 0.25  # a hull is made smaller by this part of its smallest width at most
 _HULLS_KEPT, _AT_ONCE = 128, 16  # of a process; vertices for which planes are tried together
@@ -60,9 +63,7 @@ class Plan:
             their shapes. Its robot was a URDF of its own, in which no two links meet.
     """
 
-    def __init__(
-        self, raw: mujoco.MjModel, file: UrdfFile | None = None, weighed: bool = False
-    ) -> None:
+    def __init__(self, raw: MjModel, file: UrdfFile | None = None, weighed: bool = False) -> None:
         self.raw, self.file, self.weighed = raw, file, weighed
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
@@ -106,14 +107,14 @@ class Plan:
         return _padding(self.raw)
 
     @cached_property
-    def still(self) -> mujoco.MjData:
+    def still(self) -> MjData:
         """Where everything is in the file; not to be written into."""
         return self.standing()
 
-    def standing(self) -> mujoco.MjData:
+    def standing(self) -> MjData:
         """The same, to be written into."""
         data = new_data(self.raw)
-        mujoco.mj_kinematics(self.raw, data)
+        compute_kinematics(self.raw, data)
         return data
 
     @cached_property
@@ -189,7 +190,7 @@ def _parts(solids: Sequence[Solid]) -> dict[int, int]:
     return {geom: solid.part for solid in solids for geom in solid.geoms}
 
 
-def _padding(raw: mujoco.MjModel) -> Array:
+def _padding(raw: MjModel) -> Array:
     """As much of the armature as the observer of contacts bears.
 
     It converges while what contact meets, the padded arm, is less than twice what the
@@ -202,18 +203,14 @@ def _padding(raw: mujoco.MjModel) -> Array:
         limited = raw.jnt_limited.astype(bool) & np.isfinite(np.ptp(raw.jnt_range, axis=1))
     low, high = np.where(limited[:, None], raw.jnt_range, [-np.pi, np.pi]).T
     poses = [raw.qpos0, *raw.key_qpos]
-    scalar = np.isin(raw.jnt_type, [int(mujoco.mjtJoint.mjJNT_HINGE), _SLIDE])
+    scalar = np.isin(raw.jnt_type, (JointType.HINGE, JointType.SLIDE))
     for _ in range(_SAMPLE):
         qpos = raw.qpos0.copy()
         qpos[raw.jnt_qposadr[scalar]] = random.uniform(low, high)[scalar]
         poses.append(qpos)
     for qpos in poses if share.any() else []:
         data.qpos[:] = qpos
-        mujoco.mj_kinematics(raw, data)
-        mujoco.mj_comPos(raw, data)
-        mujoco.mj_crb(raw, data)
-        mass = np.zeros((raw.nv, raw.nv))
-        mujoco.mj_fullM(raw, data, mass)
+        mass = mass_matrix(raw, data)
         bare = mass - np.diag(raw.dof_armature)
         try:
             # In halves, until this pose bears it too.
@@ -231,14 +228,13 @@ def _worst(mass: Array, padded: Array) -> float:
     return float(np.linalg.eigvals(np.linalg.solve(mass, padded)).real.max())
 
 
-def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array:
+def _padding_at(raw: MjModel, data: MjData, share: Array) -> Array:
     """What the padding adds to the mass matrix (nv, nv) in a pose."""
     total = np.zeros((raw.nv, raw.nv))
     for j in [j for body in range(raw.nbody) for j in urdf.axes(raw, body)]:
         dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
-        moving, turning = np.zeros((2, 3, raw.nv))
-        mujoco.mj_jac(raw, data, moving, turning, data.xipos[body], body)
-        slides = raw.jnt_type[j] == _SLIDE
+        moving, turning = jacobian(raw, data, body, data.xipos[body])
+        slides = raw.jnt_type[j] == JointType.SLIDE
         shape = urdf.padding_shape(data.xaxis[j])
         own = moving.T @ moving if slides else turning.T @ shape @ turning
         total += share[dof] * own
@@ -285,9 +281,9 @@ def _kept_hull(vertices: bytes, faces: bytes) -> Hull:
     )
 
 
-def hull_of(raw: mujoco.MjModel, geom: int) -> Hull:
+def hull_of(raw: MjModel, geom: int) -> Hull:
     """The hull of a geom; one for all geoms and models that have the same."""
-    if raw.geom_type[geom] == ELLIPSOID:
+    if raw.geom_type[geom] == GeomKind.ELLIPSOID:
         vertices, faces = _sphere()
         vertices = vertices * raw.geom_size[geom]
     else:
@@ -301,7 +297,7 @@ def roughness(size: Array) -> float:
     return float((np.linalg.norm(ball, axis=1).max() - 1) * size.max())
 
 
-def _mesh_hull(raw: mujoco.MjModel, mesh: int) -> tuple[Array, Faces]:
+def _mesh_hull(raw: MjModel, mesh: int) -> tuple[Array, Faces]:
     """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
     start, count = int(raw.mesh_vertadr[mesh]), int(raw.mesh_vertnum[mesh])
     vertices = np.array(raw.mesh_vert[start : start + count], dtype=np.float64)
@@ -319,7 +315,7 @@ def _mesh_hull(raw: mujoco.MjModel, mesh: int) -> tuple[Array, Faces]:
 @cache
 def _sphere() -> tuple[Array, Faces]:
     """Vertices (n, 3) and triangles (m, 3) about a unit sphere, as far in as out of it."""
-    vertices, faces = _mesh_hull(mujoco.MjModel.from_xml_string(_SPHERE), 0)
+    vertices, faces = _mesh_hull(compile_text(_SPHERE), 0)
     depth = np.linalg.norm(vertices[faces].mean(axis=1), axis=1).min()
     return vertices * (2 / (1 + depth)), faces
 

@@ -5,36 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
 from ...interface import Array, JointType
 from ...measures.text import few
-from .contacts import NO_CONTACT, PLANE, damping_ratios
-from .drives import DYNAMICS, MUSCLE, in_force
+from ..compiled_actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
+from ..compiled_flags import EnableFlag, IntegratorKind
+from ..compiled_kinds import GeomKind
+from .contacts import NO_CONTACT, damping_ratios
+from .drives import DYNAMICS, in_force
 from .file import MOST_LINKS
-from .plan import ELLIPSOID, HULLS, MARGIN, Plan, roughness
+from .plan import HULLS, MARGIN, Plan, roughness
 from .ties import acting_tendons, ends_of, joints_of, linear_sum, movers, moving
 from .urdf import floats
+
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 # What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.
 _SOLREF, _SOLIMP, _BOUNCE = (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.2
-_AFFINE = [int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)]
-_SOLIDS = [
-    int(kind)
-    for kind in (
-        mujoco.mjtGeom.mjGEOM_BOX,
-        mujoco.mjtGeom.mjGEOM_SPHERE,
-        mujoco.mjtGeom.mjGEOM_CAPSULE,
-        mujoco.mjtGeom.mjGEOM_CYLINDER,
-        mujoco.mjtGeom.mjGEOM_PLANE,
-    )
-] + list(HULLS)
+_AFFINE = (BiasKind.NONE, BiasKind.AFFINE)
+_SOLIDS = (
+    GeomKind.BOX,
+    GeomKind.SPHERE,
+    GeomKind.CAPSULE,
+    GeomKind.CYLINDER,
+    GeomKind.PLANE,
+    *HULLS,
+)
 
 
 def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
@@ -71,7 +74,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     )
 
 
-def _of_the_law(raw: mujoco.MjModel) -> list[tuple[str, str]]:
+def _of_the_law(raw: MjModel) -> list[tuple[str, str]]:
     """Return what the adapter emulates, and the engine as it comes has nothing of."""
     dynamics_of_tendons = (
         raw.tendon_stiffness,
@@ -107,7 +110,7 @@ class UnsupportedPart(NamedTuple):
     says: str
 
 
-def _of_joints(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
+def _of_joints(raw: MjModel) -> Iterator[UnsupportedPart]:
     free = raw.jnt_type == _FREE
     span = raw.jnt_range[:, 1] - raw.jnt_range[:, 0]
     part = partial(UnsupportedPart, "joint", says="has it")
@@ -129,26 +132,26 @@ def _of_bodies(plan: Plan) -> Iterator[UnsupportedPart]:
     yield UnsupportedPart("body", "a joint on a mocap body", led, "has it")
 
 
-def _of_actuators(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
+def _of_actuators(raw: MjModel) -> Iterator[UnsupportedPart]:
     own = (raw.actuator_armature != 0) | (raw.actuator_damping != 0)
     own |= raw.actuator_dampingpoly.any(axis=1)
     used, joints = in_force(raw) & ~_sticks(raw), raw.actuator_trnid[:, 0]
-    on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
-    on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    on_joint = raw.actuator_trntype == TransmissionKind.JOINT
+    on_tendon = raw.actuator_trntype == TransmissionKind.TENDON
     turning = np.zeros(raw.nactuator, dtype=bool)
     turning[on_joint] = np.isin(raw.jnt_type[joints[on_joint]], (_FREE, _BALL))
     between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
-    straight = raw.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
+    straight = raw.actuator_gaintype == GainKind.FIXED
     straight &= np.isin(raw.actuator_biastype, _AFFINE)
     of_muscles = np.array(
         [
-            raw.actuator_gaintype == MUSCLE,
-            raw.actuator_biastype == int(mujoco.mjtBias.mjBIAS_MUSCLE),
-            raw.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_MUSCLE),
+            raw.actuator_gaintype == GainKind.MUSCLE,
+            raw.actuator_biastype == BiasKind.MUSCLE,
+            raw.actuator_dyntype == ActivationKind.MUSCLE,
         ]
     )
     straight = np.where(of_muscles.any(axis=0), of_muscles.all(axis=0), straight)
-    stateful = ~np.isin(raw.actuator_dyntype, [int(mujoco.mjtDyn.mjDYN_NONE), *DYNAMICS])
+    stateful = ~np.isin(raw.actuator_dyntype, (ActivationKind.NONE, *DYNAMICS))
     elsewhere = used & ~(on_joint | on_tendon)
     part = partial(UnsupportedPart, "actuator")
     yield part("actuator armature or damping", own, "has it: give it to the joint")
@@ -159,7 +162,7 @@ def _of_actuators(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
     yield part("actuator gain", used & ~straight, "has one that is not constant")
 
 
-def _of_ties(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
+def _of_ties(raw: MjModel) -> Iterator[UnsupportedPart]:
     """Yield what tendons and equalities have, within one robot."""
     heavy = np.zeros(raw.ntendon, dtype=bool)
     for tendon in range(raw.ntendon):
@@ -199,7 +202,7 @@ def _between_robots(plan: Plan) -> list[tuple[str, str]]:
     return problems
 
 
-def _ends_in_words(raw: mujoco.MjModel, joints: list[int], bodies: list[int]) -> str:
+def _ends_in_words(raw: MjModel, joints: list[int], bodies: list[int]) -> str:
     """Return the names of what a constraint ties: its joints, else its bodies."""
     if joints:
         return few([f"joint {_name(raw, 'joint', joint)}" for joint in joints], most=4)
@@ -215,7 +218,7 @@ def _apart(plan: Plan, bodies: list[int]) -> str:
     return f"of the robots {few(robots, most=4)}, of which {few(afloat, most=4)} {verb}"
 
 
-def _label(raw: mujoco.MjModel, kind: str, number: int) -> str:
+def _label(raw: MjModel, kind: str, number: int) -> str:
     """Return "tendon sum" of one with a name, "a tendon without a name" of others."""
     name = getattr(raw, kind)(number).name
     return f"{kind} {name}" if name else f"the {kind} without a name"
@@ -227,11 +230,11 @@ def _of_geoms(plan: Plan) -> Iterator[UnsupportedPart]:
     strange = touching & ~np.isin(raw.geom_type, _SOLIDS)
     bodies = raw.geom_bodyid
     moved = (raw.body_treeid[bodies] >= 0) | (raw.body_mocapid[raw.body_rootid[bodies]] >= 0)
-    planes = touching & (raw.geom_type == PLANE) & moved
+    planes = touching & (raw.geom_type == GeomKind.PLANE) & moved
     yield UnsupportedPart("geom", "plane on a body", planes, "is on one that moves")
     yield UnsupportedPart("geom", "fluid around an ellipsoid", wet, "has it")
     for kind in np.unique(raw.geom_type[strange]).tolist():
-        says = f"is a {mujoco.mjtGeom(kind).name[7:].lower()}"
+        says = f"is a {GeomKind(kind).name.lower()}"
         which = strange & (raw.geom_type == kind)
         yield UnsupportedPart("geom", "shape of a geom", which, says)
 
@@ -240,21 +243,22 @@ def ignored(plan: Plan) -> list[str]:
     """Settings of a model that have no counterpart, and do not make it another robot."""
     raw = plan.raw
     enabled = {
-        name: raw.opt.enableflags & int(getattr(mujoco.mjtEnableBit, f"mjENBL_{name}"))
-        for name in ("OVERRIDE", "SLEEP", "DIAGEXACT")
+        flag: raw.opt.enableflags & flag
+        for flag in (EnableFlag.OVERRIDE, EnableFlag.SLEEP, EnableFlag.DIAGEXACT)
     }
     touches = not raw.opt.disableflags & NO_CONTACT
-    integrator = {
-        int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit acts as implicitfast",
-        int(mujoco.mjtIntegrator.mjINT_RK4): "RK4 acts as Euler",
-        int(mujoco.mjtIntegrator.mjINT_DISCRETE): "discrete acts as implicitfast",
-    }.get(int(raw.opt.integrator))
+    integrators: dict[int, str] = {
+        IntegratorKind.IMPLICIT: "implicit acts as implicitfast",
+        IntegratorKind.RK4: "RK4 acts as Euler",
+        IntegratorKind.DISCRETE: "discrete acts as implicitfast",
+    }
+    integrator = integrators.get(int(raw.opt.integrator))
     sentences = [f"the integrator {integrator}"] if integrator else []
     settings = {
         "noslip_iterations": raw.opt.noslip_iterations,
-        "the override of contact parameters": enabled["OVERRIDE"],
-        "sleep": enabled["SLEEP"],
-        "diagexact": enabled["DIAGEXACT"],
+        "the override of contact parameters": enabled[EnableFlag.OVERRIDE],
+        "sleep": enabled[EnableFlag.SLEEP],
+        "diagexact": enabled[EnableFlag.DIAGEXACT],
         "springyield of a tendon": raw.tendon_springyield.any(),
     }
     if touches:
@@ -280,7 +284,7 @@ def ignored(plan: Plan) -> list[str]:
     return sentences
 
 
-def _contact_settings(raw: mujoco.MjModel) -> dict[str, np.bool_]:
+def _contact_settings(raw: MjModel) -> dict[str, np.bool_]:
     """Return settings of contacts that have no counterpart, and whether a model has them."""
     slide, _, roll = np.split(raw.pair_friction, [2, 3], axis=1)
     softness = (raw.pair_solref != _SOLREF).any() or (raw.pair_solimp != _SOLIMP).any()
@@ -318,9 +322,9 @@ def otherwise(plan: Plan) -> list[str]:
     return sentences
 
 
-def _sticks(raw: mujoco.MjModel) -> Any:
+def _sticks(raw: MjModel) -> Any:
     """(nactuator,) bool: which actuators act on the contacts of a body alone."""
-    return raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_BODY)
+    return raw.actuator_trntype == TransmissionKind.BODY
 
 
 def _bounces(plan: Plan) -> list[str]:
@@ -353,7 +357,7 @@ def softness(plan: Plan) -> str:
 def _hull_differences(plan: Plan) -> list[str]:
     """Where a hull is not its shape: ellipsoids, and what is thinner than the engine's margin."""
     raw, sentences = plan.raw, []
-    eggs = [geom for geom in plan.hulls if int(raw.geom_type[geom]) == ELLIPSOID]
+    eggs = [geom for geom in plan.hulls if int(raw.geom_type[geom]) == GeomKind.ELLIPSOID]
     if eggs:
         largest = max(eggs, key=lambda geom: raw.geom_size[geom].max())
         size = 1e3 * roughness(raw.geom_size[largest])
@@ -372,11 +376,11 @@ def _hull_differences(plan: Plan) -> list[str]:
     return sentences
 
 
-def _list(raw: mujoco.MjModel, kind: str, values: Array) -> str:
+def _list(raw: MjModel, kind: str, values: Array) -> str:
     """Elements whose value is not zero, the largest first, as "a 0.5, b 0.1 and 3 more"."""
     order = [int(k) for k in np.argsort(-np.abs(values), kind="stable") if values[k]]
     return few([f"{_name(raw, kind, k)} {values[k]:.3g}" for k in order], most=2)
 
 
-def _name(raw: mujoco.MjModel, kind: str, number: int) -> Any:
+def _name(raw: MjModel, kind: str, number: int) -> Any:
     return getattr(raw, kind)(number).name or f"number {number}"

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...interface import Array
+
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
 
 _TINY = 1e-300  # for a power that is too small for a float
 
@@ -95,7 +97,7 @@ def soft_row(
     return SoftRow(jacobian, softness(strength, weight), goal, *bounds)
 
 
-def shortest_time(raw: mujoco.MjModel, off: Mapping[str, bool]) -> float:
+def shortest_time(raw: MjModel, off: Mapping[str, bool]) -> float:
     """The least time constant of a constraint [s]: two steps, where MuJoCo takes care of it."""
     return 0.0 if off["refsafe"] else 2 * float(raw.opt.timestep)
 

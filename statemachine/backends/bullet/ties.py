@@ -9,63 +9,67 @@ another are written as one robot: a mechanism.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 
-from ...interface import Array, Ints
+from ...interface import Array, Ints, JointType
+from ..compiled_actuators import TransmissionKind
+from ..compiled_kinds import SITE, EqualityKind, WrapKind
 
-_WRAP = mujoco.mjtWrap
-_EQ, SITE = mujoco.mjtEq, int(mujoco.mjtObj.mjOBJ_SITE)
-_SUMS, PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
+
+_SUMS = (EqualityKind.JOINT, EqualityKind.TENDON)
+PLACES = (EqualityKind.CONNECT, EqualityKind.WELD)
 
 
-def linear_sum(raw: mujoco.MjModel, tendon: int) -> tuple[Ints, Array]:
+def linear_sum(raw: MjModel, tendon: int) -> tuple[Ints, Array]:
     """Return joints and factors (k,) of a tendon's length; none of one that goes through space."""
     part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
-    if (raw.wrap_type[part] != int(_WRAP.mjWRAP_JOINT)).any():
+    if (raw.wrap_type[part] != WrapKind.JOINT).any():
         return np.zeros(0, np.int64), np.zeros(0)
     return raw.wrap_objid[part], raw.wrap_prm[part]
 
 
-def movers(raw: mujoco.MjModel, tendon: int) -> list[int]:
+def movers(raw: MjModel, tendon: int) -> list[int]:
     """Return the bodies whose joints change the length of a tendon."""
     part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
-    by_kind = {
-        _WRAP.mjWRAP_JOINT: raw.jnt_bodyid,
-        _WRAP.mjWRAP_SITE: raw.site_bodyid,
-        _WRAP.mjWRAP_SPHERE: raw.geom_bodyid,
-        _WRAP.mjWRAP_CYLINDER: raw.geom_bodyid,
+    by_kind: dict[int, Ints] = {
+        WrapKind.JOINT: raw.jnt_bodyid,
+        WrapKind.SITE: raw.site_bodyid,
+        WrapKind.SPHERE: raw.geom_bodyid,
+        WrapKind.CYLINDER: raw.geom_bodyid,
     }
     parts = zip(raw.wrap_type[part].tolist(), raw.wrap_objid[part], strict=True)
-    bodies = [int(by_kind[_WRAP(kind)][at]) for kind, at in parts if _WRAP(kind) in by_kind]
+    bodies = [int(by_kind[kind][at]) for kind, at in parts if kind in by_kind]
     return moving(raw, bodies)
 
 
-def moving(raw: mujoco.MjModel, bodies: Sequence[int]) -> list[int]:
+def moving(raw: MjModel, bodies: Sequence[int]) -> list[int]:
     """Return those of some bodies that a joint moves."""
     return [body for body in bodies if raw.body_treeid[body] >= 0]
 
 
-def ends_of(raw: mujoco.MjModel, eq: int) -> list[int]:
+def ends_of(raw: MjModel, eq: int) -> list[int]:
     """Return the bodies that an equality constraint ties; none of a kind that is unknown here."""
-    kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
+    kind, ends = EqualityKind(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
     if kind in PLACES:
         sites = raw.eq_objtype[eq] == SITE
         return [int(raw.site_bodyid[end] if sites else end) for end in ends]
     return raw.jnt_bodyid[joints_of(raw, eq)].tolist()
 
 
-def joints_of(raw: mujoco.MjModel, eq: int) -> list[int]:
+def joints_of(raw: MjModel, eq: int) -> list[int]:
     """Return the joints that an equality constraint of joints or tendons couples; else none."""
-    kind = _EQ(int(raw.eq_type[eq]))
+    kind = EqualityKind(int(raw.eq_type[eq]))
     ends = [int(end) for end in (raw.eq_obj1id[eq], raw.eq_obj2id[eq]) if end >= 0]
-    if kind == _EQ.mjEQ_TENDON:
+    if kind == EqualityKind.TENDON:
         return [int(joint) for tendon in ends for joint in linear_sum(raw, tendon)[0]]
     return ends if kind in _SUMS else []
 
 
-def acting_tendons(raw: mujoco.MjModel) -> list[int]:
+def acting_tendons(raw: MjModel) -> list[int]:
     """Return the tendons that a force comes of: others are a length that is measured."""
     acts = np.zeros(raw.ntendon, dtype=bool)
     for dynamics in (
@@ -76,15 +80,15 @@ def acting_tendons(raw: mujoco.MjModel) -> list[int]:
         raw.tendon_armature,
     ):
         acts |= dynamics != 0
-    pulled = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    pulled = raw.actuator_trntype == TransmissionKind.TENDON
     acts[raw.actuator_trnid[pulled, 0]] = True
-    coupled = (raw.eq_type == int(_EQ.mjEQ_TENDON)) & (raw.eq_active0 != 0)
+    coupled = (raw.eq_type == EqualityKind.TENDON) & (raw.eq_active0 != 0)
     for ends in (raw.eq_obj1id[coupled], raw.eq_obj2id[coupled]):
         acts[ends[ends >= 0]] = True
     return np.flatnonzero(acts).tolist()
 
 
-def _ties(raw: mujoco.MjModel) -> Iterator[list[int]]:
+def _ties(raw: MjModel) -> Iterator[list[int]]:
     """Yield the bodies of each tie that acts, of those that a joint moves."""
     for tendon in acting_tendons(raw):
         yield movers(raw, tendon)
@@ -92,7 +96,7 @@ def _ties(raw: mujoco.MjModel) -> Iterator[list[int]]:
         yield moving(raw, ends_of(raw, eq))
 
 
-def mechanisms(raw: mujoco.MjModel) -> Ints:
+def mechanisms(raw: MjModel) -> Ints:
     """Return the root of the mechanism of each body (nbody,).
 
     That is its tree; or, of trees that stand on the world and are tied to one another, the first
@@ -101,7 +105,7 @@ def mechanisms(raw: mujoco.MjModel) -> Ints:
     mechanism = raw.body_rootid.astype(np.int64)
     standing = raw.body_mocapid < 0
     for joint, kind in enumerate(raw.jnt_type.tolist()):
-        if kind in (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)):
+        if kind in (JointType.FREE, JointType.BALL):
             standing[raw.jnt_bodyid[joint]] = False
     for bodies in _ties(raw):
         roots = {int(mechanism[body]) for body in bodies}

@@ -12,21 +12,27 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-import mujoco
 import numpy as np
 
 from ...interface import Array, JointType
 from ...rotations import matrix_from_quat
 from .. import dense
+from ..compiled_actuators import TransmissionKind
+from ..compiled_kinds import GeomKind
 
-_BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
-_CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-_PRIMITIVES = {_BOX: "box", _SPHERE: "sphere", _CAPSULE: "capsule", _CYLINDER: "cylinder"}
-_MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
+
+_PRIMITIVES: dict[int, str] = {
+    GeomKind.BOX: "box",
+    GeomKind.SPHERE: "sphere",
+    GeomKind.CAPSULE: "capsule",
+    GeomKind.CYLINDER: "cylinder",
+}
 # [kg] mass, and a thousandth of it [kg m²] inertia, of what only carries a tree; and the largest
 # part of the tree's own.
 LIGHT, LIGHTEST = 1e-9, 1e-8
@@ -74,31 +80,29 @@ class Dialect:
     beside: tuple[int, ...] = ()
 
 
-def roots(raw: mujoco.MjModel) -> list[int]:
+def roots(raw: MjModel) -> list[int]:
     """Bodies that hang directly in the world, each the root of a tree."""
     return [b for b in range(1, raw.nbody) if raw.body_parentid[b] == 0]
 
 
-def tree(raw: mujoco.MjModel, root: int) -> list[int]:
+def tree(raw: MjModel, root: int) -> list[int]:
     """The bodies of a tree, parents first; the world is a tree of its own."""
     return [b for b in range(raw.nbody) if raw.body_rootid[b] == root]
 
 
-def axes(raw: mujoco.MjModel, body: int) -> list[int]:
+def axes(raw: MjModel, body: int) -> list[int]:
     """The joints of a body that URDF writes, its hinges and slides, in order."""
     start = int(raw.body_jntadr[body])
     joints = range(start, start + int(raw.body_jntnum[body]))
     return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
 
 
-def floats(raw: mujoco.MjModel, root: int) -> bool:
+def floats(raw: MjModel, root: int) -> bool:
     """Whether the root of a tree has a free joint."""
     return bool(raw.body_jntnum[root]) and not axes(raw, root)
 
 
-def write(
-    raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect(), names: Names | None = None
-) -> str:
+def write(raw: MjModel, root: int, dialect: Dialect = Dialect(), names: Names | None = None) -> str:
     """URDF of one tree of bodies, and of those that stand beside it.
 
     Args:
@@ -146,7 +150,7 @@ class Names:
         fixed: Of the fixed joint of each body; tips_fixed: of each site's link.
     """
 
-    def __init__(self, raw: mujoco.MjModel) -> None:
+    def __init__(self, raw: MjModel) -> None:
         self._taken = links, joints = set[str](), set[str]()
         bodies = range(raw.nbody)
         self.links = {b: _once(raw.body(b).name or f"body_{b}", links) for b in bodies}
@@ -183,7 +187,7 @@ def _once(name: str, taken: set[str], suffix: str = "") -> str:
     return name
 
 
-def anchor(raw: mujoco.MjModel, body: int) -> Array:
+def anchor(raw: MjModel, body: int) -> Array:
     """Where a body's last joint is, in the body's frame: the origin of its link."""
     joints = axes(raw, body)
     return raw.jnt_pos[joints[-1]] if joints else np.zeros(3)
@@ -197,7 +201,7 @@ def padding_shape(axis: Array) -> Array:
     return 0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis)
 
 
-def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, Array]:
+def _padding(raw: MjModel, joint: int, dialect: Dialect) -> tuple[float, Array]:
     """Mass and inertia (3, 3), in the body's axes, on top of what the joint carries."""
     if dialect.padding is None:
         return 0.0, np.zeros((3, 3))
@@ -207,7 +211,7 @@ def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, 
     return 0.0, size * padding_shape(axis)
 
 
-def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Element:
+def _link(raw: MjModel, body: int, dialect: Dialect, names: Names) -> Element:
     origin, joints = anchor(raw, body), axes(raw, body)
     frame = matrix_from_quat(raw.body_iquat[body])
     mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
@@ -228,7 +232,7 @@ def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Ele
     return link
 
 
-def _geoms(raw: mujoco.MjModel, body: int, part: int, dialect: Dialect) -> Iterator[Element]:
+def _geoms(raw: MjModel, body: int, part: int, dialect: Dialect) -> Iterator[Element]:
     """What of a body's geoms is in one of its links."""
     for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
         touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom] or geom in dialect.parts
@@ -238,27 +242,25 @@ def _geoms(raw: mujoco.MjModel, body: int, part: int, dialect: Dialect) -> Itera
             yield from _geom(raw, geom, anchor(raw, body), tag, dialect)
 
 
-def _geom(
-    raw: mujoco.MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect
-) -> Iterator[Element]:
+def _geom(raw: MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect) -> Iterator[Element]:
     pos, mat = raw.geom_pos[geom] - anchor, matrix_from_quat(raw.geom_quat[geom])
     size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
     shape = _PRIMITIVES.get(kind, "")
     solids: list[tuple[Array, Element]] = []
     if geom in dialect.hulls:
         solids.append((pos, _element("mesh", filename=hull_file(geom))))
-    elif kind == _BOX:
+    elif kind == GeomKind.BOX:
         solids.append((pos, _element(shape, size=2 * size)))
-    elif kind == _SPHERE:
+    elif kind == GeomKind.SPHERE:
         solids.append((pos, _element(shape, radius=size[0])))
     elif shape:
-        ends = kind == _CAPSULE and not dialect.capsules
+        ends = kind == GeomKind.CAPSULE and not dialect.capsules
         shape = "cylinder" if ends else shape
         solids.append((pos, _element(shape, radius=size[0], length=2 * size[1])))
         for side in (-1, 1) if ends else ():
             ball = _element("sphere", radius=size[0])
             solids.append((pos + side * size[1] * mat[:, 2], ball))
-    elif kind == _MESH:
+    elif kind == GeomKind.MESH:
         mesh = int(raw.geom_dataid[geom])
         # MuJoCo moved the mesh to its centre and axes; the file has it where it was.
         # Rounded, so that a look that was never moved is at 0 0 0 and not at 1e-17.
@@ -266,7 +268,7 @@ def _geom(
         pos = np.round(pos - dense.times(mat, raw.mesh_pos[mesh]), 12)
         file = _mesh_file(raw, mesh, dialect.folder)
         solids.append((pos, _element("mesh", filename=file, scale=raw.mesh_scale[mesh])))
-    elif kind != _PLANE:  # which URDF does not know
+    elif kind != GeomKind.PLANE:  # which URDF does not know
         raise ValueError(f"geom {geom} has no counterpart in URDF")
     name = raw.geom(geom).name
     for k, (where, solid) in enumerate(solids):
@@ -279,13 +281,13 @@ def hull_file(geom: int) -> str:
     return f"hull_{geom}.obj"
 
 
-def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:
+def _mesh_file(raw: MjModel, mesh: int, folder: Path | None) -> str:
     start = int(raw.mesh_pathadr[mesh])
     name = raw.paths[start : raw.paths.index(b"\0", start)].decode() if start >= 0 else ""
     return os.path.relpath(name, folder) if folder and os.path.isabs(name) else name
 
 
-def _joints(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[Element]:
+def _joints(raw: MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[Element]:
     """The joints between a body and its parent, with massless links between them."""
     upper = int(raw.body_parentid[body])
     parent = names.links[upper] if upper else "world"
@@ -323,18 +325,18 @@ def _joints(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> I
             place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
 
 
-def _is_limited(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> bool:
+def _is_limited(raw: MjModel, joint: int, dialect: Dialect) -> bool:
     return bool(raw.jnt_limited[joint]) and dialect.dynamics
 
 
-def _kind(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> str:
+def _kind(raw: MjModel, joint: int, dialect: Dialect) -> str:
     """Return the type of a joint in a URDF."""
     if raw.jnt_type[joint] == int(JointType.SLIDE):
         return "prismatic"
     return "revolute" if _is_limited(raw, joint, dialect) else "continuous"
 
 
-def _bounds(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, float]:
+def _bounds(raw: MjModel, joint: int, dialect: Dialect) -> tuple[float, float]:
     """Return the range of a joint that must have one in a URDF, as a slide must."""
     if _is_limited(raw, joint, dialect):
         low, high = raw.jnt_range[joint]
@@ -344,7 +346,7 @@ def _bounds(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, f
     return 1, -1  # the wrong way round, which PyBullet takes for none
 
 
-def _at_zero(raw: mujoco.MjModel, joint: int, place: Array, turn: Array) -> tuple[Array, Array]:
+def _at_zero(raw: MjModel, joint: int, place: Array, turn: Array) -> tuple[Array, Array]:
     """Where a joint's frame is when its position is 0, from where it is in the file's pose.
 
     There the position is the joint's `ref`.
@@ -366,9 +368,9 @@ def _joint(
     return _element("joint", origin, *ends, *extra, name=name, type=kind)
 
 
-def _effort(raw: mujoco.MjModel, joint: int) -> float:
+def _effort(raw: MjModel, joint: int) -> float:
     """The largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
-    on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    on_joint = raw.actuator_trntype == TransmissionKind.JOINT
     drives = on_joint & (raw.actuator_trnid[:, 0] == joint)
     limited = drives & raw.actuator_forcelimited.astype(bool)
     if not limited.any():
@@ -376,7 +378,7 @@ def _effort(raw: mujoco.MjModel, joint: int) -> float:
     return float(np.abs(raw.actuator_forcerange[limited]).max())
 
 
-def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[Element]:
+def _tip(raw: MjModel, site: int, names: Names) -> Iterator[Element]:
     body, name = int(raw.site_bodyid[site]), names.tips[site]
     mat = matrix_from_quat(raw.site_quat[site])
     yield _bare_link(name, 0.0, np.zeros((3, 3)))

@@ -5,17 +5,22 @@ from __future__ import annotations
 import copy
 from contextlib import closing
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 
 from ...interface import Array
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
+from ..compiled_algebra import principal_axes
+from ..compiled_stages import set_constants
 from ..dense import dot, product, times
 from .client import pb
 from .plan import Plan
 from .trees import FileTree
 from .world import World
+
+if TYPE_CHECKING:
+    from ..compiled_types import MjModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +92,19 @@ def _weight_of_link(plan: Plan, tree: FileTree, link: int, body: int, client: in
     return Weight(dynamics[0], com, product(scaled, np.ascontiguousarray(axes.T)))
 
 
-def with_weights(compiled: mujoco.MjModel, found: dict[int, Weight]) -> mujoco.MjModel:
+def with_weights(compiled: MjModel, found: dict[int, Weight]) -> MjModel:
     """Make a compiled model whose bodies have other inertias, and all that follows from them."""
     raw = copy.copy(compiled)
     for body, weight in found.items():
         if weight.mass > 0:
-            moments, axes, quat = np.empty(3), np.empty(9), np.empty(4)
-            mujoco.mju_eig3(moments, axes, quat, weight.inertia.ravel())
+            moments, quat = principal_axes(weight.inertia)
             raw.body_mass[body], raw.body_ipos[body] = weight.mass, weight.com
             raw.body_inertia[body], raw.body_iquat[body] = moments, quat
-    mujoco.mj_setConst(raw, mujoco.MjData(raw))
+    set_constants(raw)
     return raw
 
 
-def weighed_as_it_comes(plan: Plan, compiled: mujoco.MjModel) -> mujoco.MjModel:
+def weighed_as_it_comes(plan: Plan, compiled: MjModel) -> MjModel:
     """Make an edited model whose bodies weigh what PyBullet gives them of its own.
 
     It takes a mass from the file, and an inertia from the shapes: so a mass that was edited counts
@@ -119,10 +123,10 @@ def weighed_as_it_comes(plan: Plan, compiled: mujoco.MjModel) -> mujoco.MjModel:
     return with_weights(compiled, found)
 
 
-def with_weights_of(compiled: mujoco.MjModel, other: mujoco.MjModel) -> mujoco.MjModel:
+def with_weights_of(compiled: MjModel, other: MjModel) -> MjModel:
     """Make a compiled model with the inertias of another, and what follows from them."""
     raw = copy.copy(compiled)
     for name in ("body_mass", "body_ipos", "body_iquat", "body_inertia"):
         getattr(raw, name)[:] = getattr(other, name)
-    mujoco.mj_setConst(raw, mujoco.MjData(raw))
+    set_constants(raw)
     return raw

@@ -11,9 +11,8 @@ import weakref
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import chain
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import mujoco
 import numpy as np
 
 from ...installed import silence
@@ -22,6 +21,8 @@ from ...rotations import INVERSE, matrix_from_quat, wxyz_from_xyzw, xyzw_from_wx
 from ...rotations import times as quat_times
 from .. import dense
 from ..compiled import gravity
+from ..compiled_algebra import quat_of_matrix
+from ..compiled_stages import compute_kinematics
 from ..hidden_world import HiddenWorld
 from . import urdf
 from .client import (
@@ -37,6 +38,9 @@ from .client import (
 from .contacts import NO_CONTACT, Solid
 from .plan import Plan
 from .trees import FileTree, Tree
+
+if TYPE_CHECKING:
+    from ..compiled_types import MjData
 
 _PUSHES = 0.03  # of an overlap that a contact undoes in a step; the engine's own is 0.08
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
@@ -164,7 +168,7 @@ class World:
         return not self.close.alive
 
     @cached_property
-    def still(self) -> mujoco.MjData:
+    def still(self) -> MjData:
         """Where bodies and sites are that no joint moves; those on mocap bodies as they are led."""
         return self._plan.standing()
 
@@ -175,7 +179,7 @@ class World:
             return False
         self._led = poses.tobytes()
         still.mocap_pos.flat, still.mocap_quat.flat = np.split(poses, [3 * raw.nmocap])
-        mujoco.mj_kinematics(raw, still)
+        compute_kinematics(raw, still)
         for number, tree in enumerate(self.trees):
             if raw.body_mocapid[tree.root] >= 0:
                 # The base is a link without mass at the world's origin, and carries the body.
@@ -241,8 +245,8 @@ class World:
     def _add_planes(self) -> None:
         for solid in self._surfaces.solids:
             if solid.plane:
-                (geom,), quat = solid.geoms, np.zeros(4)
-                mujoco.mju_mat2Quat(quat, self._plan.still.geom_xmat[geom])
+                (geom,) = solid.geoms
+                quat = quat_of_matrix(self._plan.still.geom_xmat[geom])
                 shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=self.client)
                 self._planes[geom] = pb.createMultiBody(
                     0,
