@@ -14,7 +14,9 @@ from statemachine.lab.validate.fingertip import certify
 from statemachine.lab.validate.fingertip_request import FingertipRequest, answer
 from statemachine.lab.validate.fingertip_result import FingertipResult
 
-from .conftest import Cli, need_engine, written
+from .support.files import written
+from .support.processes import Cli
+from .support.requirements import need_engine
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 

@@ -17,7 +17,10 @@ from statemachine.lab.validate.fingertip import certify
 from statemachine.lab.validate.fingertip_result import CommonBody, FingertipResult, RenamedJoint
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, assert_has, need_engine, written
+from .support.claims import assert_has
+from .support.files import written
+from .support.processes import Cli
+from .support.requirements import need_engine
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 
