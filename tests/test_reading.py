@@ -416,3 +416,41 @@ def test_what_the_compiler_warns_of_is_one_warning_of_ours(tmp_path, suffix):
         sm.load(path)
     assert [warning.category for warning in caught] == [EngineWarning]
     assert "settotalmass" in str(caught[0].message)
+
+
+def test_the_frame_of_a_urdf_has_a_third_party_in_a_comparison(tmp_path):
+    pytest.importorskip("pinocchio")
+    path = arm(tmp_path)
+    trace = record(sm.load(path), None, 0.05)
+    found = witness(trace, trace, path)
+    assert found is not None
+    assert (found.site, found.grade) == ("tool", "own reading")
+    assert max(found.left, found.right) < 1e-12
+
+
+def test_frames_of_links_that_are_bodies_in_the_other_file_are_not_missed(tmp_path):
+    fused, kept = tmp_path / "fused", tmp_path / "kept"
+    fused.mkdir()
+    kept.mkdir()
+    left, right = sm.load(arm(fused)), sm.load(arm(kept, compiler='fusestatic="false"'))
+    matched = match_models(left, right)
+    assert matched.only[0]["site"] == ()
+    assert [left.body_names[a] for a, _ in matched.bodies][1:] == ["upper", "lower"]
+
+
+def test_frames_are_matched_by_name_between_two_urdfs(tmp_path):
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.mkdir()
+    two.mkdir()
+    left, right = sm.load(arm(one)), sm.load(arm(two))
+    matched = match_models(left, right)
+    assert list(matched.sites) == [(k, k) for k in range(left.nsite)]
+    assert not any(matched.only[0].values())
+
+
+def test_a_mesh_is_found_by_a_file_url_and_from_the_folder_of_the_urdf(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    place = tmp_path / "elsewhere" / "part.obj"
+    place.write_text(TETRAHEDRON)
+    for name in (f"file://{place}", "elsewhere/part.obj"):
+        assert sm.load(arm(tmp_path, mesh=name, compiler='meshdir="meshes"')).ngeom == 1

@@ -1,16 +1,17 @@
 """The text that MuJoCo is given in place of a file that it does not read as it is.
 
 Of a URDF that is one with the mesh files that it would not find by itself. MuJoCo looks for a mesh
-in the folder of the URDF, or in the `meshdir` of its <compiler>, by the name as it is written. Two
-kinds of names it does not find there:
+in the folder of the URDF, or in the `meshdir` of its <compiler>, by the name as it is written. So
+it does not find these:
 
+- `file:///home/me/part.stl`, and a name from the folder of the URDF where `meshdir` is another;
 - `package://robot/meshes/part.stl`: ROS knows where packages are, a file alone does not;
 - `meshes/part.stl` where `meshdir` is "meshes" already. Up to MuJoCo 3 the folders in the name of a
   mesh of a URDF were stripped (`strippath`, whose default was "true"); since 4.0 they are not.
 
-A name that leads to no file is looked up in this order: in the packages' folders, then without its
-own folders in `meshdir`. What is there is named by its absolute path, with `strippath` off, which
-each release of MuJoCo reads alike.
+A name that leads to no file is looked up in this order: one with `://` as a package or a file;
+then any without its own folders in `meshdir`; then from the folder of the URDF. What is there is
+named by its absolute path, with `strippath` off, which each release of MuJoCo reads alike.
 """
 
 from __future__ import annotations
@@ -24,9 +25,6 @@ from xml.sax.saxutils import quoteattr
 
 from ..interface.records import AS_WRITTEN, ReadOptions
 from ..models import mesh_file, what_is_there
-
-_PACKAGE = "package://"
-
 
 # Suffixes by which MuJoCo knows that a file is XML.
 _KNOWN = (".xml", ".urdf")
@@ -163,10 +161,11 @@ def _drop_meshes(root: Element) -> bool:
 
 def _mesh_elsewhere(name: str, folder: Path, meshdir: Path) -> Path | None:
     """Return the file of a mesh that MuJoCo does not find by its name; None where there is none."""
-    if name.startswith(_PACKAGE) and (place := mesh_file(name, folder)) is not None:
+    place = mesh_file(name, folder)
+    if "://" in name and place is not None:
         return place
     stripped = meshdir / _last_part(name)
-    return stripped if _last_part(name) and what_is_there(stripped) == "a file" else None
+    return stripped if what_is_there(stripped) == "a file" else place
 
 
 def _last_part(name: str) -> str:

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..interface.records import ReadOptions
 from ..measures.text import few, listed
-from .repairs import Repair, assets_of, balance_all, delete_assets, mend_inertia
+from .repair_record import Repair
+from .repairs import balance_all, mend_inertia
+from .spec_assets import assets_of, delete_assets
 from .spec_files import compile_spec, read_spec
 
 if TYPE_CHECKING:

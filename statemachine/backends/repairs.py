@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,8 @@ import numpy as np
 
 from ..errors import ModelError, one_line
 from ..interface import Array
+from .repair_record import Repair, label_of
+from .spec_assets import asset_named, assets_of_file, delete_assets
 from .spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 
 # The mass [kg] and the moment of inertia [kg m^2] that a body gets which moves and has none. MuJoCo
@@ -47,66 +49,6 @@ _UNBALANCED, _NOT_POSITIVE = "must satisfy A + B >= C", "must have positive eige
 _NO_MASS = "must be larger than mjMINVAL"
 _ELEMENT = re.compile(r"Element name '(?P<name>[^']*)', id (?P<id>\d+)(, line (?P<line>\d+))?")
 _OPENED = re.compile(r"opening file '(?P<file>[^']*)'")
-
-Stated = float | tuple[float, ...] | str | None
-
-
-@dataclass(frozen=True)
-class Repair:
-    """One value of a file that was changed, or one element that was deleted, so that it compiles.
-
-    Attributes:
-        kind: Of the element, as MJCF calls it: "body", "mesh", "texture", "hfield", "skin", "geom",
-            "site", "pair", "sensor".
-        name: Of the element; "body 3" for one without a name, by its place in the file.
-        body: Name of the body that has the element; "" for what is of no body.
-        quantity: "inertia", the three principal moments, largest first; "mass"; "file" of a mesh, a
-            texture, a height field or a skin; "mesh" or "hfield" of a geom or a site; "geom" of a
-            pair or a sensor that refers to a deleted one.
-        stated: What the file says, in `unit`: a number, three moments, a name; None where it says
-            nothing.
-        used: What the compiled model has instead; None where the element was deleted.
-        unit: "kg", "kg m^2", or "" of a name.
-        reason: Why, in one line; of the element that has the fault as MuJoCo says it.
-        line: Of the file, where MuJoCo tells it; None where it does not, as of a URDF.
-    """
-
-    kind: str
-    name: str
-    body: str
-    quantity: str
-    stated: Stated
-    used: Stated
-    unit: str
-    reason: str
-    line: int | None = None
-
-    @property
-    def is_deleted(self) -> bool:
-        """Whether the element is not in the compiled model."""
-        return self.used is None
-
-    @property
-    def factor(self) -> float:
-        """How many times larger or smaller the used number is than the stated one, at least 1.
-
-        Of three moments that of the one that changed most; infinite where a number was zero or
-        negative; NaN where no numbers are compared.
-        """
-        stated, used = _numbers(self.stated), _numbers(self.used)
-        if not len(stated) or len(stated) != len(used):
-            return math.nan
-        if (stated <= 0).any() or (used <= 0).any():
-            return math.inf
-        ratios = used / stated
-        return float(np.maximum(ratios, 1 / ratios).max())
-
-
-def _numbers(value: Stated) -> Array:
-    """Return the numbers of a stated or a used value, (n,); none of a name."""
-    if value is None or isinstance(value, str):
-        return np.empty(0)
-    return np.atleast_1d(np.asarray(value, dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,14 +139,14 @@ def _mend(spec: mujoco.MjSpec, message: str) -> list[Repair]:
     """Mend the fault that MuJoCo names; none where it is none of those that are known here."""
     fault = _Fault.of(message)
     if (opened := _OPENED.search(fault.reason)) is not None:
-        return delete_assets(spec, _assets_of_file(spec, opened["file"]), fault.reason)
+        return delete_assets(spec, assets_of_file(spec, opened["file"]), fault.reason)
     if fault.number is None:
         return []
     for sign, mend in _MENDS.items():
         if sign in fault.reason:
             body = _body(spec, fault.name, fault.number)
             return [] if body is None else mend(spec, body, fault)
-    assets = _asset_named(spec, fault.name, fault.number)
+    assets = asset_named(spec, fault.name, fault.number)
     return delete_assets(spec, assets, fault.reason, fault.line)
 
 
@@ -284,7 +226,7 @@ def _give_mass(spec: mujoco.MjSpec, body: Any, fault: _Fault) -> list[Repair]:
     mass = float(body.mass) if body.explicitinertial else None
     moments = stated_moments(body)
     if mass is None or mass <= _SMALLEST:
-        name = _label("body", body, spec.bodies)
+        name = label_of("body", body, spec.bodies)
         repairs.append(
             Repair("body", name, name, "mass", mass, LEAST, "kg", fault.reason, fault.line)
         )
@@ -314,7 +256,7 @@ def _of_inertia(
     spec: mujoco.MjSpec, body: Any, stated: Array | None, used: list[float], fault: _Fault
 ) -> Repair:
     """Return the record of the moments of a body."""
-    name = _label("body", body, spec.bodies)
+    name = label_of("body", body, spec.bodies)
     return Repair(
         kind="body",
         name=name,
@@ -326,153 +268,3 @@ def _of_inertia(
         reason=fault.reason,
         line=fault.line,
     )
-
-
-def _label(kind: str, element: Any, elements: Iterable[Any]) -> str:
-    """Return the name of an element, or "geom 4" by its place among all of its kind."""
-    if element.name:
-        return str(element.name)
-    places = [k for k, other in enumerate(elements) if other == element]
-    return f"{kind} {places[0]}" if places else kind
-
-
-# Kinds of elements that are read from a file of their own, with the list of a specification.
-_ASSETS = {"mesh": "meshes", "hfield": "hfields", "texture": "textures", "skin": "skins"}
-
-
-@dataclass(frozen=True)
-class Asset:
-    """An element of a specification that is read from a file.
-
-    Attributes:
-        kind: "mesh", "hfield", "texture" or "skin".
-        element: The element.
-        name: Its name.
-        file: The file that it names; "" for one that is built in.
-    """
-
-    kind: str
-    element: mujoco.MjsMesh | mujoco.MjsHField | mujoco.MjsTexture | mujoco.MjsSkin
-    name: str
-    file: str
-
-
-def assets_of(spec: mujoco.MjSpec, kinds: Iterable[str] = tuple(_ASSETS)) -> Iterator[Asset]:
-    """Yield the assets of some kinds ("mesh", "hfield", "texture", "skin") in a specification."""
-    for kind in kinds:
-        elements = list(getattr(spec, _ASSETS[kind]))
-        for element in elements:
-            files = [element.file]
-            if kind == "texture":
-                files += list(element.cubefiles)
-            file = next((name for name in files if name), "")
-            yield Asset(kind, element, _label(kind, element, elements), file)
-
-
-def _assets_of_file(spec: mujoco.MjSpec, file: str) -> list[Asset]:
-    """Return the assets that are read from a file, by the path that MuJoCo tried.
-
-    That ends with the file as the asset has it, or with its last part where `strippath` is on.
-    """
-    tried = f"/{file}"
-    named = [asset for asset in assets_of(spec) if asset.file]
-    by_path = [asset for asset in named if tried.endswith(f"/{asset.file}")]
-    if by_path:
-        return by_path
-    return [asset for asset in named if Path(asset.file).name == Path(file).name]
-
-
-def _asset_named(spec: mujoco.MjSpec, name: str, number: int) -> list[Asset]:
-    """Return the asset that an error is of, by its name, or its place where it has none."""
-    for kind in _ASSETS:
-        for place, asset in enumerate(assets_of(spec, [kind])):
-            if asset.element.name == name and (name or place == number):
-                return [asset]
-    return []
-
-
-def delete_assets(
-    spec: mujoco.MjSpec, assets: Iterable[Asset], reason: str, line: int | None = None
-) -> list[Repair]:
-    """Delete assets from a specification, with the geoms, pairs and sensors that need them.
-
-    Args:
-        spec: The specification.
-        assets: Of `assets_of`.
-        reason: Why.
-        line: Of the file.
-
-    Returns:
-        A record of each element that was deleted, and of each site that is another shape.
-    """
-    repairs: list[Repair] = []
-    users: list[Any] = []
-    assets = list(assets)
-    for asset in assets:
-        row = Repair(asset.kind, asset.name, "", "file", asset.file, None, "", reason, line)
-        repairs.append(row)
-        if asset.kind == "texture":
-            _forget_texture(spec, asset.name)
-        for row, geom in _geoms_of(spec, asset):
-            repairs.append(row)
-            users.append(geom)
-        repairs += _sites_of(spec, asset)
-    for row, element in _referring(spec, {geom.name for geom in users if geom.name}):
-        repairs.append(row)
-        users.append(element)
-    for element in [*users, *(asset.element for asset in assets)]:
-        spec.delete(element)
-    return repairs
-
-
-def _geoms_of(spec: mujoco.MjSpec, asset: Asset) -> Iterator[tuple[Repair, Any]]:
-    """Yield the geoms that a mesh or a height field is the shape of, or that are fitted to it."""
-    geoms = list(spec.geoms)
-    for geom in geoms:
-        if asset.name == {"mesh": geom.meshname, "hfield": geom.hfieldname}.get(asset.kind, ""):
-            name, body = _label("geom", geom, geoms), _label("body", geom.parent, spec.bodies)
-            reason = f"its {asset.kind} was deleted"
-            yield Repair("geom", name, body, asset.kind, asset.name, None, "", reason), geom
-
-
-def _sites_of(spec: mujoco.MjSpec, asset: Asset) -> Iterator[Repair]:
-    """Make a sphere of each site that has a mesh for its shape: its frame stays."""
-    sites = list(spec.sites)
-    for site in sites:
-        if asset.kind == "mesh" and site.meshname == asset.name:
-            site.meshname, site.type = "", mujoco.mjtGeom.mjGEOM_SPHERE
-            name, body = _label("site", site, sites), _label("body", site.parent, spec.bodies)
-            reason = "its mesh was deleted"
-            yield Repair("site", name, body, "mesh", asset.name, "sphere", "", reason)
-
-
-def _referring(spec: mujoco.MjSpec, geoms: set[str]) -> Iterator[tuple[Repair, Any]]:
-    """Yield the pairs and sensors that refer to one of these geoms."""
-    reason = "it refers to a geom that was deleted"
-    pairs, sensors = list(spec.pairs), list(spec.sensors)
-    for pair in pairs:
-        for geom in sorted({pair.geomname1, pair.geomname2} & geoms)[:1]:
-            name = _label("pair", pair, pairs)
-            yield Repair("pair", name, "", "geom", geom, None, "", reason), pair
-    for sensor in sensors:
-        for geom in sorted(_geoms_of_sensor(sensor) & geoms)[:1]:
-            name = _label("sensor", sensor, sensors)
-            yield Repair("sensor", name, "", "geom", geom, None, "", reason), sensor
-
-
-def _geoms_of_sensor(sensor: Any) -> set[str]:
-    """Return the names of the geoms that a sensor is of."""
-    of_geoms = mujoco.mjtObj.mjOBJ_GEOM
-    names = set[str]()
-    if sensor.objtype == of_geoms:
-        names.add(sensor.objname)
-    if sensor.reftype == of_geoms:
-        names.add(sensor.refname)
-    return names
-
-
-def _forget_texture(spec: mujoco.MjSpec, name: str) -> None:
-    """Take a texture from the materials that have it."""
-    for material in spec.materials:
-        textures = list(material.textures)
-        material.textures = ["" if texture == name else texture for texture in textures]

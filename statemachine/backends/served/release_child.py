@@ -14,8 +14,13 @@ import tempfile
 import mujoco
 import numpy as np
 
-_BESIDE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "release_parts.py")
-_parts = runpy.run_path(_BESIDE)
+
+def _beside(name):
+    """Run a file that lies beside this one, and return what it defines."""
+    return runpy.run_path(os.path.join(os.path.dirname(os.path.abspath(__file__)), name))
+
+
+_parts = _beside("release_parts.py")
 PARTS, contact_arrays = _parts["PARTS"], _parts["contact_arrays"]
 constraint_part, held = _parts["constraint_part"], _parts["held"]
 
@@ -126,7 +131,7 @@ def compiled(file, text, read=None):
     if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
         mujoco.set_mju_user_warning(lambda text: None)
     if read is not None:
-        return spec_with_options(file, **read).compile()
+        return spec_with_options(file, read).compile()
     make = mujoco.MjModel.from_xml_string if text else mujoco.MjModel.from_xml_path
     return make(text or file)
 
@@ -134,7 +139,7 @@ def compiled(file, text, read=None):
 def written(file, text, read=None):
     """Return as MJCF what this release reads in a file, or in its text."""
     if read is not None:
-        spec = spec_with_options(file, **read)
+        spec = spec_with_options(file, read)
         spec.compile()
         return spec.to_xml()
     model = compiled(file, text)  # anew: what is written is what was compiled last
@@ -156,20 +161,9 @@ def names_of(model):
     return names
 
 
-def spec_with_options(file, balance_inertia, meshes):
-    """Return the spec of a file with its inertias balanced, or without its mesh geoms."""
-    if not hasattr(mujoco, "MjSpec"):
-        raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads a file as it is written")
-    spec = mujoco.MjSpec.from_file(file)
-    if balance_inertia:
-        getattr(spec, "compiler", spec).balanceinertia = True
-    if not meshes:
-        for element in [geom for geom in spec.geoms if geom.meshname] + list(spec.meshes):
-            if hasattr(spec, "delete"):
-                spec.delete(element)
-            else:
-                element.delete()
-    return spec
+def spec_with_options(file, read):
+    """Return the spec of a file that is read with options."""
+    return _beside("release_options.py")["spec_with_options"](file, **read)
 
 
 def edit(model, edits, flags):

@@ -1,0 +1,24 @@
+"""Options with which a release of MuJoCo reads an MJCF, in the Python of its environment.
+
+It needs MuJoCo only, on Python 3.9 or later, and imports nothing of this package.
+"""
+
+from __future__ import annotations
+
+import mujoco
+
+
+def spec_with_options(file, balance_inertia, meshes):
+    """Return the spec of a file with its inertias balanced, or without its mesh geoms."""
+    if not hasattr(mujoco, "MjSpec"):
+        raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads an MJCF as it is written")
+    spec = mujoco.MjSpec.from_file(file)
+    if balance_inertia:
+        getattr(spec, "compiler", spec).balanceinertia = True
+    if not meshes:
+        for element in [geom for geom in spec.geoms if geom.meshname] + list(spec.meshes):
+            if hasattr(spec, "delete"):
+                spec.delete(element)
+            else:
+                element.delete()
+    return spec
