@@ -400,7 +400,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         ),
         (
             explanation_of(hold, shares=(rounded,)),
-            "1.5708 on the left and 1.570796 on the right",
+            "-90.0002 90.0002° on the left and -90.0002 90° on the right",
         ),
         (
             explanation_of(hold, floor=0.05),

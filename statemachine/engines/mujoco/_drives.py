@@ -52,6 +52,7 @@ _SO3 = 6  # mjtTrn: of a ball joint, or of a site in the frame of another
 # Where the law of an actuator's own state is another, these are one thing with it.
 _OF_A_FILTER = ("dynamics", "range of its activation")
 _OF_A_LAW = ("gains", *_OF_A_FILTER, "length range")
+_STATE_ARRAYS = ("actuator_dyntype", "actuator_dynprm", "actuator_actearly")
 _STILL = (
     *("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
     *("actuator_armature", "actuator_damping"),
@@ -99,9 +100,9 @@ def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         values += [value for value in row.values if value.quantity not in told]
     subject = "filter" if filters else "law"
     if ours.size == theirs.size:
-        edits = [edit for row in of_law for edit in row.edits]
-        own = copies(("actuator_dyntype", "actuator_dynprm", "actuator_actearly"), sides.left, a, b)
-        edits += [edit for edit in own if edit[0] not in {name for name, _, _ in edits}]
+        edits = list(copies(_STATE_ARRAYS, sides.left, a, b))
+        for row in of_law:
+            edits += row.edits
         yield sides.tell(subject, "actuator", a, values, edits)
     elif ours.controls != theirs.controls:
         why = "it takes other numbers of ctrl"
@@ -180,16 +181,15 @@ def _given_law(
     states = has_own_state(source, k)
     limited = states and bool(source.actuator_actlimited[k])
     kept = tuple(source.actuator_actrange[k].tolist()) if limited else (0.0, 0.0)
-    usual = int(source.actuator_dyntype[k]) != int(require("mujoco").mjtDyn.mjDYN_USER)
-    values: dict[str, float | tuple[float, ...]] = {
-        "dyntype": int(source.actuator_dyntype[k]),
-        "dynprm": tuple(source.actuator_dynprm[k].tolist()),
-        "actearly": bool(source.actuator_actearly[k]),
-        "actlimited": int(limited),
-        "actrange": kept,
-        "actdim": -1 if usual else int(source.actuator_actnum[k]),
-        "activations": _activations(source, k, target),
-    }
+    law, length = int(source.actuator_dyntype[k]), -1  # the length of a usual law is known
+    if law == int(require("mujoco").mjtDyn.mjDYN_USER):
+        length = int(source.actuator_actnum[k])
+    values: dict[str, float | tuple[float, ...]] = {"dyntype": law, "actdim": length}
+    values["dynprm"] = tuple(source.actuator_dynprm[k].tolist())
+    values["actearly"] = bool(source.actuator_actearly[k])
+    values["actlimited"] = int(limited)
+    values["actrange"] = kept
+    values["activations"] = _activations(source, k, target)
     return tuple(SpecEdit("actuator", there, name, value) for name, value in values.items())
 
 

@@ -179,11 +179,9 @@ def _softened_by_another(sides: Sides, a: int, b: int) -> ModelDifference:
     left, kind = sides.left, _KINDS_OF_COUPLING[int(sides.left.eq_type[a])]
     firsts = int(left.eq_obj1id[a]), int(sides.right.eq_obj1id[b])
     names = name_of(left, kind, firsts[0]), name_of(sides.right, kind, firsts[1])
-    edits: tuple[Edit, ...] = (
-        ("eq_obj1id", (b,), int(sides.right.eq_obj2id[b])),
-        ("eq_obj2id", (b,), int(sides.right.eq_obj1id[b])),
-        ("eq_data", (b,), np.array(left.eq_data[a])),
-    )
+    first, second = int(sides.right.eq_obj1id[b]), int(sides.right.eq_obj2id[b])
+    edits: list[Edit] = [("eq_obj1id", (b,), second), ("eq_obj2id", (b,), first)]
+    edits.append(("eq_data", (b,), np.array(left.eq_data[a])))
     value = DifferingQuantity(f"{kind}1", *names)
     return sides.tell("softness by", "equality", a, (value,), edits)
 
@@ -198,11 +196,11 @@ def _match(sides: Sides) -> Iterator[tuple[int, int]]:
     free = list(range(sides.right.neq))
     for a in range(sides.left.neq):
         ours = _keeps(sides, 0, a)
-        unlike = {
-            b: float(np.abs(_wanted(sides, a, b) - sides.right.eq_data[b]).max())
-            for b in free
-            if _keeps(sides, 1, b) == ours or _is_exchanged(sides, a, b)
-        }
+        unlike: dict[int, float] = {}
+        for b in free:
+            if _keeps(sides, 1, b) == ours or _is_exchanged(sides, a, b):
+                off = np.abs(_wanted(sides, a, b) - sides.right.eq_data[b])
+                unlike[b] = float(off.max())
         if unlike:
             best = min(unlike, key=unlike.__getitem__)
             free.remove(best)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...measures.text import NONE, capital, percent, quantity, short_time
 from ..compare.stillness import nothing_moved
-from .values_page import values_of
+from .values_page import heading_of, phrase_of, sides_of
 
 if TYPE_CHECKING:
     from . import Explanation, Share
@@ -102,10 +102,11 @@ def answer(result: Explanation) -> str:
 def _by_cause(result: Explanation) -> str:
     """Say which cause takes away most, and what it does together with others."""
     cause = next(row for row in result.shares if row.share)
-    left, right = values_of(cause)
-    kind = "bare" if NONE in (left, right) else "cause"
+    left, right = sides_of(cause)
+    phrase = phrase_of(cause)
+    kind = "bare" if phrase or NONE in (left, right) else "cause"
     said = ANSWERS[kind].format(
-        cause=capital(cause.name),
+        cause=capital(phrase if phrase else heading_of(cause)),
         left=left,
         right=right,
         part=percent(abs(cause.share or 0.0)),
@@ -144,7 +145,7 @@ def _switch(result: Explanation, name: str) -> tuple[str, str]:
     """
     for row in result.shares:
         if row.name == name:
-            return values_of(row)
+            return sides_of(row)
     return NONE, NONE
 
 

@@ -7,8 +7,8 @@ The first sentence is made in `why_answer`, the table in `why_table`, the values
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
+from ...engines.records import DifferingQuantity
 from ...installed import DEFAULT
 from ...measures.text import NONE, capital, few, listed, percent, quantity, sentence, short_time
 from ...show import report_template as template
@@ -20,7 +20,7 @@ from . import ADDS_UP, UNEXPLAINED, Explanation, Share
 from .answer_page import amount, answer, missing, parts, proofs, refused
 from .locate import Localisation
 from .table_page import has_effect, is_beyond, is_noisy, table, without_effect
-from .values_page import figure_of, has_several_figures, values_of
+from .values_page import texts_of, title_of
 
 _SINGULAR = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
 ADD = "add what the left has"
@@ -309,20 +309,16 @@ def _with_everything_changed(result: Explanation) -> Slots:
 
 
 def _changes(row: Share) -> list[str]:
-    """Return what to change for one cause; a line for each figure, where they differ."""
+    """Return what to change for one cause: a line for each quantity."""
     place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
-    if not has_several_figures(row):
-        return [f"{place}{row.name}{figure_of(row)}: {_change(row)}"]
-    lines: list[str] = []
-    for value in row.values:
-        single = replace(row, values=(value,))
-        lines.append(f"{place}{row.name}, {value.quantity}: {_change(single)}")
-    return lines
+    if not row.values:
+        return [f"{place}{row.name}: {NONE} → {NONE}"]
+    return [f"{place}{title_of(row, value)}: {_change(value)}" for value in row.values]
 
 
-def _change(row: Share) -> str:
+def _change(value: DifferingQuantity) -> str:
     """Say what the right is to be given."""
-    left, right = values_of(row)
+    left, right = texts_of(value)
     if (left, right) == ("there", NONE):
         return ADD
     return f"{right} → {left}"

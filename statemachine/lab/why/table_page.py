@@ -10,8 +10,9 @@ from ...show.blocks import Block, Section, Table, TableCell
 from . import Explanation, Share
 from .answer_page import amount
 from .locate import Localisation
-from .values_page import figure_of, values_of
+from .values_page import relative_difference, texts_of, title_of
 
+_SAME = "″"  # in the rows of a cause's further quantities, which have one part with the first
 _SHOWN = 12  # rows; the rest is folded away
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
@@ -35,14 +36,17 @@ def table(result: Explanation, able: Sequence[Share], small: Sequence[Share]) ->
         able: The causes that can be equalized.
         small: Those of them without an effect, which are one row.
     """
-    rows = [_row_of_cause(result, row) for row in able if row not in small]
+    rows: list[Row] = []
+    for row in able:
+        if row not in small:
+            rows += _rows_of_cause(result, row)
     rows += [_row_of_place(place) for place in result.found_in]
     if small:
         rows.append(_row_of_small(small))
     if not rows:
         return []
     heads = _HEADS
-    if all(row[4:] == (NONE, NONE) for row in rows):  # nothing was equalized by itself
+    if all({*row[4:]} <= {NONE, _SAME} for row in rows):  # nothing was equalized by itself
         heads, rows = heads[:4], [row[:4] for row in rows]
     most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
     shown = Table(heads, rows[:most], _title(result), words=_WORDS)
@@ -87,18 +91,29 @@ def _title(result: Explanation) -> str:
     )
 
 
-def _row_of_cause(result: Explanation, row: Share) -> Row:
-    what = capital(row.name) + figure_of(row)
-    left, right = values_of(row)
+def _rows_of_cause(result: Explanation, row: Share) -> list[Row]:
+    """Return a row for each quantity of a cause; the parts stand in the first."""
+    parts = _parts(result, row)
+    if not row.values:
+        return [(capital(row.name), NONE, NONE, *parts)]
+    rows: list[Row] = []
+    for value in sorted(row.values, key=relative_difference, reverse=True):
+        left, right = texts_of(value)
+        rows.append((capital(title_of(row, value)), left, right, *parts))
+        parts = (_SAME, _SAME, _SAME)
+    return rows
+
+
+def _parts(result: Explanation, row: Share) -> Row:
+    """Return the part of a cause, and what it takes away alone and last."""
     noise = result.floor / result.gap if result.verdict.divides else 0.0
     if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
-        part = TableCell(f"< {percent(noise)}", share=row.share)
-        return what, left, right, part, NONE, NONE
+        return TableCell(f"< {percent(noise)}", share=row.share), NONE, NONE
     explains = percent(row.share)
     if row.error and math.isfinite(row.error):
         explains += f" ± {percent(row.error)}"
     part = TableCell(explains, share=row.share)
-    return what, left, right, part, percent(row.alone), percent(row.last)
+    return part, percent(row.alone), percent(row.last)
 
 
 def _row_of_place(place: Localisation) -> Row:

@@ -1,4 +1,7 @@
-"""The two values of a cause, as a reader has them."""
+"""The two values of a cause, as a reader has them: with the name of each quantity.
+
+A quantity is named unless the name of its cause says what it is: "mass of lower" needs no "mass".
+"""
 
 from __future__ import annotations
 
@@ -6,53 +9,116 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...engines.records import TURNED, DifferingQuantity
-from ...measures.text import NONE, quantity, reading, significant
+from ...engines.records import TURNED, DifferingQuantity, QuantityValue
+from ...measures.text import NONE, listed, quantity, reading, significant
 
 if TYPE_CHECKING:
     from . import Share
 
-_WIDE = 24  # characters of a value
-_OFF = ("place", "anchor", "com", "axis")  # figures of which only the distance is said
+_OFF = ("place", "anchor", "com", "axis")  # quantities of which only the distance is said
+_SHOWN = 3  # quantities that a sentence has
+_DIGITS = range(4, 18)  # of a number: as many as it takes to tell two apart
+# Causes whose one quantity needs no name, beside those whose name says it.
+_SAID = {
+    *("moments", "com", "place", "anchor", "drives", "farthest corner", "farthest point"),
+    *("time", "order", "count", "joints", "ref", "springref"),
+}
 
 
-def figure_of(row: Share) -> str:
-    """Say which figure of a cause it is, where its name does not say so; else ""."""
-    figure = row.values[0].quantity if row.values else ""
-    if has_several_figures(row):
-        return f" ({len(row.values)} figures)"
-    is_entry = "[" in figure or figure == TURNED or row.kind == "option"
-    return f" ({figure})" if is_entry and figure not in row.name else ""
+def needs_name(row: Share, value: DifferingQuantity) -> bool:
+    """Tell whether a quantity of a cause has to be named beside it."""
+    name = value.quantity
+    if row.kind == "engine" or not name:
+        return False
+    if len(row.values) > 1:
+        return True
+    words = row.name.replace("(", " ").replace(")", " ").split(" ")
+    return not (name in _SAID or name in row.name or set(name.split()) <= {*words})
 
 
-def has_several_figures(row: Share) -> bool:
-    """Tell whether its figures differ; a servo's kp stands in two, once with another sign."""
-    sizes = {repr((values.left, values.right)).replace("-", "") for values in row.values}
-    return len(sizes) > 1
+def title_of(row: Share, value: DifferingQuantity) -> str:
+    """Return the name of a cause, and of one of its quantities where it has to be named."""
+    return f"{row.name} ({value.quantity})" if needs_name(row, value) else row.name
 
 
-def values_of(row: Share) -> tuple[str, str]:
-    """Return the left's and the right's value of the figure that differs most.
+def heading_of(row: Share) -> str:
+    """Return the name of a cause; with that of its quantity, where it has one that needs it."""
+    return title_of(row, row.values[0]) if len(row.values) == 1 else row.name
 
-    Of a place, or a direction, how far the right one is off.
+
+def sides_of(row: Share) -> tuple[str, str]:
+    """Return what each side has of a cause, in words: "solref 0.02 and solmix 1".
+
+    Both are `NONE` where a side has nothing that a value could tell.
     """
     if not row.values:
         return NONE, NONE
-    figure = max(row.values, key=_relative)
-    left, right, unit = figure.left, figure.right, figure.unit
-    if isinstance(left, tuple) and isinstance(right, tuple) and left and right:
-        if figure.quantity in _OFF:
-            return _how_far_off(left, right, unit)
-        texts = _of_arrays(left, right, unit)
-    else:
-        texts = _value(left, unit), _value(right, unit)
-    left_text, right_text = _cut(texts[0]), _cut(texts[1])
-    if left_text == right_text and _relative(figure):  # numbers, which read the same: all digits
-        return _first_that_differs(figure)
-    return left_text, right_text
+    values = _largest_first(row)
+    left, right = zip(*(_named(row, value) for value in values[:_SHOWN]), strict=True)
+    more = f" and {len(values) - _SHOWN} more" if len(values) > _SHOWN else ""
+    if more:
+        return ", ".join(left) + more, ", ".join(right) + more
+    return listed([text for text in left if text]), listed([text for text in right if text])
 
 
-def _how_far_off(left: tuple[object, ...], right: tuple[object, ...], unit: str) -> tuple[str, str]:
+def _largest_first(row: Share) -> list[DifferingQuantity]:
+    """Return the quantities of a cause; of more than a sentence has, those that differ most."""
+    if len(row.values) <= _SHOWN:
+        return list(row.values)
+    return sorted(row.values, key=relative_difference, reverse=True)
+
+
+def _named(row: Share, value: DifferingQuantity) -> tuple[str, str]:
+    """Return the texts of a quantity with its name; a side without it among others has "" ."""
+    texts: list[str] = []
+    for text in texts_of(value):
+        if text == NONE and len(row.values) > 1:
+            texts.append("")
+        elif len(row.values) > 1:
+            texts.append(f"{value.quantity} {text}")
+        else:
+            texts.append(text)
+    return texts[0], texts[1]
+
+
+def phrase_of(row: Share) -> str:
+    """Return a cause in a sentence of its own where its values say too little; else ""."""
+    element = row.name.rpartition(" of ")[2]
+    names = {value.quantity: value for value in row.values}
+    if row.kind == "body" and row.name.startswith("inertia") and names.keys() == {TURNED}:
+        _, angle = texts_of(names[TURNED])
+        return (
+            f"the inertia axes of {element} are turned by {angle} on the right, its moments are "
+            "equal"
+        )
+    times = names.get("timeconst")
+    if row.name.startswith("filter of ") and times and None in (times.left, times.right):
+        left, right = texts_of(times)
+        if times.left is None:
+            return f"{element} filters its command with {right} on the right, not on the left"
+        return f"{element} filters its command with {left} on the left, not on the right"
+    return ""
+
+
+def texts_of(value: DifferingQuantity) -> tuple[str, str]:
+    """Return the left's and the right's value of a quantity, with as many digits as it takes.
+
+    Of a place, or a direction, how far the right one is off.
+    """
+    left, right, unit = value.left, value.right, value.unit
+    if isinstance(left, tuple) and isinstance(right, tuple) and value.quantity in _OFF:
+        return _how_far_off(left, right, unit)
+    texts = _text(left, unit), _text(right, unit)
+    if texts[0] != texts[1] or left == right:
+        return texts
+    for digits in _DIGITS:
+        texts = _text(left, unit, digits), _text(right, unit, digits)
+        if texts[0] != texts[1]:
+            break
+    return texts
+
+
+def _how_far_off(left: tuple[float, ...], right: tuple[float, ...], unit: str) -> tuple[str, str]:
     """Return how far the right place, or direction, is off the left one."""
     a, b = np.array(left, dtype=float), np.array(right, dtype=float)
     if unit:
@@ -61,59 +127,37 @@ def _how_far_off(left: tuple[object, ...], right: tuple[object, ...], unit: str)
     return "this way", f"{quantity(angle, 'rad')} off"
 
 
-def _of_arrays(left: tuple[object, ...], right: tuple[object, ...], unit: str) -> tuple[str, str]:
-    """Return two arrays; of long ones the entries that differ, which a cut would hide."""
-    texts = _value(left, unit), _value(right, unit)
-    if len(left) != len(right) or max(len(text) for text in texts) <= _WIDE:
-        return texts
-    a, b = np.array(left, object), np.array(right, object)
-    differ = a != b
-    texts = _value(tuple(a[differ]), unit), _value(tuple(b[differ]), unit)
-    if differ.all():
-        return texts
-    return f"{texts[0]} …", f"{texts[1]} …"
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…"
-
-
-def _first_that_differs(figure: DifferingQuantity) -> tuple[str, str]:
-    """Return the first numbers of two values that differ, with all their digits."""
-    a, b = (np.array(value, dtype=float).ravel() for value in (figure.left, figure.right))
-    first = np.argmax(a != b)
-    return f"{a[first]:.12g}", f"{b[first]:.12g}"
-
-
-def _relative(figure: DifferingQuantity) -> float:
-    """Return how far two values are apart, as a part of the larger.
-
-    It is 0 where that is not a number.
-    """
+def relative_difference(value: DifferingQuantity) -> float:
+    """Return how far two values are apart, as a part of the larger; 1 where one is no number."""
     try:
-        left, right = (np.array(value, dtype=float) for value in (figure.left, figure.right))
+        left, right = np.array(value.left, dtype=float), np.array(value.right, dtype=float)
         size = max(float(np.linalg.norm(left)), float(np.linalg.norm(right)))
-        return float(np.linalg.norm(left - right)) / size if size else 0.0
+        share = float(np.linalg.norm(left - right)) / size if size else 0.0
     except (TypeError, ValueError):
-        return 0.0
+        return 1.0
+    return 1.0 if np.isnan(share) else share
 
 
-def _value(value: object, unit: str) -> str:
+def _text(value: QuantityValue, unit: str, digits: int = 0) -> str:
+    """Return a value with its unit.
+
+    Args:
+        value: The value.
+        unit: Its SI unit.
+        digits: Significant ones; 0 for as many as are usual.
+    """
     match value:
         case None:
             return NONE
         case tuple():
             factor, shown = reading(unit)
-            return " ".join(_value(_scaled(entry, factor), "") for entry in value) + shown
+            numbers = (significant(entry * factor, digits or 4) for entry in value)
+            return " ".join(numbers) + shown
         case bool():
             return "on" if value else "off"
-        case int() | float():
-            return quantity(float(value), unit) if unit else significant(float(value))
-    return str(value)
-
-
-def _scaled(value: object, factor: float) -> object:
-    """Return a number times a factor, and anything else as it is."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or factor == 1:
-        return value
-    return value * factor
+        case str():
+            return value
+    if digits or not unit:
+        factor, shown = reading(unit)
+        return f"{significant(float(value) * factor, digits or 4)}{shown}"
+    return quantity(float(value), unit)
