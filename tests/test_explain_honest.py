@@ -167,7 +167,7 @@ def test_one_cause_explains_all(folder: Path, capsys: Any, name: str) -> None:
     assert_has(cause, name=known, share=pytest.approx(1.0))
     assert [tuple(each.values()) for each in cause["values"]] == [value]
     assert (code, main(["compare", "--models", *sides])) == (0, models)
-    assert "keyframe k time" in capsys.readouterr().out or known != "time of the start"
+    assert "Keyframe k: time" in capsys.readouterr().out or known != "time of the start"
 
 
 def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any) -> None:
@@ -181,7 +181,7 @@ def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys
     code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-chaos")
     assert (code, found["shares"]) == (0, [])
     assert main(["compare", "l.xml", "v.xml", "--models"]) == 0
-    assert "sensor p type" in capsys.readouterr().out
+    assert "Sensor of p: type" in capsys.readouterr().out
 
 
 def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import statemachine as sm
 from statemachine import backends, errors, rotations
-from statemachine.engines.mujoco.description import read_file
+from statemachine.engines.mujoco.file_reading import read_file
 from statemachine.interface.checks import as_vector
 from statemachine.lab.compare import parse_sides
 from statemachine.lab.robots import find
@@ -88,7 +88,7 @@ def test_an_mjcf_may_say_so_in_its_name(tmp_path: Path) -> None:
     assert sm.load(file).path == file
     assert [found.name for found in find([tmp_path])] == ["robot.mjcf"]
     assert parse_sides([f"{file}@mujoco"])[0].path == file
-    assert read_file(file, "robot").format == "MJCF"
+    assert read_file(file).format == "MJCF"
 
 
 @pytest.mark.parametrize(

@@ -217,7 +217,7 @@ def test_data_that_only_a_function_reads_is_a_difference_and_a_cause(kind, tmp_p
     (value,) = found.shares[0].values
     assert (value.left, value.right) == (0.3, 0.6)
     listed = compare_models(tmp_path / "left.xml", tmp_path / "right.xml")
-    assert [row.where for row in listed.differences if row.matters] == [cause]
+    assert [row.cause for row in listed.differences if row.matters] == [cause]
     assert not listed.equal
 
 

@@ -68,7 +68,11 @@ class MendedModel:
 
 
 def compile_mended(
-    path: Path, *, fuse_static: bool | None = None, visuals: bool = False
+    path: Path,
+    *,
+    fuse_static: bool | None = None,
+    visuals: bool = False,
+    prepare: Callable[[mujoco.MjSpec], None] | None = None,
 ) -> MendedModel:
     """Compile a file, and mend what MuJoCo refuses in it.
 
@@ -78,6 +82,7 @@ def compile_mended(
             None for what the file's <compiler> says (of a URDF true, of an MJCF false, by default).
         visuals: Whether visual shapes of a URDF are read, too; by default they are left out, as
             MuJoCo does unless the file says `discardvisual="false"`.
+        prepare: What is done to the specification before it is compiled, after it was mended.
 
     Raises:
         ModelError: It cannot be read at all, or has a fault that nothing here mends.
@@ -96,6 +101,8 @@ def compile_mended(
             repairs += balance_all(spec, "balanceinertia of the <compiler>")
         for fault in faults:
             repairs += _mend(spec, fault)
+        if prepare is not None:
+            prepare(spec)
         try:
             compiled = compile_spec(spec)
         except (ValueError, *ENGINE_ERRORS) as error:

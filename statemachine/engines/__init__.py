@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..interface.records import ReadOptions
     from ..show.drawing.scene import Camera, Drawer
     from .call_watch import CallWatch
+    from .description.reading import Comparable, ModelReading
     from .description.records import Robot
     from .measured import Phrases
     from .records import (
@@ -222,12 +223,8 @@ class RawEngine:
 
     @_needed
     @abstractmethod
-    def read(self, path: Path, name: str) -> Robot:
-        """What it makes of a file, with its own defaults.
-
-        Args:
-            path: The file.
-            name: What the description goes by.
+    def read(self, path: Path) -> ModelReading:
+        """What it makes of a file with its own defaults, as a compiled model; see `read_robot`.
 
         Raises:
             MissingEngineError: It is not installed here.
@@ -236,8 +233,41 @@ class RawEngine:
 
     @_needed
     @abstractmethod
-    def read_file(self, path: Path, name: str) -> Robot:
-        """What an MJCF says itself; meshes may be missing. Arguments and errors as of `read`."""
+    def read_file(self, path: Path, comparable: Comparable | None = None) -> ModelReading:
+        """A file as it says itself, as a compiled model.
+
+        Args:
+            path: An MJCF, URDF or MJB file.
+            comparable: How it is made comparable with the other side; None for the elements of the
+                file alone.
+
+        Raises:
+            MissingEngineError: It is not installed here.
+            ModelError: It cannot read the file.
+        """
+
+    @_needed
+    @abstractmethod
+    def read_robot(self, robot: Robot, path: Path) -> ModelReading:
+        """What another engine made of a file, as a compiled model.
+
+        Args:
+            robot: What the engine made of it.
+            path: The file.
+
+        Raises:
+            ModelError: It cannot be compiled.
+        """
+
+    @_needed
+    @abstractmethod
+    def element_names(self, raw: Any) -> dict[str, list[str]]:
+        """The names of all elements of a compiled model by their kind, in their order."""
+
+    @_needed
+    @abstractmethod
+    def moment_arms(self, raw: Any) -> tuple[dict[str, float], ...]:
+        """The moment arms of each actuator of a compiled model on hinges and slides, by joint."""
 
     @_needed
     @abstractmethod

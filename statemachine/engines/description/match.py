@@ -7,7 +7,7 @@ the same part, are of one kind and have one axis; that is said, and `renamed` ov
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -239,7 +239,7 @@ def _of_root(left: GroupTree, right: GroupTree, a: Group, b: Group) -> list[Plac
 
 def _first_link(tree: GroupTree, group: Group) -> Placement:
     """Return the place of the robot's first link in a root that is the world, else the root's."""
-    if tree.robot.rooted and group.number == 0 and len(group.links) > 1:
+    if group.number == 0 and len(group.links) > 1:
         return group.links[1][1]
     return HERE
 
@@ -297,28 +297,33 @@ def _fixed_frames(left: GroupTree, right: GroupTree) -> Places:
     return fixed
 
 
-def frame_names(
-    left: GroupTree, right: GroupTree, given: Mapping[str, str] | None = None
+def frame_names(left: GroupTree, right: GroupTree) -> dict[str, str]:
+    """Return which frames of two descriptions are one, by their names."""
+    return alike_names(list(left.frames), list(right.frames), {})
+
+
+def alike_names(
+    left: Sequence[str], right: Sequence[str], names: Mapping[str, str]
 ) -> dict[str, str]:
-    """Frames that are one: those given, of one name, or of names that say the same.
+    """Return which names are of one thing: those that are told, the same ones, and alike ones.
 
-    "gripperframe" and "gripper_frame_link" do: case, signs and a last "link" or "site" apart.
+    "gripperframe" and "gripper_frame_link" are alike: case, signs and a last "link" or "site"
+    apart.
 
-    Raises:
-        UnknownNameError: A frame that was given is not there.
+    Args:
+        left: Names on the left.
+        right: Names on the right.
+        names: By a name of the left one of the right, as far as that is told.
     """
-    names = dict(given or {})
-    for pair in names.items():
-        for tree, name in zip((left, right), pair, strict=True):
-            check_name(f"frame in {tree.robot.name}", name, tree.frames)
-    rest = [name for name in right.frames if name not in names.values()]
-    plain = {_plain(name): name for name in reversed(rest)}
-    for name in left.frames:
-        if name not in names:
-            other = name if name in rest else plain.get(_plain(name))
-            if other is not None and other not in names.values():
-                names[name] = other
-    return names
+    pairs = dict(names)
+    rest = [name for name in right if name not in pairs.values()]
+    by_letters = {_plain(name): name for name in reversed(rest)}
+    for name in left:
+        if name not in pairs:
+            other = name if name in rest else by_letters.get(_plain(name))
+            if other is not None and other not in pairs.values():
+                pairs[name] = other
+    return pairs
 
 
 def _plain(name: str) -> str:

@@ -8,8 +8,7 @@ something else than zero.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,39 +46,22 @@ class CollisionShape:
         place: In the link's frame.
         size: Half edges of a box or ellipsoid, radius, radius and half length [m].
         points: (n, 3) corners of a mesh [m], in its own frame; None if it was not read.
-        volume: Of a mesh that was read [m³].
         name: As in the file, may be empty.
-        label: What the list of two compiled models calls it.
-        contact: Settings of its contacts by name, those that are said; `friction` has the sliding,
-            torsional and rolling coefficients.
+        friction: (3,) sliding, torsional and rolling coefficient; None where it is not said.
     """
 
     kind: str
     place: Placement
     size: tuple[float, ...] = ()
     points: Array | None = None
-    volume: float | None = None
     name: str = ""
-    label: str = ""
-    contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    friction: tuple[float, float, float] | None = None
 
     @property
     def corners(self) -> Array:
         """Those (n, 3) of a mesh that was read [m], in the link's frame."""
         assert self.points is not None
         return self.place.pos + self.points @ self.place.mat.T
-
-
-class Follows(NamedTuple):
-    """A joint's position as that of another one, times a factor, plus an offset.
-
-    `label` is what the list of two compiled models calls it, where it is of one.
-    """
-
-    joint: str
-    factor: float
-    offset: float
-    label: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +77,7 @@ class RobotJoint:
         effort: Largest force of what drives it [N·m or N], infinite where unlimited.
         armature: Inertia of the rotor as the joint feels it [kg m² or kg].
         damping: [N·m·s/rad or N·s/m]; friction: dry friction [N·m or N].
-        stiffness: Of a spring in it; rest: where that is slack.
-        follows: Where it mimics another.
+        stiffness: Of a spring in it.
         number: Its id in a compiled model, where it is of one.
     """
 
@@ -111,8 +92,6 @@ class RobotJoint:
     damping: float | None = None
     friction: float | None = None
     stiffness: float | None = None
-    rest: float | None = None
-    follows: Follows | None = None
     number: int = -1
 
 
@@ -147,7 +126,6 @@ class Actuator:
         joint: Its name; empty where it drives something else.
         kind: position, velocity, motor, or general.
         kp, kv: Gains of a position servo.
-        gain: Force for each unit of ctrl, where it is not a position servo.
         gear: Joint force for each unit of its own.
         ctrlrange, forcerange: None where unlimited.
     """
@@ -157,7 +135,6 @@ class Actuator:
     kind: str
     kp: float | None
     kv: float | None
-    gain: float | None
     gear: float
     ctrlrange: Range | None
     forcerange: Range | None
@@ -188,38 +165,25 @@ class Robot:
     Attributes:
         name: Of the file, with its folder.
         reader: What read it, with its version: "XML", "mujoco 4.0.0".
-        format: URDF or MJCF, or the engine that was asked.
         links: Parents before children; the first is the root.
         frames: Sites; a link is a frame too.
         actuators: None where the format has no word for them.
         settings: Of the simulation, by name; None where the format has no word for them.
-        defaults: What its engine takes for a setting that a file does not name.
-        touch: The same of the contacts of a shape.
-        rooted: Whether the root is the world; in a URDF it is a link of the robot.
         notes: What a reader should know, in sentences.
     """
 
     name: str
     reader: str
-    format: str
     links: tuple[Link, ...]
     frames: tuple[RobotFrame, ...]
     actuators: tuple[Actuator, ...] | None
     settings: Mapping[str, Setting] | None
-    rooted: bool
     notes: tuple[str, ...] = ()
-    defaults: Mapping[str, Setting] = field(default_factory=dict)
-    touch: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def joints(self) -> tuple[RobotJoint, ...]:
         """All joints, in the order of the links."""
         return tuple(link.joint for link in self.links if link.joint)
-
-    @property
-    def mass(self) -> float:
-        """Of all links but a root that is the world [kg]."""
-        return sum(link.inertial.mass for link in self.links[self.rooted :] if link.inertial)
 
     @property
     def names(self) -> set[str]:
@@ -240,3 +204,27 @@ def motion(slides: bool, axis: Array, anchor: Array, amount: float) -> Placement
         return Placement(axis * amount, np.eye(3))
     mat = rotation(axis, amount)
     return Placement(anchor - mat @ anchor, mat)
+
+
+@dataclass(frozen=True, eq=False)
+class VisualShape:
+    """A shape that is only drawn: it touches nothing, and nothing flows around it.
+
+    Attributes:
+        body: Name of the body that it is on.
+        place_on_body: Its number among the visual shapes of the body.
+        kind: box, sphere, cylinder, capsule, ellipsoid, mesh, plane or another word.
+        name: As in the file, may be empty.
+        mesh: Name of its mesh file, without the folder; "" of another shape.
+        scale: (3,) factors that the vertices of the mesh are multiplied by; ones of another shape.
+        corners: (n, 3) points in the frame of the body [m] that span it: vertices of a mesh,
+            corners of the box around another shape; None where its mesh cannot be read.
+    """
+
+    body: str
+    place_on_body: int
+    kind: str
+    name: str
+    mesh: str
+    scale: tuple[float, float, float]
+    corners: Array | None

@@ -1,84 +1,19 @@
-"""Meshes (STL and OBJ, read here); which shape is which, and how two lie to each other."""
+"""Which shape is which, and how two lie to each other."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise, permutations
-from pathlib import Path
+from itertools import permutations
 
 import numpy as np
 
 from ...interface import Array
-from ...models import mesh_file
 from ...rotations import Placement, rotation
 from .records import CollisionShape
 
 _OTHER_KIND = 100.0  # [m] worse than any distance
-_LARGEST = 256 * 2**20  # bytes
-
-
-def read_mesh(name: str, folder: Path) -> tuple[Array | None, str]:
-    """Triangles (n, 3, 3) of a mesh, or None and what is the matter with it.
-
-    Args:
-        name: As a URDF names it; of package://… the folders above are tried.
-        folder: That of the URDF.
-    """
-    path = mesh_file(name, folder)
-    if path is None:
-        return None, "is not there"
-    try:
-        if path.stat().st_size > _LARGEST:
-            return None, f"is larger than {_LARGEST >> 20} MB"
-        content = path.read_bytes()
-        suffix = path.suffix.lower()
-        if suffix == ".stl":
-            triangles = _stl(content)
-        elif suffix == ".obj":
-            triangles = _obj(content.decode(errors="replace"))
-        else:
-            return None, f"is a {suffix or 'file without a suffix'}, which is not read here"
-    except (OSError, ValueError, IndexError) as error:
-        return None, f"cannot be read ({error})"
-    if not len(triangles) or not np.isfinite(triangles).all():
-        return None, "has no triangles" if not len(
-            triangles
-        ) else "has figures that are not numbers"
-    return triangles, ""
-
-
-def _stl(content: bytes) -> Array:
-    count = int.from_bytes(content[80:84], "little")
-    if len(content) == 84 + 50 * count:
-        layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-        return np.frombuffer(content, layout, count, 84)["corners"].astype(np.float64)
-    if not content.lstrip().startswith(b"solid"):
-        raise ValueError("no STL")
-    lines = content.decode(errors="replace").split("\n")
-    corners = [line.split()[1:4] for line in lines if line.lstrip().startswith("vertex")]
-    return np.array(corners, dtype=np.float64).reshape(-1, 3, 3)
-
-
-def _obj(text: str) -> Array:
-    points: list[list[float]] = []
-    faces: list[list[int]] = []
-    for line in text.splitlines():
-        words = line.split()
-        if words[:1] == ["v"]:
-            points.append([float(word) for word in words[1:4]])
-        elif words[:1] == ["f"]:
-            corners = [int(word.split("/")[0]) for word in words[1:]]
-            corners = [c - 1 if c > 0 else len(points) + c for c in corners]
-            faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
-    return np.array(points, dtype=np.float64)[np.array(faces, dtype=int)]
-
-
-def volume_of(triangles: Array) -> float:
-    """Volume [m³] that the triangles (n, 3, 3) of a mesh enclose."""
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6
 
 
 def bounds_of(shape: CollisionShape) -> Array:
@@ -121,17 +56,14 @@ def _misfit(left: CollisionShape, right: CollisionShape) -> float:
     return far + float(np.abs(np.subtract(sorted(left.size), sorted(right.size))).sum())
 
 
-def with_capsules(shapes: Sequence[CollisionShape]) -> tuple[CollisionShape, ...]:
-    """A cylinder with a sphere on each end is the capsule that the format has no word for."""
-    solids = list(shapes)
+def capsules_of(
+    shapes: Sequence[CollisionShape],
+) -> Iterator[tuple[CollisionShape, tuple[CollisionShape, CollisionShape]]]:
+    """Yield each cylinder with the spheres on its ends: the capsule that a URDF has no word for."""
     for cylinder in shapes:
-        ends = list(_ends(cylinder, solids)) if cylinder.kind == "cylinder" else []
+        ends = tuple(_ends(cylinder, shapes)) if cylinder.kind == "cylinder" else ()
         if len(ends) == 2:
-            capsule = replace(cylinder, kind="capsule")
-            solids = [
-                capsule if shape is cylinder else shape for shape in solids if shape not in ends
-            ]
-    return tuple(solids)
+            yield cylinder, ends
 
 
 def _ends(cylinder: CollisionShape, shapes: Sequence[CollisionShape]) -> Iterator[CollisionShape]:

@@ -16,7 +16,6 @@ import numpy as np
 from ...interface import Array
 from ...rotations import HERE, Placement
 from .records import SCALAR, CollisionShape, Inertial, Link, Robot, RobotJoint, moved
-from .shapes import with_capsules
 
 GRAVITY = 9.81  # [m/s²]
 
@@ -57,12 +56,10 @@ class Group:
     @cached_property
     def shapes(self) -> tuple[CollisionShape, ...]:
         """Those of all its links, placed in the group's frame."""
-        return with_capsules(
-            [
-                replace(shape, place=place @ shape.place)
-                for link, place in self.links
-                for shape in link.shapes
-            ]
+        return tuple(
+            replace(shape, place=place @ shape.place)
+            for link, place in self.links
+            for shape in link.shapes
         )
 
 

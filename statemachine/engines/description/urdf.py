@@ -1,15 +1,15 @@
-"""A URDF as a description: its XML, and nothing that an engine makes of it.
+"""What the text of a URDF says, and no compiled model keeps; and what is wrong with a URDF.
 
-An engine's importer is the wrong witness here. MuJoCo's fuses fixed links, drops the root's
-mass and the limit of speed; Pinocchio's drops names of collision shapes and is not to be had
-on Windows; both refuse a file for one missing mesh. The format is small, so its XML is read.
+A compiled model has a number for everything: that the file does not say a damping, and that it says
+0, is one there. The largest speed of a joint and its transmissions are not in it at all. So this
+much is read from the XML, and what is no tree of links is refused in one line: of some bad files
+PyBullet makes an end of the process.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-from functools import cache
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -20,19 +20,71 @@ from ... import models
 from ...errors import ModelError
 from ...interface import Array
 from ...measures.text import grouped
-from ...rotations import HERE, Placement
-from .records import CollisionShape, Follows, Inertial, Link, Range, Robot, RobotJoint
-from .shapes import read_mesh, volume_of
 
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
 _MOST = 2_000  # links
-_KINDS = {
-    "revolute": "hinge",
-    "continuous": "hinge",
-    "prismatic": "slide",
-    "floating": "free",
-    "planar": "planar",
+_KINDS = ("revolute", "continuous", "prismatic", "floating", "planar")
+_ORIGIN = (0.0, 0.0, 0.0)
+# Of each shape its attributes that are sizes, and how many numbers each has.
+_SIZES = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {},
 }
+
+
+@dataclass(frozen=True)
+class DeclaredJoint:
+    """What a file says of a joint; None where it does not say.
+
+    Attributes:
+        velocity: Largest speed [rad/s or m/s].
+        effort: Largest force of what drives it [N·m or N].
+        damping: [N·m·s/rad or N·s/m].
+        friction: Dry friction [N·m or N].
+    """
+
+    velocity: float | None = None
+    effort: float | None = None
+    damping: float | None = None
+    friction: float | None = None
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """A `<transmission>`, which only a controller reads.
+
+    Attributes:
+        kind: Its `<type>`.
+        joints: Names of its joints.
+        interfaces: The hardware interfaces of these.
+        reduction: Its `<mechanicalReduction>`; None where it says none.
+    """
+
+    kind: str
+    joints: tuple[str, ...]
+    interfaces: tuple[str, ...]
+    reduction: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Declared:
+    """What a source that has no word for much says, in its own words.
+
+    Attributes:
+        joints: By name, what it says of each joint that moves.
+        weighed: Links that have an `<inertial>`.
+        frictions: By link, the lateral, spinning and rolling friction of its `<contact>`, which is
+            PyBullet's own element.
+        transmissions: By name.
+    """
+
+    joints: Mapping[str, DeclaredJoint]
+    weighed: frozenset[str] = frozenset()
+    frictions: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    transmissions: Mapping[str, Transmission] = field(default_factory=dict)
 
 
 class _Builder(ElementTree.TreeBuilder):
@@ -42,14 +94,14 @@ class _Builder(ElementTree.TreeBuilder):
         raise ModelError(f"it has a <!DOCTYPE {name}>, which a URDF has no use for")
 
 
-def read(path: Path) -> Robot:
-    """The description in a URDF file.
+def read(path: Path) -> Declared:
+    """Return what a URDF file says that no compiled model keeps.
 
     Raises:
         ModelError: It is not a URDF, or its figures make no sense; in one line.
     """
     try:
-        return _Reader(path).robot()
+        return _declared(_parse(path))
     except ModelError as error:
         raise ModelError(f"{path.name}: {error}") from None
 
@@ -70,226 +122,169 @@ def _parse(path: Path) -> Element:
     return root
 
 
-class _Reader:
-    """One file while it is read."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.notes: list[str] = []
-        self._read_mesh = cache(lambda name: read_mesh(name, path.parent))
-
-    def robot(self) -> Robot:
-        root = _parse(self.path)
-        elements = _by_name(root, "link")
-        if len(elements) > _MOST:
-            raise ModelError(f"it has {len(elements):,} links, and {_MOST:,} are the most here")
-        if not elements:
-            raise ModelError("it has no <link>")
-        hung: dict[str, tuple[str, Element]] = {}
-        for joint in _by_name(root, "joint").values():
-            parent, child = _end(joint, "parent", elements), _end(joint, "child", elements)
-            if child in hung:
-                raise ModelError(f"link {child!r} hangs on two joints")
-            hung[child] = (parent, joint)
-        order = _order(list(elements), {child: parent for child, (parent, _) in hung.items()})
-        if root.find("transmission") is not None:
-            self.notes.append(
-                "its <transmission> elements are for a controller and are not compared"
-            )
-        links: list[Link] = []
-        for name in order:
-            parent, joint = hung.get(name, ("", None))
-            links.append(self._link(name, elements[name], parent, joint))
-        return Robot(
-            name="/".join(self.path.parts[-2:]),
-            reader="its XML",
-            format="URDF",
-            links=tuple(links),
-            frames=(),
-            actuators=None,
-            settings=None,
-            rooted=False,
-            notes=tuple(self.notes),
-        )
-
-    def _link(self, name: str, element: Element, parent: str, joint: Element | None) -> Link:
-        where = f"link {name!r}"
-        place, moves = HERE, None
+def _declared(root: Element) -> Declared:
+    """Return what a URDF says, once its links are a tree and its numbers are numbers."""
+    links, joints = _by_name(root, "link"), _by_name(root, "joint")
+    if len(links) > _MOST:
+        raise ModelError(f"it has {len(links):,} links, and {_MOST:,} are the most here")
+    if not links:
+        raise ModelError("it has no <link>")
+    _check_tree(links, joints)
+    frictions: dict[str, tuple[float, float, float]] = {}
+    weighed: set[str] = set()
+    for name, link in links.items():
+        _check_link(name, link)
+        friction = _friction(name, link)
+        if friction is not None:
+            frictions[name] = friction
+        if link.find("inertial") is not None:
+            weighed.add(name)
+    moving: dict[str, DeclaredJoint] = {}
+    for name, element in joints.items():
+        joint = _joint(name, element)
         if joint is not None:
-            place, moves = _origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
-        # PyBullet's own element.
-        frictions = [
-            _said(element, f"contact/{kind}_friction", "value", where)
-            for kind in ("lateral", "spinning", "rolling")
-        ]
-        said = frictions[0] is not None
-        contact = {"friction": tuple(value or 0.0 for value in frictions)} if said else {}
-        shapes = [
-            replace(self._shape(shape, where), contact=contact)
-            for shape in element.findall("collision")
-        ]
-        return Link(name, parent, place, moves, _inertial(element, where), tuple(shapes))
+            moving[name] = joint
+    return Declared(moving, frozenset(weighed), frictions, _transmissions(root))
 
-    def _shape(self, element: Element, link: str) -> CollisionShape:
-        where = f"a collision shape of {link}"
-        solid = element.find("geometry/*")
-        if solid is None:
-            raise ModelError(f"{where} has no geometry")
-        kind, size, points = solid.tag, (), None
-        if kind == "mesh":
-            file = solid.get("filename", "")
-            scale = _numbers(solid, ".", "scale", 3, where, (1.0, 1.0, 1.0))
-            points, trouble = self._read_mesh(file)
-            if points is None:
-                self.notes.append(f"the mesh {file!r} of {link} {trouble}: its size is not known")
-            else:
-                points = points * scale
-        elif kind == "box":
-            size = tuple(edge / 2 for edge in _numbers(solid, ".", "size", 3, where))
-        elif kind == "sphere":
-            size = (_number(solid, ".", "radius", where),)
-        elif kind in ("cylinder", "capsule"):
-            size = _number(solid, ".", "radius", where), _number(solid, ".", "length", where) / 2
-        else:
-            self.notes.append(f"{where} is a <{kind}>, which is not known here")
-        if min(size, default=0) < 0:
-            raise ModelError(f"{where} has a negative size")
-        name = element.get("name", "")
-        shape = CollisionShape(kind, _origin(element, where), size, name=name, label=name)
-        if points is None:
-            return shape
-        return replace(shape, points=points.reshape(-1, 3), volume=volume_of(points))
+
+def _friction(name: str, link: Element) -> tuple[float, float, float] | None:
+    """Return the lateral, spinning and rolling friction of a `<contact>`; None if it says none."""
+    values = [
+        _said(link, f"contact/{kind}_friction", "value", f"link {name!r}")
+        for kind in ("lateral", "spinning", "rolling")
+    ]
+    if values[0] is None:
+        return None
+    lateral, spinning, rolling = (0.0 if value is None else value for value in values)
+    return lateral, spinning, rolling
 
 
 def _by_name(root: Element, tag: str) -> dict[str, Element]:
     elements: dict[str, Element] = {}
     for element in root.findall(tag):
-        name = _name(element)
+        name = element.get("name", "")
+        if not name.strip():
+            raise ModelError(f"a <{tag}> has no name")
         if name in elements:
             raise ModelError(f"two {tag}s are called {name!r}")
         elements[name] = element
     return elements
 
 
-def _name(element: Element) -> str:
-    name = element.get("name", "")
-    if not name.strip():
-        raise ModelError(f"a <{element.tag}> has no name")
-    return name
+def _check_tree(links: Mapping[str, Element], joints: Mapping[str, Element]) -> None:
+    """Refuse links that do not hang on one of them."""
+    parents: dict[str, str] = {}
+    for name, joint in joints.items():
+        parent, child = _end(name, joint, "parent", links), _end(name, joint, "child", links)
+        if child in parents:
+            raise ModelError(f"link {child!r} hangs on two joints")
+        parents[child] = parent
+    roots = [name for name in links if name not in parents]
+    if len(roots) > 1:
+        raise ModelError(f"{len(roots)} links hang on nothing: {', '.join(roots[:4])}")
+    children = grouped((parent, child) for child, parent in parents.items())
+    waiting, reached = roots, set[str]()
+    while waiting:
+        link = waiting.pop()
+        reached.add(link)
+        waiting += children.get(link, [])
+    circle = next((name for name in links if name not in reached), None)
+    if circle is not None:
+        raise ModelError(f"its links go round in a circle, {circle!r} among them")
 
 
-def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
+def _end(name: str, joint: Element, tag: str, links: Mapping[str, Element]) -> str:
     element = joint.find(tag)
     link = "" if element is None else element.get("link", "")
     if link not in links:
         what = f"a {tag} {link!r}, which is not a link" if link else f"no {tag}"
-        raise ModelError(f"joint {_name(joint)!r} has {what}")
+        raise ModelError(f"joint {name!r} has {what}")
     return link
 
 
-def _order(names: list[str], parent: dict[str, str]) -> list[str]:
-    """Parents before children, depth first, siblings as in the file."""
-    children = grouped((parent.get(name, ""), name) for name in reversed(names))
-    waiting = children.pop("", [])
-    if len(waiting) > 1:
-        named = ", ".join(waiting[:-5:-1])
-        raise ModelError(f"{len(waiting)} links hang on nothing: {named}")
-    order: list[str] = []
-    while waiting:
-        order.append(waiting.pop())
-        waiting += children.pop(order[-1], [])
-    if children:
-        left = next(name for name in names if name not in order)
-        raise ModelError(f"its links go round in a circle, {left!r} among them")
-    return order
+def _check_link(name: str, link: Element) -> None:
+    """Refuse a link with numbers that are none, or with a negative mass or size."""
+    inertial, where = link.find("inertial"), f"the <inertial> of link {name!r}"
+    if inertial is not None:
+        _check_origin(inertial, where)
+        mass = float(_numbers(inertial, "mass", "value", 1, where)[0])
+        if mass < 0:
+            raise ModelError(f"{where} gives a mass of {mass} kg")
+        if inertial.find("inertia") is not None:
+            for entry in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
+                _numbers(inertial, "inertia", entry, 1, where)
+    for shape in link.findall("collision"):
+        where = f"a collision shape of link {name!r}"
+        solid = shape.find("geometry/*")
+        if solid is None:
+            raise ModelError(f"{where} has no geometry")
+        _check_origin(shape, where)
+        for attribute, count in _SIZES.get(solid.tag, {}).items():
+            if _numbers(solid, ".", attribute, count, where).min() < 0:
+                raise ModelError(f"{where} has a negative size")
 
 
-def _joint(element: Element) -> RobotJoint | None:
-    name, kind = _name(element), element.get("type", "")
-    where = f"joint {name!r}"
+def _check_origin(element: Element, where: str) -> None:
+    for attribute in ("xyz", "rpy"):
+        _numbers(element, "origin", attribute, 3, where, _ORIGIN)
+
+
+def _joint(name: str, element: Element) -> DeclaredJoint | None:
+    """Return what is said of a joint; None of one that is fixed.
+
+    Raises:
+        ModelError: It is of an unknown type, has no axis, or lacks the limits of its type.
+    """
+    kind, where = element.get("type", ""), f"joint {name!r}"
+    _check_origin(element, where)
     if kind == "fixed":
         return None
     if kind not in _KINDS:
         raise ModelError(f"{where} is of type {kind!r}; known: fixed, {', '.join(_KINDS)}")
-    # What the format takes where no axis is given.
     axis = _numbers(element, "axis", "xyz", 3, where, (1.0, 0.0, 0.0))
-    length = float(np.linalg.norm(axis))
-    if length < 1e-9 and kind != "floating":
+    if float(np.linalg.norm(axis)) < 1e-9 and kind != "floating":
         raise ModelError(f"the axis of {where} is zero")
-    joint = RobotJoint(name, _KINDS[kind], axis / max(length, 1e-9), anchor=np.zeros(3))
-    return replace(
-        joint,
-        limits=_limits(element, kind, where),
+    if kind in ("revolute", "prismatic"):
+        if element.find("limit") is None:
+            raise ModelError(f"{where} is {kind} and has no <limit>")
+        for end in ("lower", "upper"):
+            _said(element, "limit", end, where)
+    return DeclaredJoint(
         velocity=_said(element, "limit", "velocity", where),
         effort=_said(element, "limit", "effort", where),
         damping=_said(element, "dynamics", "damping", where),
         friction=_said(element, "dynamics", "friction", where),
-        follows=_follows(element, where),
     )
 
 
-def _limits(joint: Element, kind: str, where: str) -> Range | None:
-    """Return the limits of a joint [rad or m]; None where it has none.
+def _transmissions(root: Element) -> dict[str, Transmission]:
+    """Return the transmissions of a URDF by name, those without one by number."""
+    transmissions: dict[str, Transmission] = {}
+    for number, element in enumerate(root.findall("transmission")):
+        joints = element.findall("joint")
+        interfaces = [joint.findtext("hardwareInterface", "").strip() for joint in joints]
+        reduction = element.findtext(".//mechanicalReduction")
+        name = element.get("name", "") or f"number {number}"
+        transmissions[name] = Transmission(
+            kind=element.findtext("type", "").strip(),
+            joints=tuple(joint.get("name", "") for joint in joints),
+            interfaces=tuple(interfaces),
+            reduction=None if reduction is None else _number_or_none(reduction),
+        )
+    return transmissions
 
-    Raises:
-        ModelError: It is of a type that has limits, and gives none.
-    """
-    if kind not in ("revolute", "prismatic"):
+
+def _number_or_none(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
         return None
-    if joint.find("limit") is None:
-        raise ModelError(f"{where} is {kind} and has no <limit>")
-    low = _said(joint, "limit", "lower", where) or 0.0
-    high = _said(joint, "limit", "upper", where) or 0.0
-    return (low, high) if low <= high else None  # PyBullet's way to say "none"
-
-
-def _follows(joint: Element, where: str) -> Follows | None:
-    """Return which joint it mimics, if it mimics one."""
-    mimic = joint.find("mimic")
-    if mimic is None:
-        return None
-    factor = float(_numbers(mimic, ".", "multiplier", 1, where, (1.0,))[0])
-    offset = _said(mimic, ".", "offset", where) or 0.0
-    return Follows(mimic.get("joint", ""), factor, offset)
-
-
-def _inertial(link: Element, of: str) -> Inertial | None:
-    element, where = link.find("inertial"), f"the <inertial> of {of}"
-    if element is None:
-        return None
-    mass = _number(element, "mass", "value", where)
-    if mass < 0:
-        raise ModelError(f"{where} gives a mass of {mass} kg")
-    tensor = np.zeros((3, 3))
-    if element.find("inertia") is not None:
-        for i, j in zip(*np.triu_indices(3), strict=True):
-            entry = f"i{'xyz'[i]}{'xyz'[j]}"
-            tensor[i, j] = tensor[j, i] = _number(element, "inertia", entry, where)
-    place = _origin(element, where)
-    return Inertial(mass, place.pos, place.mat @ tensor @ place.mat.T)
-
-
-def _origin(element: Element, where: str) -> Placement:
-    zeros = (0.0, 0.0, 0.0)
-    pos = _numbers(element, "origin", "xyz", 3, where, zeros)
-    rpy = _numbers(element, "origin", "rpy", 3, where, zeros).tolist()
-    sr, sp, sy = [math.sin(angle) for angle in rpy]
-    cr, cp, cy = [math.cos(angle) for angle in rpy]
-    # Rz(yaw)·Ry(pitch)·Rx(roll), as the format defines its rpy.
-    first = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
-    second = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
-    third = [-sp, cp * sr, cp * cr]
-    return Placement(pos, np.array([first, second, third]))
 
 
 def _said(element: Element, path: str, attribute: str, where: str) -> float | None:
     """Return the number of an attribute of an element below; None where the file gives none."""
     numbers = _numbers(element, path, attribute, 1, where, ())
     return float(numbers[0]) if len(numbers) else None
-
-
-def _number(element: Element, path: str, attribute: str, where: str) -> float:
-    return float(_numbers(element, path, attribute, 1, where)[0])
 
 
 def _numbers(

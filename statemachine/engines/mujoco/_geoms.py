@@ -12,7 +12,7 @@ import numpy as np
 from ...interface import Array
 from ...measures.text import few
 from ..description.records import CollisionShape
-from ..description.shapes import angle_between, likest
+from ..description.shapes import angle_between, laid_on, likest
 from ..records import DifferingQuantity, Edit, ModelDifference
 from . import _shapes as shapes
 from ._sides import NEAR, Pairs, Sides, copies, name_of, quantity_of, same, zeros
@@ -36,7 +36,7 @@ class Geoms:
 
     def __init__(self, sides: Sides) -> None:
         self._sides = sides
-        self._acting = _acting(sides.left), _acting(sides.right)
+        self._acting = acting_geoms(sides.left), acting_geoms(sides.right)
         # By id, for each model: the shape on the rigid part, both in the frame of the second's.
         self._shapes: tuple[dict[int, CollisionShape], dict[int, CollisionShape]] = {}, {}
         self._copied = set[int]()  # meshes of the second model, whose geoms change together
@@ -93,6 +93,9 @@ class Geoms:
                 refused="one of them is not a primitive, and cannot become the other",
             )
             return
+        laid = laid_on(ours, theirs)
+        if same(ours.size, laid.size) and not _off(ours, laid):
+            theirs = laid  # one solid, whose axes go by other names
         if kinds[0] == "hfield":
             yield from shapes.heights(sides, a, b)
         if not same(ours.size, theirs.size):
@@ -186,7 +189,7 @@ def touches(raw: Any) -> Any:
     return touching
 
 
-def _acting(raw: Any) -> list[int]:
+def acting_geoms(raw: Any) -> list[int]:
     """Geoms that can touch, that a tendon wraps, or that a medium flows around by their shape."""
     acting = touches(raw) | (raw.geom_fluid[:, 0] > 0)
     acting[raw.wrap_objid[np.isin(raw.wrap_type, _WRAPPED)]] = True

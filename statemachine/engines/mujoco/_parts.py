@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import chain, product
+from itertools import chain, permutations, product
 from typing import Any
 
 import numpy as np
@@ -63,16 +63,35 @@ def _differing(left: Inertial, right: Inertial) -> dict[str, list[DifferingQuant
 
 
 def _of_tensors(left: Array, right: Array) -> list[DifferingQuantity]:
-    """What two tensors of inertia (3, 3) [kg m²] differ in: their moments, and their axes."""
+    """What two tensors of inertia (3, 3) [kg m²] differ in: their moments, and their axes.
+
+    Moments are in the order of the axes of the body that their own are nearest to, as a file writes
+    them, and each beside that of the nearest axis of the other tensor.
+    """
     moments = [np.linalg.eigvalsh(tensor)[::-1] for tensor in (left, right)]
     angle = _turn_of_axes(left, right)
-    turned = DifferingQuantity(TURNED, 0.0, angle, "rad")
     if np.allclose(*moments, rtol=1e-9, atol=0) and angle:
-        return [turned]
-    values = [DifferingQuantity("moments", plain(moments[0]), plain(moments[1]), "kg m²")]
+        return [DifferingQuantity(TURNED, 0.0, angle, "rad")]
+    ours, axes = _along(left, np.eye(3))
+    theirs, other_axes = _along(right, axes)
+    values = [DifferingQuantity("moments", plain(ours), plain(theirs), "kg m²")]
+    angle = min(angle, _least_turn(axes, other_axes))
     if angle > _TILTED:
-        values.append(turned)
+        values.append(DifferingQuantity(TURNED, 0.0, angle, "rad"))
     return values
+
+
+def _along(tensor: Array, axes: Array) -> tuple[Array, Array]:
+    """Return the principal moments (3,) and axes (3, 3) of a tensor, in the order of other axes.
+
+    Args:
+        tensor: A tensor of inertia (3, 3) [kg m²].
+        axes: (3, 3) axes, as columns; each principal one stands where the nearest of these does.
+    """
+    moments, own = np.linalg.eigh(tensor)
+    cosines = np.abs(axes.T @ own)
+    order = max(permutations(range(3)), key=lambda order: cosines[range(3), order].sum())
+    return moments[list(order)], own[:, list(order)]
 
 
 def _turn_of_axes(left: Array, right: Array) -> float:
@@ -94,11 +113,19 @@ def _turn_of_axes(left: Array, right: Array) -> float:
         cosine = abs(a[:, single] @ b[:, single])
         sine = np.linalg.norm(np.cross(a[:, single], b[:, single]))
         return float(np.arctan2(sine, cosine))
-    turns = []
+    return _least_turn(a, b)
+
+
+def _least_turn(axes: Array, others: Array) -> float:
+    """Return the smallest angle [rad] that turns axes (3, 3), as columns, to others.
+
+    An axis has no direction.
+    """
+    turns: list[float] = []
     for signs in product((1.0, -1.0), repeat=3):
-        axes = b * signs
-        if np.linalg.det(axes) * np.linalg.det(a) > 0:
-            turns.append(float(angle_between(a, axes)))
+        turned = others * signs
+        if np.linalg.det(turned) * np.linalg.det(axes) > 0:
+            turns.append(float(angle_between(axes, turned)))
     return min(turns)
 
 
@@ -150,7 +177,7 @@ def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edi
     """Edits that give a body of the second model one figure of what it is to weigh."""
     inner = sides.solids[1].place(body).inverse
     if subject == "inertia":
-        values = _principal(inner.mat @ there.tensor @ inner.mat.T)
+        values = principal(inner.mat @ there.tensor @ inner.mat.T)
     else:
         values = (there.mass if subject == "mass" else inner.of(there.com),)
     return tuple(
@@ -182,7 +209,7 @@ def _specified(edits: Iterable[Edit]) -> tuple[SpecEdit, ...]:
     return tuple(spec_edits)
 
 
-def _principal(tensor: Array) -> tuple[Array, Array]:
+def principal(tensor: Array) -> tuple[Array, Array]:
     """Moments (3,) of inertia, and the quaternion of their axes."""
     moments, axes = np.linalg.eigh(tensor)
     moments, axes = moments[::-1], axes[:, ::-1]

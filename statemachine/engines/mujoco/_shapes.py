@@ -10,13 +10,11 @@ import numpy as np
 from ...installed import require
 from ...interface import Array
 from ..description.records import CollisionShape
-from ..description.shapes import volume_of
 from ..records import DifferingQuantity, Edit, ModelDifference
-from ._sides import Sides, copies, name_of, placed, same
+from ._sides import Sides, copies, placed, same
 
 MESH = 7  # mjtGeom
 PRIMITIVES = {"sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 2, "box": 3}  # sizes of each
-_CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
 _CHUNK = 256
 
 # Arrays of which a part is a mesh's, by what it has of them.
@@ -38,31 +36,14 @@ def kind(raw: Any, geom: int) -> str:
 def of(raw: Any, geom: int) -> CollisionShape:
     """A geom, in the frame of its body."""
     word = kind(raw, geom)
-    points = volume = None
+    points = None
     if word == "mesh":
         parts = _parts(raw, int(raw.geom_dataid[geom]))
         points = np.array(raw.mesh_vert[parts["mesh_vert"]], dtype=np.float64)
-        volume = volume_of(points[raw.mesh_face[parts["mesh_face"]]])
     sizes = raw.geom_size[geom][: PRIMITIVES.get(word, 0)]
     place = placed(raw.geom_pos[geom], raw.geom_quat[geom])
-    return CollisionShape(
-        kind=word,
-        place=place,
-        size=tuple(sizes.tolist()),
-        points=points,
-        volume=volume,
-        name=raw.geom(geom).name,
-        label=name_of(raw, "geom", geom),
-        contact=touch_of(raw, geom),
-    )
-
-
-def touch_of(raw: Any, geom: int) -> dict[str, tuple[float, ...]]:
-    """Settings of a geom's contacts."""
-    return {
-        name: tuple(map(float, np.atleast_1d(getattr(raw, f"geom_{name}")[geom])))
-        for name in _CONTACT
-    }
+    size = tuple(sizes.tolist())
+    return CollisionShape(word, place, size, points, name=raw.geom(geom).name)
 
 
 def hull(raw: Any, geom: int, points: Any) -> Array:

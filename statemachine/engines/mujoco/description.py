@@ -1,29 +1,18 @@
-"""What MuJoCo makes of a file, and what an MJCF says, as a description.
-
-Defaults, includes and units are settled in a compiled model: an MJCF is what MuJoCo makes of it, so
-its own compiler reads it. A URDF that was given to MuJoCo can be described from here too, to see
-what the import kept.
-"""
+"""The rigid parts, joints and frames of a compiled model, by which two models are matched."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...backends import load
-from ...errors import ModelError
 from ...installed import require
 from ...interface import JointType
-from ...measures.text import few
 from ...rotations import HERE
 from ..description.records import (
     Actuator,
-    CollisionShape,
-    Follows,
     Link,
     Range,
     Robot,
@@ -34,89 +23,32 @@ from ..description.records import (
 from . import _shapes as shapes
 from ._gains import kind_of_gains
 from ._sides import inertial_of, name_of, placed
-from .differences import settings_of
 
-_FORMATS = {".mjb": "MJB", ".urdf": "URDF"}
+# How many elements of each kind a compiled model has.
+_COUNTS = {
+    "body": "nbody",
+    "joint": "njnt",
+    "geom": "ngeom",
+    "site": "nsite",
+    "actuator": "nactuator",
+    "tendon": "ntendon",
+    "equality": "neq",
+    "sensor": "nsensor",
+    "pair": "npair",
+    "exclude": "nexclude",
+    "camera": "ncam",
+}
+_EQUALITY_OF_JOINTS = 2  # mjtEq
 _ON_JOINT, _ON_JOINT_IN_PARENT, _SO3 = 0, 1, 6  # mjtTrn
 
 
-def read_file(path: Path, name: str) -> Robot:
-    """What an MJCF says itself; one some of whose meshes are missing is read without them.
-
-    Args:
-        path: The file.
-        name: What the description goes by.
-
-    Raises:
-        MissingEngineError: It is not installed here.
-        ModelError: It cannot read the file.
-    """
-    suffix = path.suffix.lower()
-    try:
-        return read(path, name, _FORMATS.get(suffix, "MJCF"))
-    except ModelError:
-        robot = _without_missing_meshes(path, name) if suffix not in _FORMATS else None
-        if robot is None:
-            raise
-        return robot
-
-
-def read(path: Path, name: str, form: str = "engine") -> Robot:
-    """What its compiler makes of a file, with its own defaults; the rest as of `describe`."""
-    return describe(load(path, backend="mujoco", defaults="engine").raw, name, form)
-
-
-def _without_missing_meshes(path: Path, name: str) -> Robot | None:
-    """An MJCF compiled without them; None where no mesh is missing, or nothing compiles."""
-    mujoco = require("mujoco")
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        folder = Path(spec.modelfiledir or path.parent) / spec.meshdir
-        missing = {m.name: m for m in spec.meshes if m.file and not (folder / m.file).is_file()}
-        if not missing:
-            return None
-        lost: dict[str, list[CollisionShape]] = {}
-        for geom in list(spec.geoms):
-            if geom.meshname in missing:
-                if geom.contype or geom.conaffinity:
-                    shape = CollisionShape(
-                        kind="mesh",
-                        place=placed(geom.pos, geom.quat),
-                        name=geom.name,
-                        contact={"friction": tuple(map(float, geom.friction))},
-                    )
-                    lost.setdefault(geom.parent.name, []).append(shape)
-                spec.delete(geom)
-        for mesh in missing.values():
-            spec.delete(mesh)
-        raw = spec.compile()
-    except (ValueError, MemoryError, RuntimeError, mujoco.FatalError):
-        return None
-    robot = describe(raw, name)
-    files = few(sorted(mesh.file for mesh in missing.values()), 5)
-    note = (
-        f"the meshes {files} are not there: their sizes are not known, and what they weigh is not "
-        "counted where a body has no inertia of its own"
-    )
-    links = tuple(
-        replace(link, shapes=(*link.shapes, *lost.get(link.name, ()))) for link in robot.links
-    )
-    return replace(robot, links=links, notes=(*robot.notes, note))
-
-
-def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
-    """The description in a compiled model.
+def describe(raw: Any, name: str) -> Robot:
+    """Return the rigid parts, joints and frames of a compiled model.
 
     Args:
         raw: An mjModel.
         name: Of the file.
-        form: The format of the file.
     """
-    mujoco = require("mujoco")
-    # What the engine takes where a file says nothing.
-    empty = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><geom type='sphere' size='1'/></worldbody></mujoco>"
-    )
     actuators = tuple(_actuator(raw, i) for i in range(raw.nactuator))
     links: list[Link] = []
     names: list[str] = []  # of the last link of each body
@@ -124,18 +56,15 @@ def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
         above = names[raw.body_parentid[body]] if body else ""
         links += _links(raw, body, above, actuators)
         names.append(links[-1].name)
-    robot = Robot(
+    return Robot(
         name=name,
-        reader=f"mujoco {mujoco.__version__}",
-        format=form,
+        reader=f"mujoco {require('mujoco').__version__}",
         links=tuple(links),
         frames=tuple(_frame(raw, site, names) for site in range(raw.nsite)),
         actuators=actuators,
-        settings=settings_of(raw),
-        rooted=True,
-        notes=tuple(_notes(raw, links, actuators)),
+        settings=None,
+        notes=tuple(_notes(raw, actuators)),
     )
-    return replace(robot, defaults=settings_of(empty), touch=shapes.touch_of(empty, 0))
 
 
 def _frame(raw: Any, site: int, links: list[str]) -> RobotFrame:
@@ -185,30 +114,18 @@ def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
         damping=float(raw.dof_damping[dof]),
         friction=float(raw.dof_frictionloss[dof]),
         stiffness=float(raw.jnt_stiffness[joint]),
-        follows=_follows(raw, joint),
     )
     if not scalar:
         return told
-    rest = float(raw.qpos_spring[raw.jnt_qposadr[joint]])
-    return replace(told, effort=_effort(raw, joint, actuators), rest=rest)
+    return replace(told, effort=_effort(raw, joint, actuators))
 
 
-def _follows(raw: Any, joint: int) -> Follows | None:
-    """Of an equality between two joints, if it is linear."""
-    of_joints = (raw.eq_type == 2) & (raw.eq_obj2id >= 0) & (raw.eq_active0 != 0)  # mjEQ_JOINT
-    for i in np.flatnonzero(of_joints & (raw.eq_obj1id == joint)).tolist():
-        offset, factor, *rest = map(float, raw.eq_data[i, :5])
-        if not any(rest):
-            other = name_of(raw, "joint", int(raw.eq_obj2id[i]))
-            return Follows(other, factor, offset, name_of(raw, "equality", i))
-    return None
-
-
-def _notes(raw: Any, links: list[Link], actuators: tuple[Actuator, ...]) -> list[str]:
+def _notes(raw: Any, actuators: tuple[Actuator, ...]) -> list[str]:
     """What no other format has a word for."""
-    linear = sum(link.joint is not None and link.joint.follows is not None for link in links)
+    of_joints = (raw.eq_type == _EQUALITY_OF_JOINTS) & (raw.eq_obj2id >= 0)
+    linear = of_joints & ~raw.eq_data[:, 2:5].any(axis=1)
     counted = {
-        "further equality constraints": raw.neq - linear,
+        "further equality constraints": raw.neq - np.count_nonzero(linear),
         "tendons": raw.ntendon,
         "contact pairs of its own": raw.npair,
         "pairs of bodies that never touch (exclude)": raw.nexclude,
@@ -286,14 +203,13 @@ def _actuator(raw: Any, i: int) -> Actuator:
         kind=_actuator_kind(raw, i),
         kp=None,
         kv=None,
-        gain=float(gain[0]),
         gear=float(raw.actuator_gear[raw.actuator_outadr[i], 0]),
         forcerange=_limited(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
         ctrlrange=_limited(raw.actuator_ctrlrange[control], raw.actuator_ctrllimited[control]),
     )
     if actuator.kind != "position":
         return actuator
-    return replace(actuator, kp=float(gain[0]), kv=float(-bias[2]), gain=None)
+    return replace(actuator, kp=float(gain[0]), kv=float(-bias[2]))
 
 
 def _actuator_kind(raw: Any, i: int) -> str:
@@ -301,3 +217,17 @@ def _actuator_kind(raw: Any, i: int) -> str:
     if raw.actuator_dyntype[i] or raw.actuator_gaintype[i]:
         return "general"
     return kind_of_gains(raw, i)
+
+
+def element_names(raw: Any) -> dict[str, list[str]]:
+    """Return the names of all elements of a compiled model by their kind, in their order.
+
+    An element without a name goes by its kind, its number and what it is on.
+
+    Args:
+        raw: An mjModel.
+    """
+    names: dict[str, list[str]] = {}
+    for kind, count in _COUNTS.items():
+        names[kind] = [name_of(raw, kind, k) for k in range(int(getattr(raw, count)))]
+    return names

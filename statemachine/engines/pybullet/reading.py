@@ -14,10 +14,12 @@ from ...backends import load
 from ...backends.bullet.client import joint_infos, pb
 from ...backends.bullet.file import UrdfFile
 from ...backends.bullet.urdf import UNLIMITED
-from ...installed import engine_version
-from ...interface import make_data
+from ...installed import DEFAULT, engine_version
+from ...interface import Array, make_data
 from ...rotations import HERE, Placement, matrix_from_quat, wxyz_from_xyzw
+from .. import room
 from ..description import urdf
+from ..description.reading import ModelReading
 from ..description.records import CollisionShape, Inertial, Link, Robot, RobotJoint, Setting
 from .world import fresh_world
 
@@ -25,17 +27,19 @@ _KINDS = {0: "hinge", 1: "slide", 2: "ball"}  # JOINT_REVOLUTE, JOINT_PRISMATIC,
 _SHAPES = {2: "sphere", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule"}
 
 
-def read(path: Path, name: str) -> Robot:
-    """What the engine makes of a file in a run: of a URDF what loadURDF leaves of it.
-
-    Args:
-        path: The file.
-        name: What the description goes by.
+def read(path: Path) -> ModelReading:
+    """Return what the engine makes of a file in a run: of a URDF what loadURDF leaves of it.
 
     Raises:
         MissingEngineError: It is not installed here.
         ModelError: It cannot read the file.
     """
+    return room(DEFAULT).read_robot(_robot(path), path)
+
+
+def _robot(path: Path) -> Robot:
+    """Return what the engine makes of a file, off the loaded engine."""
+    name = "/".join(path.parts[-2:])
     file = UrdfFile.read(path)
     if file is None:
         with make_data(load(path, backend="pybullet", defaults="engine")) as data:
@@ -66,12 +70,10 @@ def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
     return Robot(
         name=name,
         reader=f"pybullet {engine_version('pybullet')}",
-        format="engine",
         links=(Link("world", "", HERE, None, None, tuple(around)), *links),
         frames=(),
         actuators=None,
         settings=_settings(),
-        rooted=True,
     )
 
 
@@ -128,13 +130,31 @@ class _Body:
         """One of its links, by its own frame."""
         dynamics, inner = self._dynamics[index], self._inner[index]
         shapes = []
-        for shape in pb.getCollisionShapeData(self._body, index, self._client):
-            kind = _SHAPES.get(shape[2], f"kind {shape[2]}")
-            at = inner @ _pose(*shape[5:7])
-            contact = {"friction": (dynamics[1], *dynamics[7:5:-1])}
-            shapes.append(CollisionShape(kind, at, _size(kind, shape[3]), contact=contact))
+        friction = dynamics[1], dynamics[7], dynamics[6]
+        for number, data in enumerate(pb.getCollisionShapeData(self._body, index, self._client)):
+            kind = _SHAPES.get(data[2], f"kind {data[2]}")
+            at = inner @ _pose(*data[5:7])
+            shape = CollisionShape(kind, at, _size(kind, data[3]), friction=friction)
+            if kind == "mesh":  # whose vertices are told in the frame of the centre of mass
+                shape = replace(shape, place=inner, points=self._vertices(index, number))
+            shapes.append(shape)
         inertial = Inertial(dynamics[0], np.zeros(3), np.diag(dynamics[2])).seen_from(inner)
         return Link(name, parent, place, joint, inertial, tuple(shapes))
+
+    def _vertices(self, index: int, number: int) -> Array | None:
+        """Return the vertices (n, 3) [m] of a mesh; None where the engine tells none.
+
+        Args:
+            index: Of the link.
+            number: Of the shape on it.
+        """
+        try:
+            count, vertices = pb.getMeshData(
+                self._body, index, collisionShapeIndex=number, physicsClientId=self._client
+            )
+        except pb.error:
+            return None
+        return np.array(vertices) if count else None
 
 
 def _unique(name: str, taken: set[str]) -> str:

@@ -163,36 +163,78 @@ def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int
     return sorted(pairs)
 
 
-def match_models(left: Model, right: Model, names: Mapping[str, str] | None = None) -> Matched:
+@dataclass(frozen=True, eq=False)
+class MatchedTrees:
+    """The rigid parts of two Models, and which is which.
+
+    Attributes:
+        left: Those of the first, by the names of the second.
+        right: Those of the second.
+        matching: Which is which.
+    """
+
+    left: GroupTree
+    right: GroupTree
+    matching: Matching
+
+
+def match_trees(
+    left: Model, right: Model, names: Mapping[str, str], *, one_world: bool = True
+) -> MatchedTrees:
+    """Pair the rigid parts of two Models.
+
+    Args:
+        left: A Model.
+        right: Another, of any engine.
+        names: Joints, bodies and sites of `left` that go by other names in `right`; other names
+            have no effect.
+        one_world: Whether both worlds are one; else what stands on one coincides with its
+            counterpart, as of a URDF, which does not say where its base stands.
+
+    Raises:
+        BadInputError: A backend tells nothing of the bodies of its Model.
+    """
+    robots = [_description(model) for model in (left, right)]
+    ours = {a: b for a, b in names.items() if a in robots[0].names}
+    trees = GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])
+    return MatchedTrees(*trees, match(*trees, one_world=one_world))
+
+
+def match_models(
+    left: Model,
+    right: Model,
+    names: Mapping[str, str] | None = None,
+    *,
+    one_world: bool = True,
+) -> Matched:
     """Pair what two Models have.
 
     Args:
         left: A Model.
         right: Another, of any engine.
         names: Joints, bodies, sites and actuators of `left` that go by other names in `right`.
+        one_world: As of `match_trees`.
 
     Raises:
         UnknownNameError: A name that was given is not there.
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
     given = {} if names is None else dict(names)
-    robots = [_description(model) for model in (left, right)]
     for side, model in enumerate((left, right)):
-        known = robots[side].names | {name for name in model.actuator_names if name}
+        known = _description(model).names | {name for name in model.actuator_names if name}
         for pair in given.items():
             check_name(
                 f"joint, body, site or actuator in {model.path.name}", pair[side], sorted(known)
             )
-    ours = {a: b for a, b in given.items() if a in robots[0].names}
-    trees = [GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])]
-    matching = match(trees[0], trees[1], one_world=all(robot.rooted for robot in robots))
+    trees = match_trees(left, right, given, one_world=one_world)
+    matching = trees.matching
     joints = _joints(matching)
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.left: solid for solid in map(_solid, matching.pairs)}
     solids = (*by_body.values(), *_led(left, right, given))
     by_name = _by_name(left.body_names, right.body_names, given)
     bodies = _and_further(((solid.left, solid.right) for solid in solids), by_name)
-    sites = _sites(left, right, given, matching, trees)
+    sites = _sites(left, right, given, trees)
     actuators = _actuators(left, right, joints, given)
     only_left = _only((left, right), 0, joints, actuators, sites)
     only_right = _only((right, left), 1, joints, actuators, sites)
@@ -318,15 +360,14 @@ def _sites(
     left: Model,
     right: Model,
     given: Mapping[str, str],
-    matching: Matching,
-    trees: Sequence[GroupTree],
+    trees: MatchedTrees,
 ) -> Pairs:
     """By name, then by place: of what is left, those in one place of the same solid."""
-    left_places, right_places = _frame_places(trees[0]), _frame_places(trees[1])
+    left_places, right_places = _frame_places(trees.left), _frame_places(trees.right)
 
     def in_one_place(site: int, other: int) -> bool:
         (number, place), (other_number, other_place) = left_places[site], right_places[other]
-        pair = matching.of(number)
+        pair = trees.matching.of(number)
         if pair is None or other_number != pair.right.number:
             return False
         return (pair.align @ place).distance(other_place) < _ONE_PLACE

@@ -1,25 +1,22 @@
-"""What two files differ in as compiled models: the list that `..why` explains a gap with."""
+"""The differences of two compiled models, as `..why` has them, on the one list of two files."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...engines.description.records import Robot
-from ...engines.description.tree import GroupTree
-from ...engines.records import TURNED, DifferingQuantity, ModelDifference, QuantityValue
-from ...interface import Keyframe, Model
-from ...measures.text import few
-from ..compare.matching import Matched, match_models
-from ..why.causes import data_of, differences_of, sensors_of
-from ..why.run_differences import order_of_mocap, order_of_qpos
-from .ledger import Figure, Key, Ledger, Value, plain
+from ...engines.description.reading import ModelReading
+from ...engines.records import TURNED, DifferingQuantity, ModelDifference
+from ..compare.matching import Matched
+from ..why.causes import differences_of
+from .effects import Effects, Meaning, ServoParts
+from .listing import CompiledCause, Listing
+from .locating import ElementIds, Locator
+from .meanings import Meanings
+from .records import Value
 
-_CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
-_SETTINGS = ("option", "flag")
-# What a difference is a matter of, where no reading enters it; and what readings tell of at all.
+# What a difference of an element of each kind is a matter of, by its subject.
 _SUBJECTS: dict[str, dict[str, str]] = {
     "body": {
         "mass": "mass",
@@ -57,216 +54,260 @@ _SUBJECTS: dict[str, dict[str, str]] = {
         "adhesion": "contact",
         "moving surface": "contact",
     },
-    "site": {"place": "tool frame"},
-    "actuator": {
-        "gains": "drive",
-        "law": "drive",
-        "filter": "drive",
-        "gear": "drive",
-        "force range": "drive",
-        "range of ctrl": "drive",
-        "transmission": "drive",
-        "extra actuator": "drive",
-    },
+    "site": {"place": "tool frame", "owner": "tool frame"},
     "equality": {"extra equality": "structure"},
 }
-_READ = "only a function that reads it moves otherwise"
-_READ_BY_CONTROLLERS = "only a controller that reads it moves otherwise"
-_READ_BY_NUMBER = "only a function that reads qpos or qvel by number moves otherwise"
-_MOVED_BY_NUMBER = "only a function that moves them by number moves otherwise"
-_UNTOLD = ("filter", "adhesion", "moving surface")  # of which a URDF's reading knows nothing
-_UNTOLD_FIGURES = {"dampingpoly", "stiffnesspoly", "springyield", "gap"}
+_OF_KIND = {"actuator": "drive", "option": "settings", "flag": "settings"}
+# Of a body that is cut otherwise: what each quantity is a matter of.
+_OF_WEIGHT = {"mass": "mass", "com": "centre of mass", "moments": "inertia", TURNED: "inertia"}
+# What a URDF, or what an engine tells, has no word for: by the kind of the element.
+_UNSAID = {
+    "joint": ("armature", "spring", "rest of the spring", "stop", "softness of dry friction"),
+    "geom": _SUBJECTS["geom"].keys() - {"shape", "hull", "heights", "extra shape", "place"},
+}
+# What says the largest force of a joint.
+_EFFORTS = (("joint", "force limit"), ("actuator", "force range"))
+# What each gain of a servo decides.
+_PARTS_OF_SERVO: dict[str, ServoParts] = {"kp": "sag", "kv": "ratio"}
 
 
-def compiled(
-    models: Sequence[Model], names: Mapping[str, str], tree: GroupTree
-) -> tuple[dict[Key, list[ModelDifference]], Matched]:
-    """Find what two files differ in by their compiled models.
-
-    Args:
-        models: The two.
-        names: Joints, links and frames of the first that go by other names in the second.
-        tree: The reading of the first, by these names.
-
-    Returns:
-        The differences by key, an option or a flag by each figure; and what of one model is what
-        of the other.
-
-    Raises:
-        StateMachineError: They cannot be matched.
-    """
-    left, right = models
-    here = {*left.joint_names, *left.body_names, *left.site_names, *left.actuator_names}
-    matched = match_models(left, right, {a: b for a, b in names.items() if a in here})
-    differences: dict[Key, list[ModelDifference]] = {}
-    for difference in differences_of(left, right, matched):
-        for key in _keys(difference, names, tree):
-            differences.setdefault(key, []).append(difference)
-    return differences, matched
-
-
-def _keys(difference: ModelDifference, names: Mapping[str, str], tree: GroupTree) -> list[Key]:
-    """Return the keys of a difference.
+class CompiledDifferences:
+    """Enters what two compiled models differ in.
 
     Args:
-        difference: Of two compiled models.
-        names: What joints, links and frames of the first are called in the second.
-        tree: The reading of the first, by these names.
+        listing: Where it is entered.
+        readings: Both sides.
+        matched: What of one is what of the other.
+        effects: What differences mean.
+        locator: Where elements stand in the files.
     """
-    kind, where = difference.kind, names.get(difference.where, difference.where)
-    figures = [value.quantity for value in difference.values]
-    if kind in _SETTINGS:
-        return [("option", where, word) for word in sorted({*figures})]
-    if kind == "body" and where in tree.at:
-        where = tree.groups[tree.at[where][0]].name
-    usual = difference.subject
-    words = {_CALLED.get(name, usual) for name in figures} or {usual}
-    return [(kind, where, word) for word in sorted(words)]
 
+    def __init__(
+        self,
+        listing: Listing,
+        readings: Sequence[ModelReading],
+        matched: Matched,
+        effects: Effects,
+        locator: Locator,
+    ) -> None:
+        self._listing, self._readings, self._matched = listing, readings, matched
+        self._effects, self._locator = effects, locator
+        self._meanings = Meanings(readings, effects, locator)
 
-def enter_rest(book: Ledger, matched: Matched, robots: Sequence[Robot], reach: float) -> list[str]:
-    """Enter what no reading told of; and what could not be compared.
+    def enter(self) -> list[str]:
+        """Enter all that differs; return what was not compared, in sentences."""
+        skipped: list[str] = []
+        rows = differences_of(self._matched.left, self._matched.right, self._matched)
+        lonely = {row.where for row in rows if row.subject == "extra joint"}
+        of_other_kinds = self._enter_kinds(lonely)
+        for row in rows:
+            if row.kind == "model":
+                skipped.append(f"{row.title}: compared as a whole only, and it differs")
+            if row.subject == "extra joint" and row.where in of_other_kinds:
+                continue
+            if not (self._goes_with_a_joint(row, lonely) or self._is_unknown(row)):
+                self._enter(row)
+        self._enter_base()
+        return skipped
 
-    Args:
-        book: Where the readings were entered.
-        matched: What of one compiled model is what of the other.
-        robots: The two readings.
-        reach: How far the robot reaches [m], which distances are set against.
-    """
-    skipped = []
-    drives = {drive.name: drive.joint for robot in robots for drive in robot.actuators or ()}
-    alone = {where for _, where, word in book.compiled if word == "extra joint"}
-    for key, differences in book.compiled.items():
-        for difference in differences:
-            if difference.kind == "model":
-                skipped.append(f"{difference.title}: compared as a whole only, and it differs")
-            if drives.get(difference.where) in alone and difference.subject == "extra actuator":
-                continue  # it goes with the joint
-            if key not in book.entered and (book.complete or not _is_told(difference)):
-                _enter(book, key, difference, reach)
-    _enter_orders(book, matched)
-    _enter_keyframes(book, matched)
-    _enter_sensors(book, matched)
-    _enter_data(book, matched)
-    return skipped
+    def _enter_kinds(self, lonely: set[str]) -> set[str]:
+        """Enter joints that are of another kind on the other side; return their names.
 
+        Args:
+            lonely: Names of the joints that have no counterpart of their kind.
+        """
+        names: set[str] = set()
+        for left, right in self._effects.joints_of_parts():
+            if left.kind == right.kind or left.name not in lonely:
+                continue
+            names |= {left.name, right.name}
+            cause = CompiledCause(
+                f"extra joint of {left.name}", "a joint cannot be added or taken away"
+            )
+            element = self._locator.find("joint", left.name)
+            kinds = (left.kind, right.kind)
+            self._listing.enter("places", element, "type", kinds, Meaning(1.0), "", cause)
+        return names
 
-def _enter_orders(book: Ledger, matched: Matched) -> None:
-    """Enter elements that stand elsewhere, for a function that knows them by number."""
-    if matched.reordered:  # who writes ctrl by number meets other actuators
-        names = [few(list(model.actuator_names), 6) for model in (matched.left, matched.right)]
-        book.differ(Figure("further", "ctrl", "order"), names, share=0.5)
-    for difference in order_of_qpos(matched):
-        order = difference.values[0]
-        figure = Figure("further", "qpos", "order", effect=_READ_BY_NUMBER)
-        book.differ(figure, (_value(order.left), _value(order.right)), share=0.5)
-    for difference in order_of_mocap(matched):
-        order = difference.values[0]
-        figure = Figure("further", "mocap bodies", "order", effect=_MOVED_BY_NUMBER)
-        book.differ(figure, (_value(order.left), _value(order.right)), share=0.5)
+    def _enter_base(self) -> None:
+        """Enter another mass of what is fixed to the world, which moves nothing by it."""
+        pair = self._effects.root
+        left, right = pair.left.inertial.mass, pair.right.inertial.mass
+        if pair.left.joint is None and pair.right.joint is None and left != right:
+            name = pair.left.links[min(1, len(pair.left.links) - 1)][0].name
+            element = self._locator.find("body", name)
+            meaning = Meaning(0.0, "stands still", matters=False)
+            self._listing.enter("mass", element, "mass", (left, right), meaning, "kg")
 
+    def _goes_with_a_joint(self, row: ModelDifference, lonely: set[str]) -> bool:
+        """Tell whether an actuator is there on one side only since its joint is."""
+        if row.kind != "actuator" or row.subject != "extra actuator":
+            return False
+        sides = (self._effects.left, self._effects.right)
+        actuators = [side.actuators[row.where] for side in sides if row.where in side.actuators]
+        return any(actuator.joint in lonely for actuator in actuators)
 
-def _is_told(difference: ModelDifference) -> bool:
-    """Tell whether a reading without it has said that it is the same, or that it says nothing."""
-    names = {value.quantity for value in difference.values}
-    if difference.subject in _UNTOLD or (names and names <= _UNTOLD_FIGURES):
+    def _is_unknown(self, row: ModelDifference) -> bool:
+        """Tell whether a side has no word for an option, and its engine none either."""
+        if row.kind not in ("option", "flag"):
+            return False
+        names = {value.quantity for value in row.values}
+        for reading in self._readings:
+            if reading.settings is not None and not names <= reading.settings:
+                return True
         return False
-    return difference.kind in _SETTINGS or difference.subject in _SUBJECTS.get(difference.kind, ())
+
+    def _enter(self, row: ModelDifference) -> None:
+        """Enter the quantities of one difference."""
+        element = self._locator.find(row.kind, row.where)
+        if row.subject.startswith("extra ") and row.values:
+            side = 0 if row.values[0].right is None else 1
+            element = self._locator.find_alone(side, row.kind, row.where)
+        ids = self._locator.ids(row.kind, row.where)
+        if (row.kind, row.subject) in _EFFORTS and self._is_same_effort(row):
+            return
+        for value in self._quantities(row, ids):
+            subject = self._subject(row, value.quantity)
+            values = self._said(row, ids, value)
+            if values[0] == values[1]:
+                continue
+            self._listing.enter(
+                subject,
+                element,
+                value.quantity,
+                values,
+                self._meanings.of(row, ids, value, values),
+                value.unit,
+                CompiledCause(row.title, row.refused),
+            )
+
+    def _subject(self, row: ModelDifference, quantity: str) -> str:
+        """Return the subject of a quantity."""
+        is_weight = row.kind == "body" and row.subject in ("mass", "centre of mass", "inertia")
+        if is_weight and quantity in _OF_WEIGHT:
+            return _OF_WEIGHT[quantity]
+        if row.kind in _OF_KIND:
+            return _OF_KIND[row.kind]
+        return _SUBJECTS.get(row.kind, {}).get(row.subject, "further")
+
+    def _quantities(self, row: ModelDifference, ids: ElementIds) -> Iterator[DifferingQuantity]:
+        """Yield the quantities of a difference, those of a servo by its gains."""
+        if row.kind == "actuator" and row.subject == "extra actuator":
+            yield from self._of_extra_actuator(row)
+            return
+        if row.kind == "joint" and row.subject == "extra joint":
+            yield self._extra_joint(row)
+            return
+        if row.kind == "body" and row.subject == "parent":
+            yield DifferingQuantity("parent", *self._parents(ids))
+            return
+        yield from row.values
+        if not row.values:
+            yield DifferingQuantity(row.subject, "as it is", "another")
+
+    def _right_name(self, kind: str, ids: ElementIds) -> str:
+        """Return the name of an element on the right; "" where that has none."""
+        return self._locator.name(1, kind, ids.right)
+
+    def _of_extra_actuator(self, row: ModelDifference) -> Iterator[DifferingQuantity]:
+        """Yield what an actuator is that only one side has, and its gains."""
+        sides = (self._effects.left, self._effects.right)
+        actuators = [side.actuators.get(row.where) for side in sides]
+        kinds = [actuator.kind if actuator else "nothing" for actuator in actuators]
+        yield DifferingQuantity("actuator", kinds[0], kinds[1])
+        there = next(actuator for actuator in actuators if actuator is not None)
+        loads = self._effects.loads(there.joint)
+        for name, unit in (("kp", "N·m/rad"), ("kv", "N·m·s")):
+            value = getattr(there, name)
+            if value is not None:
+                unit_of_joint = loads[0].unit(unit) if loads and there.gear == 1 else ""
+                values = (value, "nothing") if actuators[0] else ("nothing", value)
+                yield DifferingQuantity(name, *values, unit_of_joint)
+
+    def _extra_joint(self, row: ModelDifference) -> DifferingQuantity:
+        """Return what a joint is that only one side has."""
+        loads = self._effects.loads(row.where)
+        kind = loads[0].joint.kind if loads else "joint"
+        is_left = row.values[0].left is not None
+        values = (kind, "nothing") if is_left else ("nothing", kind)
+        return DifferingQuantity("joint", *values)
+
+    def _parents(self, ids: ElementIds) -> tuple[str, str]:
+        """Return the names of the bodies that carry a body on each side."""
+        names: list[str] = []
+        for side, number in ((0, ids.left), (1, ids.right)):
+            model = (self._matched.left, self._matched.right)[side]
+            parent = int(model.compiled.body_parentid[number])
+            names.append(self._locator.name(side, "body", parent))
+        return names[0], names[1]
+
+    def _said(
+        self, row: ModelDifference, ids: ElementIds, value: DifferingQuantity
+    ) -> tuple[Value, Value]:
+        """Return both values; None of a side that has no word for it, or does not say it."""
+        values: list[Value] = []
+        for side, entry in ((0, value.left), (1, value.right)):
+            is_said = self._says(side, row, ids, entry)
+            nothing = "none" if value.quantity.endswith("range") else "nothing"
+            values.append(_shown(entry, nothing) if is_said else None)
+        return values[0], values[1]
+
+    def _says(self, side: int, row: ModelDifference, ids: ElementIds, entry: Value) -> bool:
+        """Tell whether a side says a quantity of its compiled model."""
+        reading = self._readings[side]
+        declared = reading.declared
+        if declared is None:
+            return True
+        if row.kind in ("option", "flag"):
+            return reading.settings is not None
+        if row.kind == "actuator":
+            return False
+        if row.subject in _UNSAID.get(row.kind, ()):
+            is_friction = row.kind == "geom" and row.subject == "friction"
+            return is_friction and self._declares_friction(side, ids)
+        if row.kind == "joint":
+            name = self._locator.name(side, "joint", ids.left if side == 0 else ids.right)
+            joint = declared.joints.get(name)
+            if joint is not None and row.subject in ("damping", "dry friction", "force limit"):
+                stated = {
+                    "damping": joint.damping,
+                    "dry friction": joint.friction,
+                    "force limit": joint.effort,
+                }
+                return stated[row.subject] is not None
+        return True
+
+    def _declares_friction(self, side: int, ids: ElementIds) -> bool:
+        """Tell whether a URDF, or an engine, says the friction of a geom."""
+        reading, number = self._readings[side], ids.left if side == 0 else ids.right
+        if reading.format == "engine" or reading.declared is None or number < 0:
+            return True
+        body = int(reading.model.compiled.geom_bodyid[number])
+        return self._locator.name(side, "body", body) in reading.declared.frictions
+
+    def _is_same_effort(self, row: ModelDifference) -> bool:
+        """Tell whether a limit of a joint is that of its one actuator on the other side."""
+        joint = row.where
+        if row.kind == "actuator":
+            actuator = self._effects.left.actuators.get(row.where)
+            joint = "" if actuator is None else actuator.joint
+        loads = self._effects.loads(joint)
+        efforts = [load.joint.effort for load in loads]
+        if len(efforts) != 2 or efforts[0] is None or efforts[1] is None:
+            return False
+        counts: list[int] = []
+        for side, load in zip((self._effects.left, self._effects.right), loads, strict=True):
+            on_joint = [actuator.joint == load.joint.name for actuator in side.actuators.values()]
+            counts.append(sum(on_joint))
+        return max(counts) <= 1 and bool(np.isclose(efforts[0], efforts[1], rtol=1e-9, atol=0))
 
 
-def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:
-    """Enter the figures of a difference, as the compiled models name them."""
-    subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, "further")
-    whole = (DifferingQuantity("", "as it is", "another"),)
-    for value in difference.values or whole:
-        name, unit = value.quantity, value.unit
-        if name.endswith("limited") and len(difference.values) > 1:
-            continue  # the range says so
-        metres = unit == "m"
-        scale = reach if metres else 0.0
-        if name == TURNED:
-            scale = math.pi
-        book.enter(
-            Figure(subject, difference.where, name, unit, keys=[key]),
-            (_value(value.left), _value(value.right)),
-            scale=scale,
-            slack=4,
-            against=reach,
-            share=None if metres else 0.5,
-        )
-
-
-def _value(value: QuantityValue) -> Value:
-    """Return a value of a compiled model as one of the list."""
+def _shown(value: Value, nothing: str) -> Value:
+    """Return a value of a compiled model as one of the list; `nothing` of what is not there."""
     if value is None:
-        return "nothing"
+        return nothing
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, tuple):
-        return plain(value)
-    return float(value) if isinstance(value, int | float) else str(value)
-
-
-def _enter_keyframes(book: Ledger, matched: Matched) -> None:
-    """Enter keyframes by name, those without one by number."""
-    left, right = _keyframes(matched.left), _keyframes(matched.right)
-    for name in left | right:
-        ours, theirs = left.get(name), right.get(name)
-        if ours is not None and theirs is not None:
-            _enter_keyframe(book, matched, name, ours, theirs)
-            continue
-        words = ["there" if frame else "nothing" for frame in (ours, theirs)]
-        book.differ(Figure("further", f"keyframe {name}", ""), words, share=0.5)
-
-
-def _keyframes(model: Model) -> dict[str, Keyframe]:
-    return {frame.name or f"number {k}": frame for k, frame in enumerate(model.keyframes)}
-
-
-def _enter_keyframe(
-    book: Ledger, matched: Matched, name: str, left: Keyframe, right: Keyframe
-) -> None:
-    """Enter the time of a keyframe, and of qpos, qvel and ctrl the farthest entry."""
-    where = f"keyframe {name}"
-    book.enter(Figure("further", where, "time", "s"), (left.time, right.time), share=0.5)
-    for part, ours, theirs in (
-        ("qpos", left.qpos, right.qpos),
-        ("qvel", left.qvel, right.qvel),
-        ("ctrl", left.ctrl, right.ctrl),
-    ):
-        moved = matched.moved(part, ours, theirs)
-        off = float(np.abs(moved - theirs).max(initial=0.0))
-        if off > 1e-9:
-            figure = Figure("further", where, f"{part}, farthest entry")
-            book.differ(figure, (0.0, off), off, share=0.5)
-
-
-def _enter_data(book: Ledger, matched: Matched) -> None:
-    """Enter what a function of the user's may read: user data of elements, numeric, text, tuple."""
-    for difference in data_of(matched):
-        figure = Figure("further", difference.title, "", effect=_READ)
-        for value in difference.values:
-            book.enter(figure, (_value(value.left), _value(value.right)), share=0.5)
-
-
-def _enter_sensors(book: Ledger, matched: Matched) -> None:
-    """Enter what only a controller that reads them meets: it changes no motion by itself."""
-    only_left: list[str] = []
-    only_right: list[str] = []
-    for difference in sensors_of(matched):
-        for value in difference.values:
-            if difference.subject != "extra sensor":
-                where = f"sensor {difference.where}" if difference.where else "sensordata"
-                figure = _of_sensors(where, value.quantity)
-                book.enter(figure, (_value(value.left), _value(value.right)), share=0.0)
-            elif value.left is None:
-                only_right.append(difference.where)
-            else:
-                only_left.append(difference.where)
-    if only_left or only_right:
-        sides = [few(names, 6) or "nothing" for names in (only_left, only_right)]
-        book.differ(_of_sensors("sensors", "that only one has"), sides, share=0.0)
-
-
-def _of_sensors(where: str, name: str) -> Figure:
-    return Figure("further", where, name, effect=_READ_BY_CONTROLLERS, matters=False)
+    if isinstance(value, int):
+        return float(value)
+    return value

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from ...measures.text import (
     after,
     capital,
     command,
+    few,
     grouped,
     reading,
     rounded,
@@ -18,11 +19,18 @@ from ...measures.text import (
 from ...show import report_template as template
 from ...show.blocks import Block, Items, Page, Table, Text
 from ...show.report_template import if_true
-from . import ModelsComparison, ReadingSide
-from .ledger import SUBJECTS, ReadingAgreement
-from .subject_page import APART, MOMENT, Slots, subject_blocks
+from . import (
+    SUBJECTS,
+    FileFault,
+    FileSide,
+    ModelsComparison,
+    QuantityAgreement,
+    Value,
+    gross_visuals,
+)
+from .subject_page import APART, MOMENT, Slots, subject_blocks, value_text
 
-_READ = ("file", "read", "links", "joints", "shapes", "mass")  # rows of the sides
+_READ = ("file", "read", "links", "joints", "touching", "drawn", "mass")  # rows of the sides
 
 
 def page(result: ModelsComparison, sides: Sequence[str], everything: bool = False) -> Page:
@@ -37,7 +45,6 @@ def page(result: ModelsComparison, sides: Sequence[str], everything: bool = Fals
     differences: list[Block] = []
     for subject, rows in by_subject.items():
         differences += subject_blocks(subject, rows, everything)
-    counts = {subject: len(rows) for subject, rows in by_subject.items()}
     slots = (
         _sides(result)
         | _verdict(result)
@@ -45,11 +52,16 @@ def page(result: ModelsComparison, sides: Sequence[str], everything: bool = Fals
         | _what_can_be_equalized(result, sides)
         | _poses(result)
     )
+    has_lines = any(row.left_line or row.right_line for row in result.differences)
+    notes = [Text(sentence(note)) for note in _notes(result)]
     return template.page(
         "lab/model_differences/model_diff",
+        **_faults(result.faults),
         differences=differences,
-        equal=_equal(result.agreements, counts),
-        notes=[Text(sentence(note)) for note in _notes(result)],
+        lines=if_true(has_lines),
+        gross=_gross(result),
+        equal=_equal(result.agreements),
+        notes=notes,
         **slots,
     )
 
@@ -65,14 +77,14 @@ def _sides(result: ModelsComparison) -> Slots:
     }
 
 
-def _read(side: ReadingSide) -> str:
+def _read(side: FileSide) -> str:
     """Say how a side was read."""
     if side.format == "engine":
         return f"loaded into {side.reader}"
     return f"{side.format}, by {side.reader}"
 
 
-def _column(side: ReadingSide) -> list[str]:
+def _column(side: FileSide) -> list[str]:
     """Return how a side was read, and what it has."""
     return [
         side.file,
@@ -80,8 +92,80 @@ def _column(side: ReadingSide) -> list[str]:
         str(side.links),
         str(side.joints),
         str(side.shapes),
+        str(side.visuals),
         rounded(side.mass, "kg", 4),
     ]
+
+
+@dataclass(frozen=True)
+class _AlikeFaults:
+    """Faults of one side that are the same of several elements.
+
+    Attributes:
+        faults: At least one.
+    """
+
+    faults: Sequence[FileFault]
+
+    def label(self) -> str:
+        """Return what it is of: the first element, and how many more there are."""
+        first, more = self.faults[0], len(self.faults) - 1
+        label = f"{first.side}: {first.quantity} of {first.kind} {first.element}"
+        return f"{label} + {more} more" if more else label
+
+    def line(self) -> str:
+        """Return where the first element stands."""
+        line = self.faults[0].line
+        return "" if line is None else str(line.line)
+
+    def stated(self) -> str:
+        """Return what the file states."""
+        return _value_of_fault(self.faults[0], self.faults[0].stated, "nothing")
+
+    def used(self) -> str:
+        """Return what a run has instead."""
+        return _value_of_fault(self.faults[0], self.faults[0].used, "left out")
+
+    def changed(self) -> str:
+        """Return by how much it is changed."""
+        factor = self.faults[0].factor
+        return "" if factor is None else f"up to {factor:.3g} times"
+
+
+def _faults(faults: Sequence[FileFault]) -> Slots:
+    """Return a row for each fault of a file, and MuJoCo's reasons."""
+    by_kind = grouped(
+        ((fault.side, fault.kind, fault.quantity, fault.stated, fault.used, fault.reason), fault)
+        for fault in faults
+    )
+    rows = [_AlikeFaults(alike) for alike in by_kind.values()]
+    columns = {
+        "fault": _AlikeFaults.label,
+        "stated": _AlikeFaults.stated,
+        "used": _AlikeFaults.used,
+        "changed": _AlikeFaults.changed,
+        "line": _AlikeFaults.line,
+    }
+    table = Table.of(rows, columns, "What is wrong in a file, and what a run has instead")
+    reasons = dict.fromkeys(fault.reason for fault in faults)
+    return {
+        "faults": replace(table, words=frozenset(range(len(columns)))),
+        "reasons": Items([capital(reason) for reason in reasons]),
+    }
+
+
+def _value_of_fault(fault: FileFault, value: Value, none: str) -> str:
+    """Return a value of a fault as text."""
+    if value is None:
+        return none
+    unit = MOMENT if fault.unit == "kg m²" else fault.unit
+    return value_text(value, unit)
+
+
+def _gross(result: ModelsComparison) -> str | None:
+    """Return which visuals are far too large or too small, in words; None if none are."""
+    words = [f"{row.element}, {row.effect}" for row in gross_visuals(result)]
+    return few(words, 3, "; ") if words else None
 
 
 def _verdict(result: ModelsComparison) -> Slots:
@@ -103,16 +187,16 @@ def _engine_itself(result: ModelsComparison) -> Slots:
     """Return what is said of an engine that read a file itself, and emulates the contract."""
     slots: Slots = {"emulated": None, "written": None, "unlike": None}
     for side in (result.right, result.left):  # of two the left is named
-        if side.is_emulated:
-            slots["emulated"] = _engine(side)
-        if side.is_emulated and side.is_mjcf:
-            slots["written"] = _engine(side)
+        if side.emulated:
+            slots["emulated"] = side.emulated
+            if side.is_mjcf:
+                slots["written"] = side.emulated
         if side.unlike_its_users:
             slots["unlike"] = capital(side.unlike_its_users)
     return slots
 
 
-def _engine(side: ReadingSide) -> str:
+def _engine(side: FileSide) -> str:
     """Return the name of the engine that read a side, without its version."""
     return side.reader.split()[0]
 
@@ -128,12 +212,12 @@ def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Sl
     refused: dict[str, str] = {}
     for row in result.differences:
         if row.refused:
-            refused[row.causes[0]] = row.refused
-        else:
-            able |= dict.fromkeys(row.causes)
+            refused[row.cause] = row.refused
+        elif row.cause:
+            able[row.cause] = None
     typed = None
     if able:
-        experiment = "waves" if result.left.robot.actuators else "gravity"  # runs on any such robot
+        experiment = "waves" if result.has_actuators else "gravity"  # runs on any such robot
         typed = command(["statemachine", "compare", experiment, *sides, "--why"])
     lines = [f"{capital(name)}: {why}." for name, why in refused.items()]
     some = len(able) if able and refused else None
@@ -167,24 +251,22 @@ def _notes(result: ModelsComparison) -> list[str]:
     return [*notes, *result.notes, *result.skipped]
 
 
-def _name(side: ReadingSide) -> str:
+def _name(side: FileSide) -> str:
     """Return a file, and of one that an engine has read the engine."""
     return f"{side.file} on {_engine(side)}" if side.format == "engine" else side.file
 
 
 @dataclass(frozen=True)
-class _Agreement:
+class _SubjectAgreement:
     """How well both sides agree in a subject.
 
     Attributes:
         subject: A key of `SUBJECTS`.
         agreements: In each unit.
-        differ: How many figures differ.
     """
 
     subject: str
-    agreements: Sequence[ReadingAgreement]
-    differ: int
+    agreements: Sequence[QuantityAgreement]
 
     def heading(self) -> str:
         return SUBJECTS[self.subject].partition(":")[0]
@@ -192,7 +274,7 @@ class _Agreement:
     def counts(self) -> str:
         """Return how many figures are equal, of how many."""
         count = sum(agreement.count for agreement in self.agreements)
-        return f"{count} of {count + self.differ}"
+        return f"{count} of {sum(agreement.compared for agreement in self.agreements)}"
 
     def apart(self) -> str:
         """Return how far the figures are apart at the worst, in each unit."""
@@ -204,27 +286,20 @@ class _Agreement:
         return "all" if digits == 17 else str(digits)
 
 
-def _equal(agreements: Sequence[ReadingAgreement], differ: Mapping[str, int]) -> Table:
-    """Return a row for each subject: how well both sides agree in it, at the worst in each unit.
-
-    Args:
-        agreements: Of each subject and unit.
-        differ: How many figures of a subject differ.
-    """
+def _equal(agreements: Sequence[QuantityAgreement]) -> Table:
+    """Return a row for each subject: how well both sides agree in it, at the worst in each unit."""
     by_subject = grouped((row.subject, row) for row in agreements)
-    rows = [
-        _Agreement(subject, group, differ.get(subject, 0)) for subject, group in by_subject.items()
-    ]
+    rows = [_SubjectAgreement(subject, group) for subject, group in by_subject.items()]
     columns = {
-        "subject": _Agreement.heading,
-        "equal": _Agreement.counts,
-        "apart, at most": _Agreement.apart,
-        "to digits": _Agreement.digits,
+        "subject": _SubjectAgreement.heading,
+        "equal": _SubjectAgreement.counts,
+        "apart, at most": _SubjectAgreement.apart,
+        "to digits": _SubjectAgreement.digits,
     }
     return Table.of(rows, columns, "Figures that are equal")
 
 
-def _worst(agreement: ReadingAgreement) -> str:
+def _worst(agreement: QuantityAgreement) -> str:
     unit = MOMENT if agreement.subject == "inertia" else agreement.unit
     factor, shown = APART.get(unit, (1.0, after(unit)))
     return f"{agreement.worst * factor:.1e}{shown}" if agreement.worst else ""

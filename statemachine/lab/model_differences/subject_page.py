@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
+from ...engines.description.lines import SourceLine
 from ...measures.text import after, capital, reading, significant
 from ...show import report_template as template
 from ...show.blocks import Block, Items, Table
 from ...show.report_template import if_true
-from .ledger import SUBJECTS, ReadingDifference, Value
+from . import SUBJECTS, ListedDifference, Value
 
 _ROWS = 8  # of a table, unless all are asked for
 _FOR_THE_RECORD = " (for the record)"
@@ -44,7 +45,7 @@ _LAST = {
 }
 # Words of a subject's table that want a legend, by its slot.
 _EXPLAINED = {
-    "zero": ("places", "zero position"),
+    "zero": ("places", "only its zero"),
     "armature": ("armature", "M_ii"),
     "sags": ("drive", "sags"),
     "ratio": ("drive", "damping ratio"),
@@ -52,41 +53,49 @@ _EXPLAINED = {
     "load": ("centre of mass", "load"),
     "felt": ("inertia", "M_ii"),
 }
-# Figures that say no more than the name of their difference.
+# Quantities that say no more than the name of their difference.
 _SAID_BY_ITS_NAME = {
-    "active",
     "actuator",
+    "armature",
     "axis",
+    "com",
     "condim",
     "ctrlrange",
+    "damping",
+    "data",
+    "equality",
     "forcerange",
-    "frame turned",
     "friction",
+    "frictionloss",
     "gear",
     "geom",
     "gravity",
     "integrator",
-    "jnt",
     "joint",
-    "middle",
+    "keyframe",
+    "kind",
+    "mass",
     "moments",
-    "origin",
+    "parent",
     "place",
     "priority",
     "range",
-    "shape",
     "stiffness",
     "timestep",
-    "type",
-    "zero position",
+    "user",
+    "velocity",
+    "visual",
 }
+# Kinds of elements whose names say little without the kind.
+_NAMED_WITH_KIND = ("keyframe", "transmission", "visual")
 _HEADERS = ("figure", "left", "right", "apart")
+_LINES = "lines"
 
 Slots = dict[str, str | float | Items | Table | Sequence[Block] | None]  # of a template, by name
 
 
 def subject_blocks(
-    subject: str, differences: Sequence[ReadingDifference], everything: bool
+    subject: str, differences: Sequence[ListedDifference], everything: bool
 ) -> list[Block]:
     """Say what differs in a subject, what the figures mean, and of armature what its lack does.
 
@@ -110,8 +119,8 @@ def subject_blocks(
 
 
 def _alike(
-    differences: Sequence[ReadingDifference], everything: bool
-) -> list[list[ReadingDifference]]:
+    differences: Sequence[ListedDifference], everything: bool
+) -> list[list[ListedDifference]]:
     """Group differences: where three places or more have one figure with the same values.
 
     One row is then for all of them.
@@ -120,11 +129,11 @@ def _alike(
         differences: Of one subject.
         everything: Whether each has a row of its own nevertheless.
     """
-    alike: dict[Hashable, list[ReadingDifference]] = {}
+    alike: dict[Hashable, list[ListedDifference]] = {}
     for row in differences:
-        figure = row.figure, row.left, row.right, row.size, row.unit
+        figure = row.quantity, row.left, row.right, row.size, row.unit
         alike.setdefault(figure, []).append(row)
-    groups: list[list[ReadingDifference]] = []
+    groups: list[list[ListedDifference]] = []
     for rows in alike.values():
         if len(rows) > 2 and not everything:
             groups.append(rows)
@@ -134,10 +143,10 @@ def _alike(
 
 
 def _table(subject: str, rows: Sequence[Sequence[str]]) -> Table:
-    """Return the table of a subject; the last two columns are left out where they are empty."""
-    headers = (*_HEADERS, _LAST.get(subject, ""))
+    """Return the table of a subject; the last columns are left out where they are empty."""
+    headers = (*_HEADERS, _LAST.get(subject, ""), _LINES)
     columns = list(range(len(headers)))
-    for column in (3, 4):
+    for column in (3, 4, 5):
         if not any(row[column] for row in rows):
             columns.remove(column)
     cells: list[list[str]] = []
@@ -147,7 +156,7 @@ def _table(subject: str, rows: Sequence[Sequence[str]]) -> Table:
     return Table(shown, cells, SUBJECTS[subject], words=frozenset(range(len(columns))))
 
 
-def _lack_of_armature(subject: str, differences: Sequence[ReadingDifference]) -> Slots:
+def _lack_of_armature(subject: str, differences: Sequence[ListedDifference]) -> Slots:
     """Return how much faster a joint is accelerated on the side that has no armature."""
     worst = max(differences, key=lambda row: row.share)
     one_has_none = not (worst.left and worst.right)
@@ -155,7 +164,7 @@ def _lack_of_armature(subject: str, differences: Sequence[ReadingDifference]) ->
     if subject == "armature" and 0 < worst.share < 1 and one_has_none:
         factor = 1 / (1 - worst.share)
         times = f"{factor:,.0f}" if factor >= 100 else f"{factor:.3g}"
-    return {"times": times, "joint": worst.where, "side": "left" if worst.right else "right"}
+    return {"times": times, "joint": worst.element, "side": "left" if worst.right else "right"}
 
 
 def _meanings(subject: str, table: Table) -> Slots:
@@ -167,36 +176,48 @@ def _meanings(subject: str, table: Table) -> Slots:
     return slots
 
 
-def _row(subject: str, group: Sequence[ReadingDifference]) -> list[str]:
+def _row(subject: str, group: Sequence[ListedDifference]) -> list[str]:
     """Return the row of differences that are alike."""
     first, last = group[0], group[-1]
     unit = MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
     effect = " … ".join(dict.fromkeys((first.effect, last.effect)))
-    left, right = _value(first.left, unit), _value(first.right, unit)
     apart = ""
-    if first.size is not None and (first.left is None) == (first.right is None):
+    if first.size is not None and subject != "drawing":
         apart = _number(first.size, unit, APART)
-        if first.left is None:
-            left, right = "", ""  # what both do not say is their size
-    return [_label(first, len(group) - 1), left, right, apart, effect]
+    label = _label(first, len(group) - 1)
+    values = value_text(first.left, unit), value_text(first.right, unit)
+    return [label, *values, apart, effect, _lines(first)]
 
 
-def _label(row: ReadingDifference, more: int) -> str:
+def _lines(row: ListedDifference) -> str:
+    """Return the lines of both files at which an element stands; "" where none is known."""
+    if row.left_line is None and row.right_line is None:
+        return ""
+    return f"{_line(row.left_line)} | {_line(row.right_line)}".strip()
+
+
+def _line(line: SourceLine | None) -> str:
+    return "–" if line is None else str(line.line)
+
+
+def _label(row: ListedDifference, more: int) -> str:
     """Return what a row is called: as its difference is, with the figure that it is of it."""
-    if len(row.causes) != 1:
-        where = f"{row.where} + {more} more:" if more else row.where
-        return f"{where} {row.figure}".strip().removesuffix(":")
-    name, figure = row.causes[0], row.figure
+    name = row.cause if row.cause else row.element
+    if not row.cause and row.kind in _NAMED_WITH_KIND:
+        name = f"{row.kind} {row.element}"
     name = f"{capital(name)} + {more} more" if more else capital(name)
-    return name if not figure or figure in _SAID_BY_ITS_NAME else f"{name}: {figure}"
+    if row.cause and row.quantity in _SAID_BY_ITS_NAME:
+        return name
+    return f"{name}: {row.quantity}".removesuffix(": ").removeprefix(": ")
 
 
-def _value(value: Value, unit: str) -> str:
+def value_text(value: Value, unit: str) -> str:
+    """Return a value of a side, in the units of a reader."""
     match value:
         case None:
             return "not said"
-        case str():
-            return value
+        case str() | bool():
+            return str(value)
         case tuple():
             # Three in a row are a place or a direction.
             usual = "" if len(value) == 3 else f" {unit}"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from statemachine import Model
 from statemachine.engines import RawEngine, room
-from statemachine.engines.description.records import Robot
+from statemachine.engines.description.reading import ModelReading
 from statemachine.interface import Array
 
 
@@ -21,7 +21,7 @@ class MyEngine(RawEngine):
     ) -> AbstractContextManager[Callable[[int], object]]:
         return room("mujoco").stepper(model, qpos, qvel, ctrl)
 
-    def read(self, path: Path, name: str) -> Robot:
-        """The description, under the engine's own name."""
-        robot = room("mujoco").read(path, name)
-        return replace(robot, reader=robot.reader.replace("mujoco", self.name))
+    def read(self, path: Path) -> ModelReading:
+        """What it makes of a file, under the engine's own name."""
+        reading = room("mujoco").read(path)
+        return replace(reading, reader=reading.reader.replace("mujoco", self.name))
