@@ -63,17 +63,19 @@ def describe(kinematics: Kinematics, joint_labels: Sequence[str]) -> Robot:
         own = kinematics.definition(site, "site")
         frames.append(RobotFrame(site, own.body, Placement(own.pos, own.mat)))
     name = "/".join(kinematics.path.parts[-2:])
-    is_rooted = bool(links) and links[0].name == _WORLD
     return Robot(
         name=name,
         reader=f"{WITNESS} {kinematics.version}",
-        format="places",
         links=tuple(links),
         frames=tuple(frames),
         actuators=None,
         settings=None,
-        rooted=is_rooted,
     )
+
+
+def is_rooted(robot: Robot) -> bool:
+    """Return whether the root of a robot is the world; in a URDF it is a link of the robot."""
+    return bool(robot.links) and robot.links[0].name == _WORLD
 
 
 def _bodies(kinematics: Kinematics) -> list[_Body]:

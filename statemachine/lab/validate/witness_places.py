@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ...engines.description.match import Matching, Pair, frame_names, match
-from ...engines.description.moving import describe
+from ...engines.description.moving import describe, is_rooted
 from ...engines.description.tree import Group, GroupTree
 from ...errors import BadInputError
 from ...interface import Model
@@ -70,7 +70,7 @@ class PartsByPlace(WitnessParts):
         ours = describe(numbers, _joint_labels(numbers, "the engine"))
         theirs = describe(kinematics, _joint_labels(kinematics, "the witness"))
         self._left, self._right = GroupTree(ours), GroupTree(theirs)
-        has_two_worlds = ours.rooted and theirs.rooted
+        has_two_worlds = is_rooted(ours) and is_rooted(theirs)
         root = match(self._left, self._right, one_world=has_two_worlds).pairs[0]
         bases = _bases(self._left, self._right, root, has_two_worlds)
         base, matching = _best_base(self._left, self._right, bases)
@@ -212,7 +212,7 @@ def _bases(left: GroupTree, right: GroupTree, root: Pair, has_two_worlds: bool) 
 
 def _first_link(tree: GroupTree, group: Group) -> str:
     """Return the robot's first link in its base; the world is none if there is another."""
-    if tree.robot.rooted and group.number == 0 and len(group.links) > 1:
+    if is_rooted(tree.robot) and group.number == 0 and len(group.links) > 1:
         return group.links[1][0].name
     return group.name
 
