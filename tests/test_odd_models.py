@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.engines.mujoco.description import read
+from statemachine.engines.mujoco.description import describe
 from tools.fuzz import random_models
 
 from .support.files import written
@@ -75,7 +75,7 @@ def test_the_target_of_a_thruster_is_no_joint(here: Cli, tmp_path: Path) -> None
 
 
 def test_only_transmissions_by_a_joint_have_one(tmp_path: Path) -> None:
-    robot = read(written(tmp_path / "m.xml", ALL), "m")
+    robot = describe(sm.load(written(tmp_path / "m.xml", ALL)).raw, "m")
     assert [drive.joint for drive in robot.actuators] == ["j", "j", "", "", "", "", "turns"]
     # Of the servos only the first turns its joint by the gear alone.
     assert [note for note in robot.notes if "beyond the range" in note] == [
