@@ -20,7 +20,7 @@ from .errors import BadInputError, ModelError, check_name
 from .installed import require
 from .interface import Array, JointType, Model
 from .interface.checks import as_numbers, as_vector
-from .model_files import checked_file
+from .model_files import checked_path
 from .models import AnyPath
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
 from .witness import RobotReading, Segment, read_file, read_numbers
@@ -65,7 +65,7 @@ class Kinematics:
     """
 
     def __init__(self, model: AnyPath, joint_names: Sequence[str] | None = None) -> None:
-        pin, path = require("pinocchio"), checked_file(model)
+        pin, path = require("pinocchio"), checked_path(model)
         self._hold(pin, path, read_file(pin, path), joint_names)
 
     @classmethod

@@ -44,18 +44,18 @@ _NUMBER, _FLOAT, _ELEMENT, _PIXEL = 8, 4, 500, 3
 _UNITS = {"k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40, "p": 2**50, "e": 2**60}
 
 
-def checked_file(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
+def checked_path(model: AnyPath, menagerie: AnyPath | None = None) -> Path:
     """Return the file of a model by its name or path, after `check_model_file`.
 
     Args:
-        name: See `models.resolve`.
+        model: See `models.resolve`.
         menagerie: See `models.resolve`.
 
     Raises:
         ModelFileError, UnknownNameError, MissingEngineError: As `models.resolve`.
         ModelError: As `check_model_file`.
     """
-    path = resolve(name, menagerie)
+    path = resolve(model, menagerie)
     check_model_file(path)
     return path
 
@@ -88,19 +88,19 @@ def check_model_file(path: Path) -> None:
                 waiting.append(part)
 
 
-def _check_elements(main: Path, file: Path, root: Element) -> None:
+def _check_elements(path: Path, file: Path, root: Element) -> None:
     """Raise ModelError if an element of a file asks for what no engine should be given.
 
     Args:
-        main: The model's file.
-        file: `main`, or one that it includes.
+        path: The model's file.
+        file: `path`, or one that it includes.
         root: Of that file.
     """
     folders = {value for element in root.iter() for value in _folders_of(element)}
     for element in root.iter():
         for attribute, value in element.attrib.items():
             if attribute.startswith(_FILES):
-                _check_named_file(main, file, element, attribute, value, folders)
+                _check_named_file(path, file, element, attribute, value, folders)
             elif _SUSPECT.search(value):
                 _check_numbers(file, element, attribute, value)
         _check_memory(file, element)
@@ -122,13 +122,13 @@ def _folders_of(element: Element) -> Iterator[str]:
 
 
 def _check_named_file(
-    main: Path, file: Path, element: Element, attribute: str, name: str, folders: set[str]
+    path: Path, file: Path, element: Element, attribute: str, name: str, folders: set[str]
 ) -> None:
     """Raise ModelError if what an element names is there and is not a file.
 
     Args:
-        main: The model's file.
-        file: That of the element; `main`, or one that it includes.
+        path: The model's file.
+        file: That of the element; `path`, or one that it includes.
         element: With the name.
         attribute: That holds it.
         name: As it is written.
@@ -137,11 +137,11 @@ def _check_named_file(
     names = {name, Path(name).name}  # <compiler strippath="true"> has the last part alone
     places = [
         Path(start, folder, part)
-        for start in {main.parent, file.parent}
+        for start in {path.parent, file.parent}
         for folder in {"", *folders}
         for part in names
     ]
-    places += mesh_places(name, main.parent)
+    places += mesh_places(name, path.parent)
     found = [kind for kind in map(what_is_there, places) if kind not in ("nothing", "a file")]
     special = [kind for kind in found if kind != "a folder"]
     is_folder = bool(found) and bool(name) and not any(_is_file(place) for place in places)

@@ -80,11 +80,11 @@ def check_is_file(path: Path, error: Callable[[str], Exception] = BadInputError)
         raise error(f"{path} is {kind}, not a file")
 
 
-def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
+def resolve(model: AnyPath, menagerie: AnyPath | None = None) -> Path:
     """Find the file of a model: everything that reads one asks here.
 
     Args:
-        name: One of `model_names()`, a path to an .xml, .mjcf, .urdf or .mjb file, or
+        model: One of `model_names()`, a path to an .xml, .mjcf, .urdf or .mjb file, or
             "menagerie:NAME" or "robot_descriptions:NAME" of the packages of these names.
         menagerie: A menagerie folder. Given, names are looked up there ("so101/scene"
             as robotstudio_so101/scene.xml) and not among ours.
@@ -99,30 +99,30 @@ def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
         MissingEngineError: The package of robots is not installed.
         TypeError: It is not text and no path.
     """
-    path = _file(name, menagerie)
+    path = _path_of(model, menagerie)
     refuse_xacro(path)
     return path
 
 
-def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
+def _path_of(model: AnyPath, menagerie: AnyPath | None) -> Path:
     """Find the file of a model, whatever is in it; see `resolve`."""
-    text = _as_text(name)
+    text = _as_text(model)
     if is_named(text) and (menagerie is None or ":" in text):
-        from .robot_packages import file_of
+        from .robot_packages import path_of_robot
 
-        return file_of(text)
+        return path_of_robot(text)
     try:
         path = Path(text).expanduser()
         path.is_file()
     except (OSError, RuntimeError) as error:  # too long a name, no such user, no permission
         raise ModelFileError(f"{text[:80]!r} cannot be a model file: {error}") from None
     if path.suffix.lower() in SUFFIXES:
-        return path.absolute() if path.is_file() else _file_of_a_known_model(text, menagerie)
+        return path.absolute() if path.is_file() else _path_of_name(text, menagerie)
     if menagerie is not None:
         return _in_menagerie(text, Path(menagerie).expanduser())
-    ours = text if "/" in text else f"{text}/{text}"
-    if ours in model_names():
-        return models_dir() / f"{ours}.xml"
+    name = text if "/" in text else f"{text}/{text}"
+    if name in model_names():
+        return models_dir() / f"{name}.xml"
     if path.suffix.lower() == _XACRO_SUFFIX and path.is_file():
         raise ModelError(_is_xacro(path))
     if path.is_dir():
@@ -134,25 +134,25 @@ def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
     raise unknown_name("model", text, model_names())
 
 
-def _file_of_a_known_model(text: str, menagerie: AnyPath | None) -> Path:
+def _path_of_name(name: str, menagerie: AnyPath | None) -> Path:
     """Return the file of a model whose name has the suffix of a file, as pages print it.
 
     Raises:
         ModelFileError: There is no such model, of ours or in the menagerie.
     """
-    if menagerie is None and text.removesuffix(".xml") in model_names():
-        return models_dir() / text
-    if menagerie is not None and (Path(menagerie).expanduser() / text).is_file():
-        return (Path(menagerie).expanduser() / text).absolute()
-    kind = what_is_there(Path(text).expanduser())
+    if menagerie is None and name.removesuffix(".xml") in model_names():
+        return models_dir() / name
+    if menagerie is not None and (Path(menagerie).expanduser() / name).is_file():
+        return (Path(menagerie).expanduser() / name).absolute()
+    kind = what_is_there(Path(name).expanduser())
     what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
-    raise ModelFileError(f"model file {text} {what}")
+    raise ModelFileError(f"model file {name} {what}")
 
 
-def _as_text(name: AnyPath) -> str:
-    text = os.fspath(name) if isinstance(name, os.PathLike) else name
+def _as_text(model: AnyPath) -> str:
+    text = os.fspath(model) if isinstance(model, os.PathLike) else model
     if not isinstance(text, str):
-        raise TypeError(f"a model is given by its name or a path; got {shown(name)}")
+        raise TypeError(f"a model is given by its name or a path; got {shown(model)}")
     if "\0" in text or not text.strip():
         raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
     if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):
@@ -318,17 +318,17 @@ def mesh_places(name: str, folder: Path) -> Iterator[Path]:
             yield up / rest
 
 
-def included_file(name: str, main: Path, includer: Path) -> Path | None:
+def included_file(name: str, path: Path, includer: Path) -> Path | None:
     """The file that an MJCF includes, or None where there is none.
 
-    MuJoCo looks in the folder of the main file, then in that of the file with the <include>.
+    MuJoCo looks in the folder of the model's file, then in that of the file with the <include>.
 
     Args:
         name: As the <include> has it.
-        main: The main file.
+        path: The model's file.
         includer: The file with the <include>.
     """
-    choices = [file.parent / name for file in (main, includer) if name]
+    choices = [file.parent / name for file in (path, includer) if name]
     return next((choice for choice in choices if choice.is_file()), None)
 
 

@@ -30,7 +30,7 @@ _GIT = {
 }
 
 
-def file_of(text: str) -> Path:
+def path_of_robot(text: str) -> Path:
     """Return the file of a robot that is given by such a name; downloaded if it is not there yet.
 
     Raises:

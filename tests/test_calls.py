@@ -409,7 +409,7 @@ def test_every_call_of_the_backend_says_its_client() -> None:
     from statemachine.engines.pybullet import calls as watched
 
     folder = Path(backends.__file__).parent
-    files = [*folder.glob("_bullet_*.py"), folder / "pybullet_backend.py"]
+    files = [*(folder / "bullet").glob("*.py"), folder / "pybullet_backend.py"]
     found = []
     for node in itertools.chain.from_iterable(
         ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for path in files

@@ -147,7 +147,7 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
     ):
         file = str(written(files / name, (files / "arm.xml").read_text()))
         (side,) = parse_sides([file + more])
-        assert (side.file, side.engine, dict(side.options)) == (file, "mujoco", options)
+        assert (side.model, side.engine, dict(side.options)) == (file, "mujoco", options)
 
 
 @pytest.mark.parametrize(
@@ -457,7 +457,7 @@ def test_words_are_sorted_into_what_and_sides() -> None:
 def test_the_command_shows_both_loops(files: Path, here: Cli) -> None:
     words = ("own.py:feedback", "--every", "2", "arm.xml", "heavy.xml", "--seconds", "0.4")
     result = json.loads(here("compare", *words, "--json").stdout)
-    assert [side["file"] for side in result["sides"]] == ["arm.xml", "heavy.xml"]
+    assert [side["model"] for side in result["sides"]] == ["arm.xml", "heavy.xml"]
     assert result["commands"] == "its own"
     assert result["open_loop"]["agreements"] != result["comparison"]["agreements"]
     assert result["comparison"]["left"]["short"] == "arm.xml"

@@ -137,3 +137,179 @@ def test_no_private_name_of_support_is_imported() -> None:
             if isinstance(node, ast.ImportFrom) and node.level:
                 private = [alias.name for alias in node.names if alias.name.startswith("_")]
                 assert private == [], f"{file.name} imports {private} of {node.module}"
+
+
+# Who imports MuJoCo: what keeps the contract on it, and what drives it without us.
+
+_OF_MUJOCO = ("backends/mujoco", "backends/compiled", "backends/served/", "engines/mujoco/")
+# It shrinks: what the others need of a compiled model they ask `backends/compiled*`.
+_STILL_IMPORTS_MUJOCO = {
+    "backends/bullet/constraints.py",
+    "backends/bullet/contacts.py",
+    "backends/bullet/driven.py",
+    "backends/bullet/drives.py",
+    "backends/bullet/joint_dynamics.py",
+    "backends/bullet/plan.py",
+    "backends/bullet/scope.py",
+    "backends/bullet/soft.py",
+    "backends/bullet/ties.py",
+    "backends/bullet/urdf.py",
+    "backends/bullet/weights.py",
+    "backends/bullet/world.py",
+    "backends/pybullet_backend.py",
+    "backends/reading.py",
+    "backends/repairs.py",
+    "backends/spec_files.py",
+}
+
+
+def imports_mujoco(tree: ast.Module) -> bool:
+    """Tell whether a module imports MuJoCo; for type checking alone counts, too."""
+    modules = list[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            modules += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            modules.append(str(node.module))
+    return any(module.split(".")[0] == "mujoco" for module in modules)
+
+
+def test_mujoco_is_imported_in_its_rooms_alone() -> None:
+    importing = {
+        path
+        for path, source in _sources().items()
+        if "import" in source and "mujoco" in source and imports_mujoco(ast.parse(source))
+    }
+    assert "backends/mujoco_backend.py" in importing
+    elsewhere = {path for path in importing if not path.startswith(_OF_MUJOCO)}
+    assert elsewhere == _STILL_IMPORTS_MUJOCO
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("import mujoco", True),
+        ("import numpy, mujoco.viewer as viewer", True),
+        ("def f():\n    from mujoco import MjModel", True),
+        ("if TYPE_CHECKING:\n    import mujoco", True),
+        ("from .mujoco import alarms", False),
+        ("from ..engines import mujoco", False),
+        ("import mujoco_menagerie", False),
+    ],
+)
+def test_an_import_of_mujoco_is_seen(code: str, expected: bool) -> None:
+    assert imports_mujoco(ast.parse(code)) is expected
+
+
+# A file is one concept.
+
+_MOST_LINES = 400
+# Why each is longer; one that was split fails here, and goes.
+_LONGER = {
+    "backends/bullet/urdf.py": "not split yet",
+    "backends/bullet/world.py": "not split yet",
+    "backends/repairs.py": "not split yet",
+    "backends/served/release_backend.py": "not split yet",
+    "course/grading/classroom.py": "not split yet",
+    "course/grading/faults/run.py": "not split yet",
+    "engines/__init__.py": "one list: what is asked of the room of an engine",
+    "lab/recordings/recorder.py": "not split yet",
+    "lab/robots/records.py": "not split yet",
+    "lab/why/setup.py": "not split yet",
+    "processes/sandbox.py": "not split yet",
+    "show/blocks.py": "one list: every block that a page may have",
+    "show/terminal.py": "not split yet",
+    "view/session.py": "not split yet",
+}
+
+
+def test_a_file_has_at_most_400_lines() -> None:
+    longer = {path for path, source in _sources().items() if source.count("\n") > _MOST_LINES}
+    assert longer == set(_LONGER)
+
+
+# What is private stays in its module, and a private module in its folder.
+
+
+def private_imports(tree: ast.Module, neighbours: frozenset[str]) -> set[str]:
+    """Return the private names of the package that a module imports from another one.
+
+    Args:
+        tree: Of the module.
+        neighbours: Names of the modules beside it: it may import a private one of them.
+    """
+    private = set[str]()
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        parts = (node.module or "").split(".")
+        if not node.level and parts[0] != PACKAGE.name:
+            continue
+        modules, names = set(parts), {alias.name for alias in node.names}
+        if node.level == 1 and node.module is None:  # `from . import _name`, a module or not
+            names -= neighbours
+        elif node.level == 1 and len(parts) == 1:
+            modules -= neighbours
+        private |= {name for name in modules | names if re.match(r"_(?!_)", name)}
+    return private
+
+
+def test_no_private_name_is_imported_from_another_module() -> None:
+    paths = [*_sources()]
+    importing = dict[str, set[str]]()
+    for path, source in _sources().items():
+        folder, _, _ = path.rpartition("/")
+        beside = {other.rpartition("/")[2] for other in paths if other.rpartition("/")[0] == folder}
+        neighbours = frozenset(name.removesuffix(".py") for name in beside)
+        importing[path] = private_imports(ast.parse(source), neighbours)
+    assert {path: names for path, names in importing.items() if names} == {}
+
+
+@pytest.mark.parametrize(
+    ("code", "private"),
+    [
+        ("from .data import _Input", {"_Input"}),
+        ("from ..backends.compiled import _problems, facts", {"_problems"}),
+        ("from . import _constant", {"_constant"}),
+        ("from ..lessons._robot import arm", {"_robot"}),
+        ("from statemachine.models import _path_of", {"_path_of"}),
+        ("from . import _beside", set()),
+        ("from ._beside import name", set()),
+        ("from os import _exit", set()),
+        ("from .. import __version__", set()),
+    ],
+)
+def test_an_import_of_a_private_name_is_seen(code: str, private: set[str]) -> None:
+    assert private_imports(ast.parse(code), frozenset({"_beside", "data"})) == private
+
+
+# A stranger who reads only the tree knows what each folder is for.
+
+
+def test_every_folder_says_in_a_sentence_what_it_is_for() -> None:
+    folders = {path.rpartition("/")[0] for path in _sources()}
+    assert len(folders) > 30
+    for folder in folders:
+        source = _sources().get(f"{folder}/__init__.py".lstrip("/"), "")
+        says = (ast.get_docstring(ast.parse(source)) or "").split("\n")[0]
+        assert len(says.split()) >= 3, f"{folder} says nothing of itself"
+        assert says[-1] in ".?", f"what {folder} says of itself is no sentence"
+
+
+@pytest.mark.parametrize("floor", ["lab", "course"])
+def test_every_room_of_a_floor_is_on_the_map(floor: str) -> None:
+    """Of the floors of the package itself `test_architecture` holds that."""
+    table = [
+        line
+        for line in (ROOT / "docs" / "architecture.md").read_text("utf-8").split("\n")
+        if line.startswith("|")
+    ]
+    rooms = {path.split("/")[1] for path in _sources() if re.match(rf"{floor}/\w+/", path)}
+    assert len(rooms) >= 2
+    named = {
+        room
+        for room in rooms
+        for line in table
+        if f"`{floor}/{room}/`" in line or (f"`{floor}/`" in line and f"`{room}/`" in line)
+    }
+    assert rooms - named == set()

@@ -24,7 +24,7 @@ from statemachine.lab.recordings import read
 from statemachine.lab.robots.table import read_table
 from statemachine.lab.runs import controllers
 from statemachine.lab.sweep import read_manifest
-from statemachine.model_files import check_model_file, checked_file
+from statemachine.model_files import check_model_file, checked_path
 
 from .support.claims import refused
 from .support.files import written
@@ -99,7 +99,7 @@ def test_a_number_that_is_not_finite_is_refused_by_element_and_attribute(
     says = rf"{re.escape(says)} '{re.escape(word)}', which is not a finite number"
     refused(
         (ModelError, says, lambda: sm.load(file)),
-        (ModelError, says, lambda: checked_file(file)),
+        (ModelError, says, lambda: checked_path(file)),
     )
 
 

@@ -25,10 +25,10 @@ PACKAGE = ROOT / "statemachine"
 
 # What a question guards that a type checker does not follow: `hasattr`, or an import that may fail.
 GUARDED = {
-    ("backends/bullet_client.py", "memfd_create"),
+    ("backends/bullet/client.py", "memfd_create"),
     ("backends/hidden_world.py", "register_at_fork"),
     ("interface/turns.py", "register_at_fork"),
-    ("backends/child_server.py", "poll"),
+    ("backends/served/child_server.py", "poll"),
     ("processes/__init__.py", "resource"),  # there is no /proc
     ("processes/__init__.py", "sysconf"),
     ("processes/sandbox.py", "SIGKILL"),  # a return code below zero is POSIX's

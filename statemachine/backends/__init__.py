@@ -9,12 +9,12 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import inspect
-import os
 import warnings
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
@@ -22,7 +22,7 @@ from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..interface.checks import as_switch
 from ..interface.records import AS_WRITTEN, Defaults, ReadOptions
-from ..model_files import checked_file
+from ..model_files import checked_path
 from ..models import AnyPath
 from ..release_names import is_release, version_of
 from .binary import is_binary, read_binary
@@ -75,7 +75,7 @@ class Loader(Protocol):
     takes `read_options`, too.
     """
 
-    def __call__(self, path: os.PathLike[str], defaults: Defaults) -> Model: ...
+    def __call__(self, path: Path, defaults: Defaults) -> Model: ...
 
 
 # Where each is, as "package.module:function"; ours go by the names of their engines.
@@ -143,7 +143,7 @@ def parse_backend(word: str) -> BackendChoice:
 
 
 def backend_engine(name: str) -> str | None:
-    """The engine (a key of `engines.ENGINES`) that a backend needs.
+    """The engine (a key of `installed.ENGINES`) that a backend needs.
 
     Raises:
         UnknownNameError: There is no such backend.
@@ -231,7 +231,7 @@ def load(
         )
     place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))
-    path = checked_file(model, menagerie)
+    path = checked_path(model, menagerie)
     if as_switch(trust_binary, "trust_binary") and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
     if backend in ENGINES:

@@ -7,13 +7,12 @@ an `mjModel`, and give its Model the facts that every other backend gives:
         raw = compile_file(path)
     model = MyModel(raw=..., backend="mine", ..., **facts(raw))
 
-For `Model.replace`, `_edits` has a copy with other options (`edited`).
+For `Model.replace`, `edits` has a copy with other options (`edited`).
 """
 
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -27,7 +26,6 @@ from ..errors import BadInputError, EngineWarning, ModelError, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..interface.records import AS_WRITTEN, ReadOptions
-from ..models import AnyPath
 from .actuators import control_names, delay_steps, servos
 from .binary import is_binary, read_binary
 from .controls import ctrl_owners
@@ -79,7 +77,7 @@ def compiler_warnings() -> Iterator[list[str]]:
         texts[:] = [text for text in texts if " Time = " not in text]
 
 
-def compile_file(path: AnyPath, options: ReadOptions = AS_WRITTEN) -> mujoco.MjModel:
+def compile_file(path: Path, options: ReadOptions = AS_WRITTEN) -> mujoco.MjModel:
     """Compile an MJCF, URDF or MJB file; the suffix ".mjb" says that it is binary.
 
     Static bodies that are fused with their parents, as those of a URDF are behind fixed joints,
@@ -95,18 +93,17 @@ def compile_file(path: AnyPath, options: ReadOptions = AS_WRITTEN) -> mujoco.MjM
             with a number that no step can be taken with; or the file is binary, and nobody
             said that it is to be trusted (see `binary`).
     """
-    text = os.fspath(path)
-    if is_binary(text):
-        raw, effects = _from_binary(text, read_binary(text), options), list[str]()
+    if is_binary(path):
+        raw, effects = _from_binary(path, read_binary(path), options), list[str]()
     else:
-        raw, effects = _compile_xml(Path(text), options)
-    check_numbers(raw, text)
+        raw, effects = _compile_xml(path, options)
+    check_numbers(raw, str(path))
     if doubtful := [*_doubtful(raw), *effects]:
-        warnings.warn(f"{text}: {'; '.join(doubtful)}", EngineWarning, stacklevel=4)
+        warnings.warn(f"{path}: {'; '.join(doubtful)}", EngineWarning, stacklevel=4)
     return raw
 
 
-def _from_binary(path: str, content: bytes, options: ReadOptions) -> mujoco.MjModel:
+def _from_binary(path: Path, content: bytes, options: ReadOptions) -> mujoco.MjModel:
     """Read a binary model, of which `content` is all.
 
     Raises:

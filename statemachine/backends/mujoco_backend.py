@@ -107,7 +107,7 @@ _COMPONENTS = {
 
 
 def load(
-    path: AnyPath, defaults: Defaults = "model", read_options: ReadOptions = AS_WRITTEN
+    path: Path, defaults: Defaults = "model", read_options: ReadOptions = AS_WRITTEN
 ) -> MujocoModel:
     """Compile an MJCF, URDF or MJB file.
 
@@ -126,7 +126,7 @@ def load(
     if defaults == "model":
         raw.opt.disableflags |= int(_DISABLE.mjDSBL_AUTORESET)
     pass_on(texts, stacklevel=4)
-    return MujocoModel(raw, Path(path), substeps=1)
+    return MujocoModel(raw, path, substeps=1)
 
 
 class MujocoModel(Model):

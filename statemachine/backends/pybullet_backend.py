@@ -30,7 +30,6 @@ from ..interface.checks import HUGE
 from ..interface.options import checked_options
 from ..interface.records import AS_WRITTEN, Defaults, ReadOptions
 from ..measures.text import few
-from ..models import AnyPath
 from . import edits as _edits
 from .bullet.client import MOST_CLIENTS
 from .bullet.driven import Act, DrivenWorld
@@ -137,7 +136,7 @@ def _bound(max_qvel: Array | None) -> str:
 
 
 def load(
-    path: AnyPath,
+    path: Path,
     defaults: Defaults = "model",
     options: Mapping[str, Any] = MappingProxyType({}),
     read_options: ReadOptions = AS_WRITTEN,
@@ -173,10 +172,10 @@ def load(
     if checked:
         timestep = _edits.step_length(float(raw.opt.timestep), substeps, checked)
         raw = _edits.edited(raw, checked, timestep)
-    file = UrdfFile.read(Path(path), read_options) if defaults == "engine" else None
+    file = UrdfFile.read(path, read_options) if defaults == "engine" else None
     plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
-    model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
+    model = PybulletModel(plan, path, substeps, defaults, checked.get("max_qvel"))
     # What PyBullet cannot read shows now.
     World(plan, model._kind).close()
     if defaults == "model":

@@ -30,7 +30,7 @@ def reason_of(error: BaseException) -> str:
 def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
     """Read an MJCF or a URDF file, and compile nothing.
 
-    Meshes of a URDF that MuJoCo would not find are looked up as `_file_text` says.
+    Meshes of a URDF that MuJoCo would not find are looked up as `file_text` says.
 
     Args:
         path: The file.

@@ -1,4 +1,4 @@
-"""The command line. Nothing heavy is imported before a command needs it."""
+"""The command line: a file or a folder for each command, which imports nothing heavy early."""
 
 from __future__ import annotations
 

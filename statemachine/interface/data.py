@@ -26,7 +26,7 @@ _SLOTS = ("__weakref__", "_home", "_turn", "_trouble", "_layout", *_ENGINE, *_WR
 
 if TYPE_CHECKING:
 
-    class _Input:
+    class InputArray:
         """An input as a type checker sees it: read as an array, assigned array-likes."""
 
         def __get__(self, data: object, owner: object) -> Array: ...
@@ -95,11 +95,11 @@ class Data(Closable, ABC):
     _warned: Any  # differs from `_told` when the engine has something to say
     _told: Any
     if TYPE_CHECKING:
-        qpos = _Input()
-        qvel = _Input()
-        ctrl = _Input()
-        mocap_pos = _Input()
-        mocap_quat = _Input()
+        qpos = InputArray()
+        qvel = InputArray()
+        ctrl = InputArray()
+        mocap_pos = InputArray()
+        mocap_quat = InputArray()
         time = _Time()
     else:
 

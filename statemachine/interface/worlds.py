@@ -36,7 +36,7 @@ from .records import (
 from .turns import Closable, Turn
 
 if TYPE_CHECKING:
-    from .data import _Input
+    from .data import InputArray
 
 BATCHED = (*POSES, "qacc", *FORCES)  # the derived arrays that worlds can keep
 WRITABLE = (*INPUTS, *MOCAP, "time")
@@ -85,12 +85,12 @@ class Worlds(Closable, ABC):
     _turn: Turn
     _trouble: str
     if TYPE_CHECKING:
-        qpos = _Input()
-        qvel = _Input()
-        ctrl = _Input()
-        mocap_pos = _Input()
-        mocap_quat = _Input()
-        time = _Input()
+        qpos = InputArray()
+        qvel = InputArray()
+        ctrl = InputArray()
+        mocap_pos = InputArray()
+        mocap_quat = InputArray()
+        time = InputArray()
         xpos: Array
         xquat: Array
         site_xpos: Array

@@ -1,6 +1,6 @@
 """A page: what a command has to say, free of how it is shown.
 
-Lessons, comparisons, probes and gradings make pages; `report` turns them into text for a
+Lessons, comparisons, probes and gradings make pages; `show` turns them into text for a
 terminal and into other media.
 """
 

@@ -8,7 +8,6 @@ engine there makes of the file, and edits reach it by the names of fields.
 from __future__ import annotations
 
 import copy
-import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
@@ -25,7 +24,6 @@ from ...interface import Capabilities
 from ...interface.checks import unsupported_by
 from ...interface.read_options import told
 from ...interface.records import AS_WRITTEN, Arrays, Defaults, ReadOptions
-from ...models import AnyPath
 from ...release_names import is_release, version_of
 from ...releases import python_of
 from ..binary import is_binary
@@ -58,7 +56,7 @@ _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mj
 
 
 def load(
-    path: AnyPath,
+    path: Path,
     defaults: Defaults = "model",
     read_options: ReadOptions = AS_WRITTEN,
     *,
@@ -92,9 +90,9 @@ def served(
     """
 
     def load_there(
-        path: AnyPath, defaults: Defaults = "model", read_options: ReadOptions = AS_WRITTEN
+        path: Path, defaults: Defaults = "model", read_options: ReadOptions = AS_WRITTEN
     ) -> ServedModel:
-        if is_binary(os.fspath(path)):
+        if is_binary(path):
             raise ModelError(
                 f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML"
             )

@@ -1,6 +1,6 @@
 """What is read alike of every release of MuJoCo: contacts, parts of the constraint forces, fields.
 
-The backend imports it. In the Python of another release `_release_child` runs it: so it needs NumPy
+The backend imports it. In the Python of another release `release_child` runs it: so it needs NumPy
 and MuJoCo only, on Python 3.9 or later, and imports nothing of this package.
 """
 

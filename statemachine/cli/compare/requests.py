@@ -102,7 +102,7 @@ def run_of(options: argparse.Namespace) -> Request:
         common["timestep"] = options.timestep
     model = None
     if len(sides) == 1:  # of both engines
-        model = sides[0].file
+        model = sides[0].model
         common |= sides[0].options
         sides = ()
     _check_options_of_run(options, what, sides)
@@ -154,7 +154,7 @@ def _with_parts(
     """Return two sides, each with the parts that it has of the other."""
     of_left = [part for part in PARTS if getattr(options, part) == "left"]
     of_right = [part for part in PARTS if getattr(options, part) == "right"]
-    back = {there: here for here, there in names.items()}
+    back = {right_name: left_name for left_name, right_name in names.items()}
     return left.taking(of_right, right, back), right.taking(of_left, left, names)
 
 
@@ -191,22 +191,22 @@ def _models_request_of(options: argparse.Namespace) -> ModelsRequest:
     words = [*options.what, *options.models]
     sides = [side for word in words for side in parse_sides([word], options.menagerie)]
     # The file itself, unless an engine is named.
-    engines = [None if s.file == word else s.engine for s, word in zip(sides, words, strict=True)]
+    engines = [None if s.model == word else s.engine for s, word in zip(sides, words, strict=True)]
     if options.backend and any(engines):
         raise BadInputError("--backend and FILE@ENGINE say the same: give one of them")
     if any(side.options for side in sides):
         raise BadInputError("--models compares what the files say, without options of a run")
-    files = [side.file for side in sides]
+    models = [side.model for side in sides]
     if options.backend:
         engines = [backend.name for backend in chosen_backends(options.backend)]
-        if len(files) == 1:
-            files *= 2
-    if len(files) != 2 or len(engines) != 2:
+        if len(models) == 1:
+            models *= 2
+    if len(models) != 2 or len(engines) != 2:
         raise BadInputError(
             f"--models wants two models, or one and --backend A --backend B; got {len(words)}"
         )
     return ModelsRequest(
-        files=(files[0], files[1]),
+        models=(models[0], models[1]),
         engines=(engines[0], engines[1]),
         frames=pairs_of(options.frame, "--frame"),
         names=pairs_of(options.map, "--map"),

@@ -1,6 +1,6 @@
 """The lessons: what each is called, asks and takes. Importing this loads no engine.
 
-A lesson is a page `NAME.md`, a template (see `lesson_template`), and a module `NAME.py` with these
+A lesson is a page `NAME.md`, a template (see `show/lesson_template.py`), and a module `NAME.py` of
 functions, in the order in which one reads them: `code(model, options, load)` is what a student
 types for a Model, where `load` is the call that loads it; `run(play, options, progress)` calls
 `play` (a `session.CodeRun`) once, which runs that code, looks on, and returns what was measured;

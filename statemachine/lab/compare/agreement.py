@@ -265,11 +265,11 @@ def _motion(left: Trace, right: Trace, least: LeastMotion, until: float) -> Moti
         least: By kind of quantity, what is no motion.
         until: The last moment that counts [s from the start].
     """
-    theirs = right.header.joint_labels
+    right_names = right.header.joint_labels
     names = [
         name
         for name in left.header.joint_labels
-        if name in theirs
+        if name in right_names
         and joint_columns(left.header, name).kind is joint_columns(right.header, name).kind
     ]
     return motion_of([(left, names), (right, names)], least, until)

@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...backends import load
+from ...engines.records import Pairs
 from ...errors import StateMachineError, TraceError
 from ...interface import MOCAP, Array, Data, Model
 from ..recordings import Header, SideStart, Trace, model_file, start_of
 from ..recordings.recorder import layout_of
 from ..runs.scenarios import Controller
-from .matching import Matched, Pairs, match_models
+from .matched import Matched
+from .matching import match_models
 from .sides import Request, Side
 
 
@@ -27,39 +29,40 @@ def match_sides(
     sides: Sequence[Side], left: Model, right: Model, names: Mapping[str, str]
 ) -> Matched | None:
     """Which is which; None for one file, of which every engine has the same ids."""
-    left_side, right_side = sides
-    if left_side.path == right_side.path and not names and left.joint_names == right.joint_names:
+    if left.path == right.path and not names and left.joint_names == right.joint_names:
         return None
     matched = match_models(left, right, names)
     if not matched.joints and left.njnt and right.njnt:
         raise TraceError(
-            f"{left_side.label} and {right_side.label} have no joint in common, by name or by "
+            f"{sides[0].label} and {sides[1].label} have no joint in common, by name or by "
             "place: name one with --map LEFT=RIGHT"
         )
     return matched
 
 
 def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, Trace]:
-    """Both runs with the names of the first; commands in its order where both have all of them.
+    """Both runs with the names of the left; commands in its order where both have all of them.
 
-    What a joint, body or site of the first is called, its counterpart is called too. One
+    What a joint, body or site of the left is called, its counterpart is called too. One
     without a counterpart whose name is taken is "NAME (right)". Where a joint has none, the
     energies, which are of all that can move, are left out.
 
     Args:
-        left: A run of the first Model.
-        right: A run of the second.
+        left: A run of the left Model.
+        right: A run of the right one.
         matched: Which is which.
     """
-    a, b = left.header, right.header
-    left_header = replace(a, joints=a.joint_labels, bodies=a.body_labels)
-    right_header = _named_as(left_header, b, matched)
+    left_header = left.header
+    left_header = replace(
+        left_header, joints=left_header.joint_labels, bodies=left_header.body_labels
+    )
+    right_header = _named_as(left_header, right.header, matched)
     left_columns, right_columns = dict(left.columns), dict(right.columns)
     if any(only.get("joint") for only in matched.only):
         left_columns.pop("energy", None)
         right_columns.pop("energy", None)
-    order = [there for _, there in matched.actuators]
-    if len(order) == a.nu == b.nu:
+    order = [right_id for _, right_id in matched.actuators]
+    if len(order) == left_header.nu == right_header.nu:
         right_columns["ctrl"] = right_columns["ctrl"][:, order]
         right_header = _with_actuators_in(order, right_header)
     return Trace(left_header, left_columns), Trace(right_header, right_columns)
@@ -82,13 +85,13 @@ def _with_actuators_in(order: Sequence[int], header: Header) -> Header:
     return replace(header, actuators=actuators, actuator_jntid=joints, ctrlrange=ranges)
 
 
-def translated(trace: Trace, matched: Matched, start: SideStart) -> Trace:
-    """Return the start and the commands of a run of the first Model, as the second takes them.
+def translated(trace: Trace, matched: Matched, right_start: SideStart) -> Trace:
+    """Return the start and the commands of a run of the left Model, as the right takes them.
 
     Args:
         trace: The run.
         matched: Which is which.
-        start: Qpos (nq,), qvel (nv,) and ctrl (nu,) of the second, for what the first has no
+        right_start: Qpos (nq,), qvel (nv,) and ctrl (nu,) of the right, for what the left has no
             counterpart of.
     """
     recorded = SideStart(trace.qpos, trace.qvel, trace.ctrl)
@@ -98,15 +101,15 @@ def translated(trace: Trace, matched: Matched, start: SideStart) -> Trace:
         for name, pose in poses.items()
         if name in trace
     }
-    return replace_layout(trace, matched.right, *matched.start(recorded, start), led)
+    return replace_layout(trace, matched.right, *matched.start(recorded, right_start), led)
 
 
 def for_left(trace: Trace, model: Model, request: Request) -> Trace:
     """A trace as one of the left's Model; matched by the model that it was recorded with."""
     header = trace.header
-    own = layout_of(model)
+    layout = layout_of(model)
     compared = ("joints", "actuators", "jnt_type", "nmocap")
-    if all(getattr(header, name) == own[name] for name in compared):
+    if all(getattr(header, name) == layout[name] for name in compared):
         led = {name: trace[name] for name in MOCAP if name in trace}
         return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, led)
     try:
@@ -124,26 +127,26 @@ def in_terms_of_right(left: Trace, right: Trace, matched: Matched | None) -> Tra
     """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
     if matched is None:
         return left
-    start = SideStart(right.qpos[0], right.qvel[0], right.ctrl[0])
-    return translated(left, matched, start)
+    right_start = SideStart(right.qpos[0], right.qvel[0], right.ctrl[0])
+    return translated(left, matched, right_start)
 
 
-def same_commands(theirs: Trace, right: Trace) -> bool:
+def same_commands(left: Trace, right: Trace) -> bool:
     """Whether the right was told what the left was, from the same start."""
     return (
-        np.array_equal(theirs.qpos[0], right.qpos[0])
-        and np.array_equal(theirs.qvel[0], right.qvel[0])
-        and commands_alike(theirs, right)
+        np.array_equal(left.qpos[0], right.qpos[0])
+        and np.array_equal(left.qvel[0], right.qvel[0])
+        and commands_alike(left, right)
     )
 
 
-def commands_alike(theirs: Trace, right: Trace) -> bool:
+def commands_alike(left: Trace, right: Trace) -> bool:
     """Whether the right was told at each of its moments what the left was."""
-    since, times = right.time - right.time[0], theirs.time - theirs.time[0]
-    early = 1e-6 * theirs.timestep  # as `play` has it
+    since, times = right.time - right.time[0], left.time - left.time[0]
+    early = 1e-6 * left.timestep  # as `play` has it
     rows = np.searchsorted(times - early, since, side="right") - 1
     used = since < times[-1] - early  # the command of a last row is never carried out
-    return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
+    return np.array_equal(left.ctrl[rows[used]], right.ctrl[used])
 
 
 def replace_layout(
@@ -161,18 +164,22 @@ def with_bodies_of(trace: Trace, model: Model) -> Trace:
     return Trace(replace(trace.header, bodies=model.body_names), trace.columns)
 
 
-def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[str, ...]:
-    """The names of the second, those of the first for what both have."""
-    names = list(theirs)
+def _renamed(
+    left_names: Sequence[str], right_names: Sequence[str], pairs: Pairs
+) -> tuple[str, ...]:
+    """The names of the right, those of the left for what both have."""
+    names = list(right_names)
     for k, name in enumerate(names):
-        if name and name in ours:
+        if name and name in left_names:
             names[k] = f"{name} (right)"
-    for left, right in pairs:
-        names[right] = ours[left]
+    for left_id, right_id in pairs:
+        names[right_id] = left_names[left_id]
     return tuple(names)
 
 
-def controller_for_right(controller: Controller, matched: Matched, start: Array) -> Controller:
+def controller_for_right(
+    controller: Controller, matched: Matched, right_start: Array
+) -> Controller:
     """A controller that gives the right what another one gives the left.
 
     Where it gives no command ctrl stays as it is, as it does on the left.
@@ -180,13 +187,13 @@ def controller_for_right(controller: Controller, matched: Matched, start: Array)
     Args:
         controller: Of the left, or one that writes in the order of the left.
         matched: What of the left is what of the right.
-        start: (nu,) ctrl of the right, for the actuators that have no counterpart.
+        right_start: (nu,) ctrl of the right, for the actuators that have no counterpart.
     """
 
     def translate(time: float, data: Data) -> Array | None:
         ctrl = controller(time, data)
         if ctrl is None:
             return None
-        return matched.moved("ctrl", np.asarray(ctrl, np.float64), start)
+        return matched.moved("ctrl", np.asarray(ctrl, np.float64), right_start)
 
     return translate

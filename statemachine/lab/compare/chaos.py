@@ -250,30 +250,32 @@ def _departures(
 
 
 def _departure(
-    draw: Callable[[], Trace], own: Trace, comparison: Comparison, rows: Ints
+    draw: Callable[[], Trace], trace: Trace, comparison: Comparison, rows: Ints
 ) -> _Departure:
     """Make a perturbed run, and measure how far it gets from the run of its side.
 
     Args:
         draw: Makes the run.
-        own: The run of the side as it comes, by the names of the comparison.
+        trace: The run of the side as it comes, by the names of the comparison.
         comparison: Of both sides.
-        rows: (n,) of `own`, at the common moments.
+        rows: (n,) of `trace`, at the common moments.
     """
     run = draw()
-    known = {name: run.columns[name] for name in own.columns if name in run.columns}
-    perturbed = Trace(replace(own.header, ended=run.header.ended), known)
+    known = {name: run.columns[name] for name in trace.columns if name in run.columns}
+    perturbed = Trace(replace(trace.header, ended=run.header.ended), known)
     distances: dict[str, Array] = {}
     try:
-        curves, count = series(own, perturbed, comparison.tip), len(perturbed)
-        for touch in touches(own, perturbed):
-            first, other = touch.left.first, touch.right.first
-            apart = comparison.until if first is None or other is None else abs(first - other)
+        curves, count = series(trace, perturbed, comparison.tip), len(perturbed)
+        for touch in touches(trace, perturbed):
+            left_first, right_first = touch.left.first, touch.right.first
+            apart = comparison.until
+            if left_first is not None and right_first is not None:
+                apart = abs(left_first - right_first)
             distances[f"{touch.pair}{_FIRST_TOUCH}"] = np.array([apart])
     except TraceError:  # it ended at once
-        curves, count = series(own, own, comparison.tip), 0
+        curves, count = series(trace, trace, comparison.tip), 0
     for curve in curves:
-        far = np.full(len(own), np.inf)
+        far = np.full(len(trace), np.inf)
         far[:count] = np.nan_to_num(curve.difference[:count], nan=np.inf)
         distances[curve.name] = far[rows]
     return _Departure(distances, bool(run.header.ended))

@@ -117,12 +117,13 @@ def typed_option(name: str, value: OptionValue | None) -> str:
 
 def _apart(left: Header, right: Header) -> Iterator[Two]:
     """What differs besides the engine, the weightiest first."""
-    a, b = left.provenance, right.provenance
-    if a.model_file != b.model_file:
-        yield files_apart(a.model_file.split("/"), b.model_file.split("/"))
-    elif a.model_sha256 != b.model_sha256:
-        last = a.model_file.split("/")[-1]
-        yield f"{last} ({a.model_sha256[:8]})", f"{last} ({b.model_sha256[:8]})"
+    left_file, right_file = left.provenance.model_file, right.provenance.model_file
+    left_digest, right_digest = left.provenance.model_sha256, right.provenance.model_sha256
+    if left_file != right_file:
+        yield files_apart(left_file.split("/"), right_file.split("/"))
+    elif left_digest != right_digest:
+        last = left_file.split("/")[-1]
+        yield f"{last} ({left_digest[:8]})", f"{last} ({right_digest[:8]})"
     options = options_apart(_with_known(left, right), _with_known(right, left))
     if options[0] != options[1]:
         yield options
@@ -133,8 +134,8 @@ def _apart(left: Header, right: Header) -> Iterator[Two]:
     left_start, right_start = _start_of(left), _start_of(right)
     if left_start != right_start:
         yield f"from {left_start}", f"from {right_start}"
-    if a.seed != b.seed:
-        yield f"seed {a.seed}", f"seed {b.seed}"
+    if left.provenance.seed != right.provenance.seed:
+        yield f"seed {left.provenance.seed}", f"seed {right.provenance.seed}"
 
 
 def _start_of(header: Header) -> str:
@@ -182,28 +183,29 @@ def notes_on(left: Trace, right: Trace, common: Common, of_quantities: Iterable[
 
 
 def _notes_on_files(left: Header, right: Header) -> Iterator[str]:
-    a, b = left.provenance, right.provenance
-    if a.model_sha256 != b.model_sha256:
-        yield f"the two sides use different model files: {a.model_file} and {b.model_file}"
+    left_file, right_file = left.provenance.model_file, right.provenance.model_file
+    if left.provenance.model_sha256 != right.provenance.model_sha256:
+        yield f"the two sides use different model files: {left_file} and {right_file}"
 
 
 def _notes_on_joints(left: Trace, right: Trace, labels: Two) -> Iterator[str]:
-    ours, theirs = left.header.joint_labels, right.header.joint_labels
-    only = [f"{name} ({labels[0]})" for name in ours if name not in theirs]
-    only += [f"{name} ({labels[1]})" for name in theirs if name not in ours]
+    left_names, right_names = left.header.joint_labels, right.header.joint_labels
+    only = [f"{name} ({labels[0]})" for name in left_names if name not in right_names]
+    only += [f"{name} ({labels[1]})" for name in right_names if name not in left_names]
     if only:
         yield f"compared is what both have; missing on one side: {', '.join(only)}"
     other_kind = []
     start_differs = False
-    for name in ours:
-        if name not in theirs:
+    for name in left_names:
+        if name not in right_names:
             continue
-        here, there = joint_columns(left.header, name), joint_columns(right.header, name)
-        if here.kind is not there.kind:
+        left_columns = joint_columns(left.header, name)
+        right_columns = joint_columns(right.header, name)
+        if left_columns.kind is not right_columns.kind:
             other_kind.append(name)
             continue
-        positions = left.qpos[0, here.qpos], right.qpos[0, there.qpos]
-        velocities = left.qvel[0, here.qvel], right.qvel[0, there.qvel]
+        positions = left.qpos[0, left_columns.qpos], right.qpos[0, right_columns.qpos]
+        velocities = left.qvel[0, left_columns.qvel], right.qvel[0, right_columns.qvel]
         if not (np.array_equal(*positions) and np.array_equal(*velocities)):
             start_differs = True
     if other_kind:

@@ -7,160 +7,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from ...backends.controls import ctrl_owners
 from ...engines import room
 from ...engines.description.match import Matching, Pair, match, renamed
 from ...engines.description.records import Robot
 from ...engines.description.shapes import one_to_one
 from ...engines.description.tree import GroupTree
-from ...engines.records import BodyPair, Counterparts, Pairs
+from ...engines.records import BodyPair, Pairs
 from ...errors import BadInputError, check_name
 from ...installed import DEFAULT
-from ...interface import Array, Model, State
+from ...interface import Model
 from ...rotations import HERE, Placement
-from ..recordings import SideStart
+from .matched import Matched, Only
 
-Only = Mapping[str, tuple[str, ...]]
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Matched(Counterparts):
-    """What of one Model is what of another.
-
-    Attributes:
-        left: The first Model.
-        right: The second.
-        bodies: Pairs of ids.
-        only: For each Model what it alone has: names, by "joint", "site" and "actuator".
-        notes: What a reader should know, in sentences.
-    """
-
-    left: Model
-    right: Model
-    bodies: Pairs
-    only: tuple[Only, Only]
-    notes: tuple[str, ...]
-
-    @property
-    def reordered(self) -> bool:
-        """Whether who writes ctrl by number meets other actuators on the second."""
-        places = [b for _, b in self.actuators]
-        return places != sorted(places)
-
-    @property
-    def joints_elsewhere(self) -> bool:
-        """Whether who reads qpos or qvel by number meets other joints on the second."""
-        here, there = self.left, self.right
-        return any(
-            here.jnt_qposadr[a] != there.jnt_qposadr[b] or here.jnt_dofadr[a] != there.jnt_dofadr[b]
-            for a, b in self.joints
-        )
-
-    @property
-    def mocap_elsewhere(self) -> bool:
-        """Whether who moves mocap bodies by number meets others on the second."""
-        ours, theirs = self.places["mocap_pos"]
-        return ours != theirs
-
-    def start(self, left: SideStart, right: SideStart) -> SideStart:
-        """The start of the first Model in the second's terms; the rest is that of `right`."""
-        return SideStart(
-            qpos=self.moved("qpos", left.qpos, right.qpos),
-            qvel=self.moved("qvel", left.qvel, right.qvel),
-            ctrl=self.moved("ctrl", left.ctrl, right.ctrl),
-        )
-
-    def state(self, left: State, right: State) -> State:
-        """The second Model's State `right` with what a State of the first tells of it.
-
-        Beside the time these are the arrays in `places` that both have.
-        """
-        given = {
-            name: self.moved(name, left[name], right[name])
-            for name in self.places
-            if name in dict(left.layout) and name in dict(right.layout)
-        }
-        return right.with_parts(time=left["time"], **given)
-
-    def moved(self, part: str, values: Array, start: Array) -> Array:
-        """An array of the second Model, from that of the first.
-
-        Args:
-            part: Its name in `places`.
-            values: (m,) or (n, m) of the first.
-            start: (k,) of the second, for what has no counterpart.
-        """
-        return _moved(values, start, *self.places[part])
-
-    @cached_property
-    def places(self) -> Mapping[str, list[list[int]]]:
-        """By array of a State, where in it on either side the counterparts are.
-
-        Activations are of actuators that have as many of them.
-        """
-        left, right = self.left.compiled, self.right.compiled
-        activations: Iterable[tuple[int, int]] = ()
-        if left is not None and right is not None:
-            activations = _activations(self.actuators, left, right)
-        mocap_bodies = list(self._mocap_bodies())
-        return {
-            "qpos": self._spans("jnt_qposadr", "nq"),
-            "qvel": self._spans("jnt_dofadr", "nv"),
-            "ctrl": _ends(self.actuators),
-            "act": _ends(activations),
-            "mocap_pos": _ends(_entries(mocap_bodies, 3)),
-            "mocap_quat": _ends(_entries(mocap_bodies, 4)),
-        }
-
-    def _mocap_bodies(self) -> Iterator[tuple[int, int]]:
-        """Yield the numbers of mocap bodies, as `body_mocapid` has them, that are counterparts."""
-        for pair in self.solids:
-            here = int(self.left.compiled.body_mocapid[pair.left])
-            there = int(self.right.compiled.body_mocapid[pair.right])
-            if here >= 0 and there >= 0:
-                yield here, there
-
-    def _spans(self, start: str, end: str) -> list[list[int]]:
-        """The places of the joints of both, in qpos or qvel."""
-        places: list[list[int]] = [[], []]
-        for side, model in enumerate((self.left, self.right)):
-            starts = [*getattr(model, start).tolist(), getattr(model, end)]
-            for pair in self.joints:
-                places[side] += range(starts[pair[side]], starts[pair[side] + 1])
-        return places
-
-
-def _entries(bodies: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
-    """Yield the places of so many numbers of each body, which stand one after the other."""
-    for here, there in bodies:
-        for k in range(size):
-            yield size * here + k, size * there + k
-
-
-def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """Return the left ends of some pairs, and the right ones."""
-    both = list(pairs)
-    return [[a for a, _ in both], [b for _, b in both]]
-
-
-def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
-    """Pairs of places in act."""
-    owner = ctrl_owners(left), ctrl_owners(right)
-    pairs: set[tuple[int, int]] = set()
-    for a, b in actuators:
-        here, there = int(owner[0][a]), int(owner[1][b])
-        number = int(left.actuator_actnum[here])
-        if number == right.actuator_actnum[there]:
-            start = int(left.actuator_actadr[here]), int(right.actuator_actadr[there])
-            pairs |= {(start[0] + k, start[1] + k) for k in range(number)}
-    return sorted(pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,23 +82,23 @@ def match_models(
         UnknownNameError: A name that was given is not there.
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
-    given = {} if names is None else dict(names)
+    names = {} if names is None else dict(names)
     for side, model in enumerate((left, right)):
         known = _description(model).names | {name for name in model.actuator_names if name}
-        for pair in given.items():
+        for pair in names.items():
             check_name(
                 f"joint, body, site or actuator in {model.path.name}", pair[side], sorted(known)
             )
-    trees = match_trees(left, right, given, one_world=one_world)
+    trees = match_trees(left, right, names, one_world=one_world)
     matching = trees.matching
     joints = _joints(matching)
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.left: solid for solid in map(_solid, matching.pairs)}
-    solids = (*by_body.values(), *_led(left, right, given))
-    by_name = _by_name(left.body_names, right.body_names, given)
+    solids = (*by_body.values(), *_led(left, right, names))
+    by_name = _by_name(left.body_names, right.body_names, names)
     bodies = _and_further(((solid.left, solid.right) for solid in solids), by_name)
-    sites = _sites(left, right, given, trees)
-    actuators = _actuators(left, right, joints, given)
+    sites = _sites(left, right, names, trees)
+    actuators = _actuators(left, right, joints, names)
     only_left = _only((left, right), 0, joints, actuators, sites)
     only_right = _only((right, left), 1, joints, actuators, sites)
     return Matched(
@@ -247,7 +110,7 @@ def match_models(
         actuators=actuators,
         solids=solids,
         only=(only_left, only_right),
-        notes=(*matching.notes(), *_by_place(left, right, sites, actuators, given)),
+        notes=(*matching.notes(), *_by_place(left, right, sites, actuators, names)),
     )
 
 
@@ -255,9 +118,9 @@ def _joints(matching: Matching) -> Pairs:
     """Return the joints of counterparts that are of one kind."""
     joints = []
     for pair in matching.pairs:
-        here, there = pair.left.joint, pair.right.joint
-        if here and there and here.kind == there.kind:
-            joints.append((here.number, there.number))
+        left, right = pair.left.joint, pair.right.joint
+        if left and right and left.kind == right.kind:
+            joints.append((left.number, right.number))
     return tuple(sorted(joints))
 
 
@@ -327,17 +190,21 @@ def _solid(pair: Pair) -> BodyPair:
     return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
 
 
-def _led(left: Model, right: Model, given: Mapping[str, str]) -> list[BodyPair]:
+def _led(left: Model, right: Model, names: Mapping[str, str]) -> list[BodyPair]:
     """The mocap bodies: no joint moves them, but they are not part of the world; by name.
 
     Those without a name in both are one where as many others come before them.
     """
     left_bodies, right_bodies = _mocap_bodies_of(left), _mocap_bodies_of(right)
-    ours = [left.body_names[body] for body in left_bodies]
-    theirs = [right.body_names[body] for body in right_bodies]
-    nameless = [(k, k) for k, names in enumerate(zip(ours, theirs, strict=False)) if not any(names)]
-    pairs = sorted([*_by_name(ours, theirs, given), *nameless])
-    return [BodyPair(left_bodies[a], right_bodies[b], HERE, False) for a, b in pairs]
+    left_names = [left.body_names[body] for body in left_bodies]
+    right_names = [right.body_names[body] for body in right_bodies]
+    both = enumerate(zip(left_names, right_names, strict=False))
+    nameless = [(k, k) for k, pair in both if not any(pair)]
+    pairs = sorted([*_by_name(left_names, right_names, names), *nameless])
+    return [
+        BodyPair(left_bodies[left_id], right_bodies[right_id], HERE, False)
+        for left_id, right_id in pairs
+    ]
 
 
 def _mocap_bodies_of(model: Model) -> list[int]:
@@ -345,10 +212,12 @@ def _mocap_bodies_of(model: Model) -> list[int]:
     return np.flatnonzero(model.compiled.body_mocapid >= 0).tolist()
 
 
-def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str]) -> Pairs:
-    there = {name: k for k, name in enumerate(theirs) if name}
-    wanted = [given.get(name, name) for name in ours]
-    return tuple((k, there[name]) for k, name in enumerate(wanted) if name in there)
+def _by_name(
+    left_names: Sequence[str], right_names: Sequence[str], names: Mapping[str, str]
+) -> Pairs:
+    right_ids = {name: k for k, name in enumerate(right_names) if name}
+    wanted = [names.get(name, name) for name in left_names]
+    return tuple((k, right_ids[name]) for k, name in enumerate(wanted) if name in right_ids)
 
 
 def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, int]]) -> Pairs:
@@ -359,25 +228,26 @@ def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, 
 def _sites(
     left: Model,
     right: Model,
-    given: Mapping[str, str],
+    names: Mapping[str, str],
     trees: MatchedTrees,
 ) -> Pairs:
     """By name, then by place: of what is left, those in one place of the same solid."""
     left_places, right_places = _frame_places(trees.left), _frame_places(trees.right)
 
-    def in_one_place(site: int, other: int) -> bool:
-        (number, place), (other_number, other_place) = left_places[site], right_places[other]
-        pair = trees.matching.of(number)
-        if pair is None or other_number != pair.right.number:
+    def in_one_place(left_id: int, right_id: int) -> bool:
+        left_solid, left_place = left_places[left_id]
+        right_solid, right_place = right_places[right_id]
+        pair = trees.matching.of(left_solid)
+        if pair is None or right_solid != pair.right.number:
             return False
-        return (pair.align @ place).distance(other_place) < _ONE_PLACE
+        return (pair.align @ left_place).distance(right_place) < _ONE_PLACE
 
     by_place = (
-        (site, other)
-        for site, other in product(range(left.nsite), range(right.nsite))
-        if in_one_place(site, other)
+        (left_id, right_id)
+        for left_id, right_id in product(range(left.nsite), range(right.nsite))
+        if in_one_place(left_id, right_id)
     )
-    return _and_further(_by_name(left.site_names, right.site_names, given), by_place)
+    return _and_further(_by_name(left.site_names, right.site_names, names), by_place)
 
 
 def _frame_places(tree: GroupTree) -> list[tuple[int, Placement]]:
@@ -389,15 +259,15 @@ def _frame_places(tree: GroupTree) -> list[tuple[int, Placement]]:
     return places
 
 
-def _actuators(left: Model, right: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
+def _actuators(left: Model, right: Model, joints: Pairs, names: Mapping[str, str]) -> Pairs:
     """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
     of_one_joint = (
-        (a, b)
-        for a, joint in enumerate(left.actuator_jntid.tolist())
-        for b, other in enumerate(right.actuator_jntid.tolist())
-        if (joint, other) in joints
+        (left_id, right_id)
+        for left_id, left_joint in enumerate(left.actuator_jntid.tolist())
+        for right_id, right_joint in enumerate(right.actuator_jntid.tolist())
+        if (left_joint, right_joint) in joints
     )
-    return _and_further(_by_name(left.actuator_names, right.actuator_names, given), of_one_joint)
+    return _and_further(_by_name(left.actuator_names, right.actuator_names, names), of_one_joint)
 
 
 def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
@@ -406,25 +276,19 @@ def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
 
 
 def _by_place(
-    left: Model, right: Model, sites: Pairs, actuators: Pairs, given: Mapping[str, str]
+    left: Model, right: Model, sites: Pairs, actuators: Pairs, names: Mapping[str, str]
 ) -> Iterator[str]:
     """Sites and actuators that are matched although they go by two names."""
     for kind, pairs, place in (("site", sites, "place"), ("actuator", actuators, "joint")):
-        names = [getattr(model, f"{kind}_names") for model in (left, right)]
-        for a, b in pairs:
-            name, other = names[0][a], names[1][b]
-            if name and other and name != other and given.get(name) != other:
+        both = [getattr(model, f"{kind}_names") for model in (left, right)]
+        for left_id, right_id in pairs:
+            left_name, right_name = both[0][left_id], both[1][right_id]
+            is_same = left_name == right_name or names.get(left_name) == right_name
+            if left_name and right_name and not is_same:
                 yield (
-                    f"{kind} {name!r} on the left is taken for {other!r} on the right: one {place} "
-                    f"(--map {name}=NAME says otherwise)"
+                    f"{kind} {left_name!r} on the left is taken for {right_name!r} on the right: "
+                    f"one {place} (--map {left_name}=NAME says otherwise)"
                 )
-
-
-def _moved(values: Array, start: Array, here: Sequence[int], there: Sequence[int]) -> Array:
-    """Values (k,) or (n, k) at other places of a start (m,)."""
-    rows = np.array(np.broadcast_to(start, (*np.shape(values)[:-1], len(start))))
-    rows[..., there] = values[..., here]
-    return rows
 
 
 def missing_parts(left: Model, right: Model) -> tuple[tuple[str, str], ...]:

@@ -33,7 +33,8 @@ from ...measures.floors import moving_bodies
 from ..recordings import Rerun
 from ..recordings.recorder import put_row
 from ..runs.drive import Progress, silent
-from .matching import Matched, match_models
+from .matched import Matched
+from .matching import match_models
 from .stage_measures import StageMeasure, measures
 from .stages import AFTER, FORCE, FOUND, STAGES, StageReader, StepReading
 
@@ -171,23 +172,24 @@ def one_step(
     readings: list[tuple[StepReading, StepReading, StepReading]] = []
     with (
         make_data(matched.left) as running,
-        make_data(matched.left) as left,
-        make_data(right) as other,
+        make_data(matched.left) as left_data,
+        make_data(right) as right_data,
     ):
         for k, state, before in _states(rerun, running, inputs, every):
             start = inputs["qpos"][k], inputs["qvel"][k]
-            set_state(matched.left, left, state)
-            primed_now = _put(matched, reader, other, state, before)
+            set_state(matched.left, left_data, state)
+            primed_now = _put(matched, reader, right_data, state, before)
             if primed_now:
                 primed = primed_now
             try:
                 as_it_runs = reader.step(0, running, *start)
-                put_back = reader.step(0, left, *start)
-                on_the_right = reader.step(1, other, other.qpos.copy(), other.qvel.copy())
+                left_step = reader.step(0, left_data, *start)
+                right_start = right_data.qpos.copy(), right_data.qvel.copy()
+                right_step = reader.step(1, right_data, *right_start)
             except DivergedError:
                 failed = True
                 break
-            readings.append((as_it_runs, put_back, on_the_right))
+            readings.append((as_it_runs, left_step, right_step))
             times.append(float(inputs["time"][k] - inputs["time"][0]))
             progress(k / rows)
     progress(1.0)
@@ -253,11 +255,11 @@ def _put(
 ) -> str:
     """Put the right side to a state of the left one; what of the step before it was given."""
     reset(matched.right, data)
-    own = get_state(matched.right, data)
-    if (own.backend, own.fingerprint) == (state.backend, state.fingerprint):
+    right_state = get_state(matched.right, data)
+    if (right_state.backend, right_state.fingerprint) == (state.backend, state.fingerprint):
         set_state(matched.right, data, state)
         return "all that a State of the left side holds"
-    set_state(matched.right, data, matched.state(state, own))
+    set_state(matched.right, data, matched.state(state, right_state))
     return reader.prime(1, data, before)
 
 

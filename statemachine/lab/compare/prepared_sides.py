@@ -27,7 +27,7 @@ from .alike import (
     for_left,
     match_sides,
 )
-from .matching import Matched
+from .matched import Matched
 from .recorded import (
     recorded_scenario,
     refuse_of_run,
@@ -59,27 +59,27 @@ def prepare_sides(
     trace = read(request.what[0]) if request.is_traces else None
     scenario = recorded_scenario(trace) if trace else request.scenario()
     sides = request.both_sides(scenario.model)
-    given = {**scenario.options, **request.options}
-    left, right = models = [side.load(**given) for side in sides]
+    options = {**scenario.options, **request.options}
+    left, right = models = [side.load(**options) for side in sides]
     matched = match_sides(sides, left, right, request.names)
     seconds = scenario.seconds if trace or request.seconds is None else request.seconds
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
     notes_on_engines = [room(engine_of(model.backend)).unlike_its_users(model) for model in models]
-    start, notes = None, list[str]()
+    left_start, notes = None, list[str]()
     if trace is not None:
         refuse_of_run(request)
         trace = for_left(trace, left, request)
         scenario, seed = recorded_scenario(trace), trace.header.provenance.seed
-        start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
+        left_start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
         notes.append(
             f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
         )
     else:
         scenario = scenario.on(left)
         seed = request.seed if scenario.seeded else None
-    right_start = _start_of_right(scenario.keyframe, start, left, right, matched)
+    right_start = _start_of_right(scenario.keyframe, left_start, left, right, matched)
     notes += right_start.notes
     notes += _notes_on_every(request.every, left, right)
 
@@ -92,10 +92,10 @@ def prepare_sides(
         else:
             controller = scenario.controller(left, request.seed)
             if matched:
-                controller = controller_for_right(controller, matched, right_start.own.ctrl)
-        if right_start.given is None:
+                controller = controller_for_right(controller, matched, right_start.usual.ctrl)
+        if right_start.written is None:
             return controller
-        first_ctrl = right_start.given.ctrl
+        first_ctrl = right_start.written.ctrl
         return beginning_with(lambda _: first_ctrl, controller)
 
     left_rerun = Rerun(
@@ -103,19 +103,19 @@ def prepare_sides(
         left_controller,
         seconds,
         defaults=sides[0].defaults,
-        options={**given, **sides[0].options},
+        options={**options, **sides[0].options},
     )
     right_rerun = Rerun(
         right,
         right_controller,
         seconds,
         defaults=sides[1].defaults,
-        options={**given, **sides[1].options},
+        options={**options, **sides[1].options},
     )
     reruns = (
-        _of_scenario(_starting(left_rerun, scenario.keyframe, start), scenario, seed),
+        _of_scenario(_starting(left_rerun, scenario.keyframe, left_start), scenario, seed),
         _of_scenario(
-            _starting(right_rerun, right_start.keyframe, right_start.given), scenario, seed
+            _starting(right_rerun, right_start.keyframe, right_start.written), scenario, seed
         ),
     )
     notes += request.taken
@@ -130,35 +130,35 @@ class _RightStart:
 
     Attributes:
         keyframe: One of its own; None for its default state.
-        own: Its state there, for what the left has no counterpart of.
-        given: What is written over that, in terms of the right; None for nothing.
+        usual: Its state there, for what the left has no counterpart of.
+        written: What is written over that, in terms of the right; None for nothing.
         notes: What a reader should know of it.
     """
 
     keyframe: str | None
-    own: SideStart
-    given: SideStart | None
+    usual: SideStart
+    written: SideStart | None
     notes: tuple[str, ...]
 
 
 def _start_of_right(
     keyframe: str | None,
-    start: SideStart | None,
+    left_start: SideStart | None,
     left: Model,
     right: Model,
     matched: Matched | None,
 ) -> _RightStart:
     """Return where the right side starts, if the left starts in a keyframe, or in a state."""
-    given, notes = start, ()
+    written, notes = left_start, ()
     known = [frame.name for frame in right.keyframes]
     if keyframe is not None and matched and keyframe not in known:
-        given = start_of(left, keyframe)
+        written = start_of(left, keyframe)
         notes = (f"{right.path.name} has no keyframe {keyframe!r}: it starts in the left's",)
         keyframe = None
-    own = start_of(right, keyframe)
-    if matched and given:
-        given = matched.start(given, own)
-    return _RightStart(keyframe, own, given, notes)
+    usual = start_of(right, keyframe)
+    if matched and written:
+        written = matched.start(written, usual)
+    return _RightStart(keyframe, usual, written, notes)
 
 
 def _notes_on_every(every: int, left: Model, right: Model) -> list[str]:

@@ -80,14 +80,14 @@ def side_of_trace(request: Request, place: int, trace: Trace) -> Side:
     return Side(str(file), header.backend, defaults, options)
 
 
-def other_side(request: Request, own: Side) -> Side:
+def other_side(request: Request, side: Side) -> Side:
     """Return what a trace was recorded of, on the backend of a request that is another one."""
     backends = [parse_backend(word) for word in request.backends]
-    backends.sort(key=lambda backend: backend.name == own.engine)  # another engine first
+    backends.sort(key=lambda backend: backend.name == side.engine)  # another engine first
     for backend in backends:
-        if backend != own.chosen_backend():
-            return replace(own, engine=backend.name, defaults=backend.defaults)
-    raise BadInputError(f"the trace is of {own.chosen_backend()}: name another with --backend")
+        if backend != side.chosen_backend():
+            return replace(side, engine=backend.name, defaults=backend.defaults)
+    raise BadInputError(f"the trace is of {side.chosen_backend()}: name another with --backend")
 
 
 def refuse_of_run(request: Request) -> None:

@@ -80,9 +80,9 @@ def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
     common = common_moments(left.time, right.time, (left.timestep, right.timestep))
     time, sides = common.time, ((left, common.left), (right, common.right))
     curves: list[Series] = []
-    theirs = right.header.joint_labels
+    right_names = right.header.joint_labels
     for name in left.header.joint_labels:
-        if name in theirs:
+        if name in right_names:
             curves += _joint(name, time, sides)
     site = default_tip(left.header, right.header) if tip is None else tip
     if site and tell(left, right, "site_xpos") and tell(left, right, "site_xmat"):

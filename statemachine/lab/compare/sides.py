@@ -35,7 +35,7 @@ class Side:
     """What one side of a comparison is.
 
     Attributes:
-        file: A name or a file, as `load` takes it.
+        model: A name or a path, as `load` takes it.
         engine: The backend to run it on.
         defaults: "model", or "engine" for the engine as its own users meet it.
         options: As `load` takes them: those of `Model.replace`, balance_inertia, meshes.
@@ -43,7 +43,7 @@ class Side:
         taken: Parts of another side's file that stand in place of its own.
     """
 
-    file: str
+    model: str
     engine: str = DEFAULT
     defaults: Literal["model", "engine"] = "model"
     options: Mapping[str, OptionValue] = field(default_factory=dict)
@@ -57,13 +57,13 @@ class Side:
     @property
     def path(self) -> Path:
         """Its file; raises as `models.resolve` does."""
-        return resolve(self.file, self.menagerie)
+        return resolve(self.model, self.menagerie)
 
     @property
     def label(self) -> str:
         """As one types it, without folders: "so101@mujoco timestep=0.002"."""
         options = (typed_option(name, value) for name, value in self.options.items())
-        return " ".join([f"{_typed(self.file)}@{self.chosen_backend()}", *options])
+        return " ".join([f"{_typed(self.model)}@{self.chosen_backend()}", *options])
 
     def load(self, **options: OptionValue) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.
@@ -72,7 +72,7 @@ class Side:
             StateMachineError: As `load` does.
         """
         options |= self.options
-        load_it = partial(self.chosen_backend().load_to_run, self.file, menagerie=self.menagerie)
+        load_it = partial(self.chosen_backend().load_to_run, self.model, menagerie=self.menagerie)
         if self.taken is None:
             return load_it(**options)
         read = {name: options[name] for name in READ_OPTIONS if name in options}
@@ -104,7 +104,7 @@ class TakenParts:
         Raises:
             StateMachineError: It cannot be made.
         """
-        giver = load_to_run(self.of.file, menagerie=self.of.menagerie)
+        giver = load_to_run(self.of.model, menagerie=self.of.menagerie)
         matched = match_models(giver, model, self.names)
         names = {
             "joint": _renamed(giver.joint_names, model.joint_names, matched.joints),
@@ -117,10 +117,10 @@ class TakenParts:
 
 
 def _renamed(
-    names: Sequence[str], others: Sequence[str], pairs: Iterable[tuple[int, int]]
+    left_names: Sequence[str], right_names: Sequence[str], pairs: Iterable[tuple[int, int]]
 ) -> dict[str, str]:
     """Return by what other name each thing goes that has a counterpart."""
-    return {names[here]: others[there] for here, there in pairs}
+    return {left_names[left_id]: right_names[right_id] for left_id, right_id in pairs}
 
 
 def with_options(
@@ -202,10 +202,10 @@ class Request:
     @property
     def taken(self) -> tuple[str, ...]:
         """A line for each side that has parts of the other's file."""
-        others = (("left", "right"), ("right", "left"))
+        names = (("left", "right"), ("right", "left"))
         return tuple(
-            f"the {here} has the {listed(side.taken.parts)} of the {there}, not its own"
-            for side, (here, there) in zip(self.sides, others, strict=False)
+            f"the {name} has the {listed(side.taken.parts)} of the {other}, not its own"
+            for side, (name, other) in zip(self.sides, names, strict=False)
             if side.taken
         )
 
@@ -241,9 +241,9 @@ class Request:
         return function_scenario(what, self.every, self.keyframe)
 
 
-def _typed(file: str) -> str:
+def _typed(model: str) -> str:
     """A model as one types it, without folders."""
-    return Path(file).name if Path(file).is_file() else file
+    return Path(model).name if Path(model).is_file() else model
 
 
 def is_trace(word: str) -> bool:

@@ -101,8 +101,8 @@ def measures(
         return []
     # Each side over all moments.
     running = [as_it_runs for as_it_runs, _, _ in readings]
-    left = [put_back for _, put_back, _ in readings]
-    right = [on_the_right for _, _, on_the_right in readings]
+    left = [left_step for _, left_step, _ in readings]
+    right = [right_step for _, _, right_step in readings]
     inertias = _least_inertias(reader, [*left, *right])
     by_unit: list[StageMeasure] = []
     for number, column in enumerate(reader.columns):

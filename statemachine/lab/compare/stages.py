@@ -13,7 +13,7 @@ from ...measures import ContactNames
 from ...rotations import matrix_from_quat
 from ..recordings.header import labels_of_joints
 from ..recordings.recorder import array_or_nan, is_stale
-from .matching import Matched
+from .matched import Matched
 
 KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"
 ACCELERATION, AFTER = "acceleration", "velocity update"
@@ -63,8 +63,8 @@ class StageReader:
     def __init__(self, matched: Matched) -> None:
         self._matched = matched
         self._models = left, right = matched.left, matched.right
-        dofs, names, turns = _dofs(left, [a for a, _ in matched.joints])
-        self._dofs = dofs, _dofs(right, [b for _, b in matched.joints])[0]
+        dofs, names, turns = _dofs(left, [left_id for left_id, _ in matched.joints])
+        self._dofs = dofs, _dofs(right, [right_id for _, right_id in matched.joints])[0]
         self._upper = np.triu_indices(len(names))
         frames = _frames(matched)
         positions = StageColumn(KINEMATICS, frames, ["m"] * len(frames))
@@ -209,11 +209,14 @@ def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
     if left.geom_names == right.geom_names and np.array_equal(left.geom_bodyid, right.geom_bodyid):
         same: PairNames = ContactNames.of(left).geoms, range(left.ngeom)
         return same, same
-    counterpart = {b: a for a, b in matched.bodies}
+    counterpart = {right_id: left_id for left_id, right_id in matched.bodies}
     # A body that only the right has comes after those of the left.
-    extra = [b for b in range(right.nbody) if b not in counterpart]
-    labels = [*left.body_names, *(right.body_names[b] or f"body {b} of the right" for b in extra)]
-    counterpart |= {b: left.nbody + k for k, b in enumerate(extra)}
+    extra = [right_id for right_id in range(right.nbody) if right_id not in counterpart]
+    labels = [
+        *left.body_names,
+        *(right.body_names[right_id] or f"body {right_id} of the right" for right_id in extra),
+    ]
+    counterpart |= {right_id: left.nbody + k for k, right_id in enumerate(extra)}
     parents = [*left.body_parentid.tolist(), *([0] * len(extra))]
     geoms = ["world", *([""] * (len(labels) - 1))]
     names = ContactNames(labels, geoms, range(len(labels)), parents)

@@ -31,7 +31,8 @@ from .alike import (
     same_commands,
 )
 from .labels import files_apart, labels_of, lacking
-from .matching import Matched, missing_parts
+from .matched import Matched
+from .matching import missing_parts
 from .prepared_sides import prepare_sides
 from .recorded import (
     of_a_run,
@@ -59,7 +60,7 @@ class SidesRun:
             "more than ctrl" if a FUNCTION also wrote what no recorded command repeats.
         matched: What of the left is what of the right; None if both are of one file.
         reruns: How the left and the right were run; None for a recorded run.
-        file: The file of both sides; None if they have two, or were not run here.
+        path: The file of both sides; None if they have two, or were not run here.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
         said: What a reader should know of how it was run.
     """
@@ -70,7 +71,7 @@ class SidesRun:
     commands: Loop = "recorded"
     matched: Matched | None = None
     reruns: tuple[Rerun | None, Rerun | None] = (None, None)
-    file: Path | None = None
+    path: Path | None = None
     missing: tuple[tuple[str, str], ...] = ()
     said: tuple[str, ...] = ()
 
@@ -158,8 +159,8 @@ def _run_both(
     commands = _loop(request, left_run, right_run, matched)
     right_runs = [right_run]
     if commands == "its own":
-        theirs = in_terms_of_right(left_run, right_run, matched)
-        in_open_loop = replayed(theirs, right, reruns[1].defaults, reruns[1].options)
+        left_for_right = in_terms_of_right(left_run, right_run, matched)
+        in_open_loop = replayed(left_for_right, right, reruns[1].defaults, reruns[1].options)
         right_runs.append(in_open_loop.record(progress=part_of(progress, 0.7, 0.3)))
     same_name = left_run.header.provenance.model_file == right_run.header.provenance.model_file
     if left.path != right.path and same_name:  # as much of the paths as tells them apart
@@ -176,7 +177,7 @@ def _run_both(
         commands=commands,
         matched=matched,
         reruns=reruns,
-        file=left.path if left.path == right.path else None,
+        path=left.path if left.path == right.path else None,
         missing=missing_parts(left, right),
     )
 

@@ -47,15 +47,15 @@ def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side
     for word in words:
         texts = [word]
         if Path(word).exists() or not _OPTION.fullmatch(word):
-            name, texts = _split_options(word)
-            sides.append(_side(name, menagerie))
+            first, texts = _split_options(word)
+            sides.append(_side(first, menagerie))
         if not sides:
             raise BadInputError(f"{word} stands before any side: type FILE {word}")
         options = dict(sides[-1].options)
         for text in texts:
             name, value = _option(text)
             if name in options:
-                raise BadInputError(f"{name} is given twice for {sides[-1].file}")
+                raise BadInputError(f"{name} is given twice for {sides[-1].model}")
             options[name] = value
         sides[-1] = replace(sides[-1], options=options)
     return sides
@@ -73,13 +73,13 @@ def _split_options(word: str) -> tuple[str, list[str]]:
 
 
 def _side(word: str, menagerie: str | None) -> Side:
-    file, backend = word, BackendChoice(DEFAULT)
+    model, backend = word, BackendChoice(DEFAULT)
     before, sign, after = word.rpartition("@")
     if sign and before and _ENGINE.fullmatch(after) and not Path(word).exists():
-        file, backend = before, parse_backend(after)
+        model, backend = before, parse_backend(after)
     elif not Path(word).exists():
         _refuse_mistyped(word)
-    side = Side(file, backend.name, backend.defaults, {}, menagerie)
+    side = Side(model, backend.name, backend.defaults, {}, menagerie)
     side.path  # noqa: B018  (raises for what is not a file)
     return side
 
@@ -109,19 +109,19 @@ def _option(text: str) -> tuple[str, OptionValue]:
         UnknownNameError: There is no such option.
         BadInputError: It has no value, or an invalid one.
     """
-    name, _, given = text.partition("=")
+    name, _, value = text.partition("=")
     check_name("option", name, (*OPTIONS, *READ_OPTIONS))
-    if not given:
+    if not value:
         raise BadInputError(f"{name}= has no value")
-    if given.lower() in _SWITCHES:
-        return name, _SWITCHES[given.lower()]
+    if value.lower() in _SWITCHES:
+        return name, _SWITCHES[value.lower()]
     if name == "integrator":
-        return name, given
+        return name, value
     try:
-        numbers = [typed_float(number) for number in given.split(",")]
+        numbers = [typed_float(number) for number in value.split(",")]
     except ValueError:
         raise BadInputError(
-            f"{name}={shown(given)[1:-1]} is not a value: give numbers, with commas between, on or "
+            f"{name}={shown(value)[1:-1]} is not a value: give numbers, with commas between, on or "
             "off"
         ) from None
     if len(numbers) > 1:
@@ -169,13 +169,13 @@ def _refuse_sides_alone(words: Sequence[str], sides: Sequence[Side]) -> NoReturn
     Raises:
         BadInputError: Always.
     """
-    run, files = ["hold", *words], [*words]
+    run, models = ["hold", *words], [*words]
     if len(sides) == 1:
-        files.append(_on_other_engine(sides[0]))
+        models.append(_on_other_engine(sides[0]))
         if not _is_model_alone(words, sides):
             run.append(_on_other_engine(sides[0]))
     typed = command(["statemachine", "compare", *run])
-    named = command(word for word in files if not _OPTION.fullmatch(word))
+    named = command(word for word in models if not _OPTION.fullmatch(word))
     raise BadInputError(
         f"compare what? {typed} runs an experiment ({', '.join(SCENARIOS)}) or "
         f"FILE.py:FUNCTION; statemachine compare --models {named} lists what the files differ in"
@@ -211,23 +211,23 @@ def _check_number_of_sides(
 
 def _is_model_alone(words: Sequence[str], sides: Sequence[Side]) -> bool:
     """Tell whether the only side is a model without an engine, for both engines."""
-    return len(sides) == 1 and sides[0].file == _split_options(words[0])[0]
+    return len(sides) == 1 and sides[0].model == _split_options(words[0])[0]
 
 
 def _on_other_engine(side: Side) -> str:
     """Return what to type for the file of a side on the last engine of the pair that is not its."""
     other = next(name for name in reversed(PAIR) if name != side.engine)
-    return f"{side.file}@{other}"
+    return f"{side.model}@{other}"
 
 
-def _is_file(word: str) -> bool:
+def _names_file(word: str) -> bool:
     """Whether a word names a model's file, by its suffix."""
     return Path(word.split("@", maxsplit=1)[0]).suffix.lower() in MODELS
 
 
 def _is_side(word: str, menagerie: str | None) -> bool:
     """Whether a word is meant as a side: it names a model, or reads as if it did."""
-    if _is_file(word):
+    if _names_file(word):
         return True
     try:
         return bool(parse_sides([word], menagerie))

@@ -57,24 +57,24 @@ def witness(left: Trace, right: Trace, path: Path | None = None) -> WitnessResul
     site = default_tip(left.header, right.header)
     if not site or "site_xpos" not in left or "site_xpos" not in right:
         return None
-    ours, theirs = (trace.header.provenance.model_sha256 for trace in (left, right))
-    if path is None and ours != theirs:
+    left_digest, right_digest = (trace.header.provenance.model_sha256 for trace in (left, right))
+    if path is None and left_digest != right_digest:
         return None  # one model cannot be the witness of two
     try:
         file, same = (path, True) if path else model_file(left.header)
         if not same:
             return None
         kinematics = _readable(file, left.header, site)
-        first, second = (_gap(kinematics, trace, site) for trace in (left, right))
-        if not np.isfinite([first, second]).all():
+        left_gap, right_gap = (_gap(kinematics, trace, site) for trace in (left, right))
+        if not np.isfinite([left_gap, right_gap]).all():
             return None
     except StateMachineError:
         return None
     return WitnessResult(
         by=f"{WITNESS} {kinematics.version}",
         site=site,
-        left=first,
-        right=second,
+        left=left_gap,
+        right=right_gap,
         rows=len(left) + len(right),
         grade=kinematics.grade,
     )
@@ -113,6 +113,6 @@ def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
         raise ModelError(f"{kinematics.path.name} has no site named {site!r}")
     joints = [header.joint_labels[k] for k in shared_joints(kinematics, header.joints)]
     qpos = [trace.qpos[:, joint_columns(header, name).qpos] for name in joints]
-    theirs = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site, kind).pos
-    ours, _ = trace.site(site)
-    return float(distances(ours, theirs).max())
+    poses = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site, kind)
+    recorded, _ = trace.site(site)
+    return float(distances(recorded, poses.pos).max())

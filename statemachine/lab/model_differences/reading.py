@@ -13,7 +13,7 @@ from ...engines.description.reading import Comparable, ModelReading
 from ...errors import UnsupportedError
 from ...installed import DEFAULT
 from ...interface import JointType, Model
-from ...model_files import checked_file
+from ...model_files import checked_path
 from ...models import resolve
 from ...release_names import engine_of, is_release
 
@@ -71,7 +71,7 @@ def read(
         ModelError, ModelFileError: The file cannot be read.
         UnsupportedError: The engine is one of a third party, which nothing here reads.
     """
-    path = checked_file(model, menagerie)
+    path = checked_path(model, menagerie)
     if engine is None:
         return room(DEFAULT).read_file(path, comparable)
     if is_release(engine):

@@ -110,7 +110,7 @@ def answer(request: CompareRequest, reporter: Reporter = QUIET) -> CompareResult
     played = None
     if run.played is not run.right:
         played = compare(run.left, run.played, tolerances=request.tolerances, robot=run.robot)
-    fingertips = witness(*run.traces, run.file)
+    fingertips = witness(*run.traces, run.path)
     floor = _floor(request, run, comparison, reporter)
     instead = _instead(request.run, run, comparison)
     return CompareResult(request, run, comparison, played, fingertips, floor, instead)

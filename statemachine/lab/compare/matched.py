@@ -1,0 +1,161 @@
+"""What of one Model is what of another, and what of the left is moved to the right by that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...backends.controls import ctrl_owners
+from ...engines.records import Counterparts, Pairs
+from ...interface import Array, Model, State
+from ..recordings import SideStart
+
+Only = Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Matched(Counterparts):
+    """What of one Model is what of another.
+
+    Attributes:
+        left: The left Model.
+        right: The right one.
+        bodies: Pairs of ids.
+        only: For each Model what it alone has: names, by "joint", "site" and "actuator".
+        notes: What a reader should know, in sentences.
+    """
+
+    left: Model
+    right: Model
+    bodies: Pairs
+    only: tuple[Only, Only]
+    notes: tuple[str, ...]
+
+    @property
+    def reordered(self) -> bool:
+        """Whether who writes ctrl by number meets other actuators on the right."""
+        places = [right_id for _, right_id in self.actuators]
+        return places != sorted(places)
+
+    @property
+    def joints_elsewhere(self) -> bool:
+        """Whether who reads qpos or qvel by number meets other joints on the right."""
+        left, right = self.left, self.right
+        return any(
+            left.jnt_qposadr[left_id] != right.jnt_qposadr[right_id]
+            or left.jnt_dofadr[left_id] != right.jnt_dofadr[right_id]
+            for left_id, right_id in self.joints
+        )
+
+    @property
+    def mocap_elsewhere(self) -> bool:
+        """Whether who moves mocap bodies by number meets others on the right."""
+        left_places, right_places = self.places["mocap_pos"]
+        return left_places != right_places
+
+    def start(self, left: SideStart, right: SideStart) -> SideStart:
+        """The start of the left Model in the right's terms; the rest is that of `right`."""
+        return SideStart(
+            qpos=self.moved("qpos", left.qpos, right.qpos),
+            qvel=self.moved("qvel", left.qvel, right.qvel),
+            ctrl=self.moved("ctrl", left.ctrl, right.ctrl),
+        )
+
+    def state(self, left: State, right: State) -> State:
+        """The right Model's State `right` with what a State of the left tells of it.
+
+        Beside the time these are the arrays in `places` that both have.
+        """
+        arrays = {
+            name: self.moved(name, left[name], right[name])
+            for name in self.places
+            if name in dict(left.layout) and name in dict(right.layout)
+        }
+        return right.with_parts(time=left["time"], **arrays)
+
+    def moved(self, part: str, values: Array, right_start: Array) -> Array:
+        """An array of the right Model, from that of the left.
+
+        Args:
+            part: Its name in `places`.
+            values: (m,) or (n, m) of the left.
+            right_start: (k,) of the right, for what has no counterpart.
+        """
+        return _moved(values, right_start, *self.places[part])
+
+    @cached_property
+    def places(self) -> Mapping[str, list[list[int]]]:
+        """By array of a State, where in it on either side the counterparts are.
+
+        Activations are of actuators that have as many of them.
+        """
+        left, right = self.left.compiled, self.right.compiled
+        activations: Iterable[tuple[int, int]] = ()
+        if left is not None and right is not None:
+            activations = _activations(self.actuators, left, right)
+        mocap_bodies = list(self._mocap_bodies())
+        return {
+            "qpos": self._spans("jnt_qposadr", "nq"),
+            "qvel": self._spans("jnt_dofadr", "nv"),
+            "ctrl": _ends(self.actuators),
+            "act": _ends(activations),
+            "mocap_pos": _ends(_entries(mocap_bodies, 3)),
+            "mocap_quat": _ends(_entries(mocap_bodies, 4)),
+        }
+
+    def _mocap_bodies(self) -> Iterator[tuple[int, int]]:
+        """Yield the numbers of mocap bodies, as `body_mocapid` has them, that are counterparts."""
+        for pair in self.solids:
+            left_id = int(self.left.compiled.body_mocapid[pair.left])
+            right_id = int(self.right.compiled.body_mocapid[pair.right])
+            if left_id >= 0 and right_id >= 0:
+                yield left_id, right_id
+
+    def _spans(self, start: str, end: str) -> list[list[int]]:
+        """The places of the joints of both, in qpos or qvel."""
+        places: list[list[int]] = [[], []]
+        for side, model in enumerate((self.left, self.right)):
+            starts = [*getattr(model, start).tolist(), getattr(model, end)]
+            for pair in self.joints:
+                places[side] += range(starts[pair[side]], starts[pair[side] + 1])
+        return places
+
+
+def _entries(bodies: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
+    """Yield the places of so many numbers of each body, which stand one after the other."""
+    for left_id, right_id in bodies:
+        for k in range(size):
+            yield size * left_id + k, size * right_id + k
+
+
+def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
+    """Return the left ends of some pairs, and the right ones."""
+    both = list(pairs)
+    return [[left_id for left_id, _ in both], [right_id for _, right_id in both]]
+
+
+def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
+    """Pairs of places in act."""
+    owner = ctrl_owners(left), ctrl_owners(right)
+    pairs: set[tuple[int, int]] = set()
+    for left_id, right_id in actuators:
+        left_owner, right_owner = int(owner[0][left_id]), int(owner[1][right_id])
+        number = int(left.actuator_actnum[left_owner])
+        if number == right.actuator_actnum[right_owner]:
+            start = int(left.actuator_actadr[left_owner]), int(right.actuator_actadr[right_owner])
+            pairs |= {(start[0] + k, start[1] + k) for k in range(number)}
+    return sorted(pairs)
+
+
+def _moved(
+    values: Array, right_start: Array, left_places: Sequence[int], right_places: Sequence[int]
+) -> Array:
+    """Return values (k,) or (n, k) of the left at their places in a start (m,) of the right."""
+    shape = (*np.shape(values)[:-1], len(right_start))
+    rows = np.array(np.broadcast_to(right_start, shape))
+    rows[..., right_places] = values[..., left_places]
+    return rows
