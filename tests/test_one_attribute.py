@@ -179,7 +179,8 @@ ATTRIBUTES: dict[tuple[str, str], dict[str, str]] = {
         **{"cone": "elliptic"},
         **{"impratio": "10", "density": "200", "viscosity": "0.5", "wind": "1 0 0"},
         **{"iterations": "1", "tolerance": "0.1", "solver": "PGS", "noslip_iterations": "5"},
-        **{"jacobian": "sparse", "ccd_iterations": "3", "magnetic": "1 0 0", "actuatorgroupdisable": "0"},
+        **{"jacobian": "sparse", "ccd_iterations": "3", "magnetic": "1 0 0"},
+        **{"actuatorgroupdisable": "0"},
     },
     ("flag", ""): {
         **{"contact": "disable", "gravity": "disable", "limit": "disable", "actuation": "disable"},

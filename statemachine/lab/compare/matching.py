@@ -31,8 +31,8 @@ class MatchedTrees:
     """The rigid parts of two Models, and which is which.
 
     Attributes:
-        left: Those of the first, by the names of the second.
-        right: Those of the second.
+        left: Those of the left, by the names of the right.
+        right: Those of the right.
         matching: Which is which.
     """
 
@@ -58,8 +58,8 @@ def match_trees(
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
     robots = [_description(model) for model in (left, right)]
-    ours = {a: b for a, b in names.items() if a in robots[0].names}
-    trees = GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])
+    of_robot = {name: names[name] for name in names if name in robots[0].names}
+    trees = GroupTree(renamed(robots[0], of_robot)), GroupTree(robots[1])
     return MatchedTrees(*trees, match(*trees, one_world=one_world))
 
 

@@ -6,6 +6,7 @@ everybody but a simulator.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -232,5 +233,7 @@ def _share(row: _Quantity) -> float:
     """Return how much a visual differs in size, from 0 to 1; 0 of another quantity."""
     if row.name not in ("size", "scale"):
         return 0.0
-    sizes = float(np.linalg.norm(row.left)), float(np.linalg.norm(row.right))
+    if not isinstance(row.left, tuple) or not isinstance(row.right, tuple):
+        return 0.0
+    sizes = math.hypot(*row.left), math.hypot(*row.right)
     return 1 - min(sizes) / max(sizes) if max(sizes) else 0.0
