@@ -8,10 +8,10 @@ it is refused instead of being measured.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...backends.repair_record import Repair
 from ...errors import BadInputError, ModelError, UnknownNameError
 from ...installed import WITNESS
 from ...interface import Array, Model
@@ -27,9 +27,6 @@ from .fingertip_poses import checked_poses, engine_poses, random_qpos, relative
 from .fingertip_result import SAME_FRAME, TOLERANCE, FingertipResult, FrameOffset, TipGap
 from .witness_parts import WitnessFrame, WitnessParts
 from .witness_places import witness_parts
-
-if TYPE_CHECKING:
-    from ...backends.repairs import Repair
 
 __all__ = [
     "FingertipResult",

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from ...backends.repair_record import Repair
 from ...measures import largest_or_inf
 from ...show.blocks import only_on_pages
 from ...witness import OWN_READING
 from ..runs.provenance import Provenance
-
-if TYPE_CHECKING:  # it imports an engine
-    from ...backends.repairs import Repair
 
 TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
