@@ -201,3 +201,15 @@ def test_two_models_with_nothing_that_moves_are_compared(tmp_path: Path) -> None
     assert [row.quantity for row in result.differences] == ["size"]
     assert result.posed.joints == 0
     assert np.isfinite(result.posed.distance)
+
+
+def test_a_coupling_that_only_one_file_has_is_told_in_words(tmp_path: Path) -> None:
+    more = (
+        '<link name="b"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" '
+        'ixz="0" iyz="0"/></inertial></link><joint name="k" type="revolute"><parent link="base"/>'
+        '<child link="b"/><limit lower="-1" upper="1"/>{}</joint>'
+    )
+    mimic = '<mimic joint="j" multiplier="-2" offset="0.5"/>'
+    texts = _urdf(more=more.format(mimic)), _urdf(more=more.format(""))
+    row = _row(_listed(tmp_path, *texts, suffix="urdf"), "equality")
+    assert (row.left, row.right) == ("k is -2 j +0.5", "nothing")

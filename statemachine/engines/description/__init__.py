@@ -1,6 +1,9 @@
-"""A robot as its file describes it, whatever the format: what descriptions are compared by.
+"""A robot, whatever its format: what compiled models are matched and compared by.
 
 - `records`: a robot as frozen records, in one set of conventions
-- `urdf`: from a URDF; what only an engine can read is read in that engine's room
-- `shapes`: which is which, how they lie; corners, volumes and extents of meshes
+- `tree`: its rigid parts, and their plain mechanics
+- `match`, `shapes`: which part of one is which of another, and how their frames and shapes lie
+- `reading`: a file, or what an engine made of one, as a compiled model
+- `urdf`: what the text of a URDF says, and no compiled model keeps
+- `lines`: the line of a file at which an element stands
 """

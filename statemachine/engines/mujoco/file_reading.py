@@ -7,6 +7,7 @@ them.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,6 +62,7 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
         MissingEngineError: MuJoCo is not installed here.
         ModelError: It cannot read the file, and nothing mends it; or a URDF makes no sense.
     """
+    from ...backends.compiled import compiler_warnings
     from ...backends.repairs import compile_mended
 
     version = f"mujoco {require('mujoco').__version__}"
@@ -82,7 +84,8 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
             _float_base(spec, comparable.free_joint)
 
     fuse_static = False if declared is not None else None
-    mended = compile_mended(path, fuse_static=fuse_static, visuals=True, prepare=prepare)
+    with warnings.catch_warnings(action="ignore", category=UserWarning), compiler_warnings():
+        mended = compile_mended(path, fuse_static=fuse_static, visuals=True, prepare=prepare)
     raw = mended.compiled
     visuals = (
         *_visuals(raw, _mesh_files(mended.spec)),

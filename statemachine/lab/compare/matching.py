@@ -83,12 +83,9 @@ def match_models(
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
     names = {} if names is None else dict(names)
-    for side, model in enumerate((left, right)):
-        known = _description(model).names | {name for name in model.actuator_names if name}
-        for pair in names.items():
-            check_name(
-                f"joint, body, site or actuator in {model.path.name}", pair[side], sorted(known)
-            )
+    if names:
+        _check_names(left, names.keys())
+        _check_names(right, names.values())
     trees = match_trees(left, right, names, one_world=one_world)
     matching = trees.matching
     joints = _joints(matching)
@@ -112,6 +109,18 @@ def match_models(
         only=(only_left, only_right),
         notes=(*matching.notes(), *_by_place(left, right, sites, actuators, names)),
     )
+
+
+def _check_names(model: Model, names: Iterable[str]) -> None:
+    """Refuse names of what a Model does not have.
+
+    Raises:
+        UnknownNameError: It has nothing of such a name.
+        BadInputError: Its backend tells nothing of its bodies.
+    """
+    known = _description(model).names | {name for name in model.actuator_names if name}
+    for name in names:
+        check_name(f"joint, body, site or actuator in {model.path.name}", name, sorted(known))
 
 
 def _joints(matching: Matching) -> Pairs:

@@ -13,7 +13,6 @@ from ...engines.description.records import OF_A_SLIDE, SCALAR, CollisionShape, R
 from ...engines.description.shapes import likest
 from ...engines.description.urdf import Declared
 from ..compare.matching import MatchedTrees
-from .listing import Listing
 from .records import SUBJECTS, PoseGap, QuantityAgreement
 
 POSES = 100  # at which the same positions are put into both
@@ -65,28 +64,23 @@ def digits_of(relative: float) -> int:
 
 
 def agreements(
-    listing: Listing, trees: MatchedTrees, declared: Sequence[Declared | None]
+    trees: MatchedTrees, declared: Sequence[Declared | None], tolerance: float
 ) -> tuple[QuantityAgreement, ...]:
     """Return how well two models agree in what does not differ, by subject and unit.
 
     Args:
-        listing: What differs.
         trees: The rigid parts of both.
         declared: What each side says in words of its own; None of one that says all.
+        tolerance: The relative difference up to which two figures are equal.
     """
     reach = max(trees.left.reach, trees.right.reach)
     compared: dict[tuple[str, str], list[_Compared]] = {}
     for pair in trees.matching.pairs:
         for figure in _of_pair(pair, trees.matching, reach, declared):
             compared.setdefault((figure.subject, figure.unit), []).append(figure)
-    differing: dict[tuple[str, str], int] = {}
-    listed: dict[tuple[str, str], int] = {}
-    for row in listing.differences:
-        listed[row.subject, row.unit] = listed.get((row.subject, row.unit), 0) + 1
     rows: list[QuantityAgreement] = []
     for (subject, unit), figures in compared.items():
-        equal = [figure for figure in figures if figure.relative <= listing.tolerance * 16]
-        differing[subject, unit] = len(figures) - len(equal)
+        equal = [figure for figure in figures if figure.relative <= tolerance * 16]
         if equal:
             worst = max(equal, key=lambda figure: figure.size)
             rows.append(

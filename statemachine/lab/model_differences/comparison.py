@@ -84,7 +84,7 @@ def compare(
     enter_visuals(listing, readings, trees)
     differences, faults = listing.ordered(), tuple(faults_of(readings))
     declared = [reading.declared for reading in readings]
-    agreeing = agreements(listing, trees, declared)
+    agreeing = agreements(trees, declared, listing.tolerance)
     left_side = _side(readings[0], trees.left, sides[0])
     right_side = _side(readings[1], trees.right, sides[1])
     notes = tuple(dict.fromkeys(_notes(readings, matched, trees)))

@@ -65,6 +65,7 @@ _UNSAID = {
     "joint": ("armature", "spring", "rest of the spring", "stop", "softness of dry friction"),
     "geom": _SUBJECTS["geom"].keys() - {"shape", "hull", "heights", "extra shape", "place"},
 }
+_EQUALITY_OF_JOINTS = 2  # mjtEq
 # What says the largest force of a joint.
 _EFFORTS = (("joint", "force limit"), ("actuator", "force range"))
 # What each gain of a servo decides.
@@ -134,8 +135,9 @@ class CompiledDifferences:
         pair = self._effects.root
         left, right = pair.left.inertial.mass, pair.right.inertial.mass
         if pair.left.joint is None and pair.right.joint is None and left != right:
-            name = pair.left.links[min(1, len(pair.left.links) - 1)][0].name
-            element = self._locator.find("body", name)
+            # The first link that is not the world, which an engine may have taken it for.
+            links = max(pair.left.links, pair.right.links, key=len)
+            element = self._locator.find("body", links[min(1, len(links) - 1)][0].name)
             meaning = Meaning(0.0, "stands still", matters=False)
             self._listing.enter("mass", element, "mass", (left, right), meaning, "kg")
 
@@ -198,6 +200,9 @@ class CompiledDifferences:
         if row.kind == "joint" and row.subject == "extra joint":
             yield self._extra_joint(row)
             return
+        if row.kind == "equality" and row.subject == "extra equality":
+            yield self._extra_equality(row)
+            return
         if row.kind == "body" and row.subject == "parent":
             yield DifferingQuantity("parent", *self._parents(ids))
             return
@@ -231,6 +236,25 @@ class CompiledDifferences:
         is_left = row.values[0].left is not None
         values = (kind, "nothing") if is_left else ("nothing", kind)
         return DifferingQuantity("joint", *values)
+
+    def _extra_equality(self, row: ModelDifference) -> DifferingQuantity:
+        """Return what an equality keeps that only one side has."""
+        side = 0 if row.values[0].right is None else 1
+        model = (self._matched.left, self._matched.right)[side]
+        raw = model.compiled
+        number = self._locator.number(side, "equality", row.where)
+        words = str(row.values[0].right if side else row.values[0].left)
+        if number >= 0 and int(raw.eq_type[number]) == _EQUALITY_OF_JOINTS:
+            first = self._locator.name(side, "joint", int(raw.eq_obj1id[number]))
+            second = self._locator.name(side, "joint", int(raw.eq_obj2id[number]))
+            offset, factor = raw.eq_data[number, :2].tolist()
+            words = f"{first} is {offset:g}"
+            if second:
+                words = f"{first} is {factor:g} {second} {offset:+g}"
+            if raw.eq_data[number, 2:5].any():
+                words += " + …"
+        values = (words, "nothing") if side == 0 else ("nothing", words)
+        return DifferingQuantity("equality", *values)
 
     def _parents(self, ids: ElementIds) -> tuple[str, str]:
         """Return the names of the bodies that carry a body on each side."""

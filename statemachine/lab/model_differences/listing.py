@@ -46,27 +46,8 @@ class CompiledCause:
     refused: str = ""
 
 
-@dataclass(frozen=True)
-class Rounded:
-    """A quantity that differs by rounding alone.
-
-    Attributes:
-        subject: A key of `SUBJECTS`.
-        unit: SI unit of its values.
-        element: The element that it is of.
-        size: How far they are apart, in `unit`.
-        relative: As a part of what they are set against.
-    """
-
-    subject: str
-    unit: str
-    element: str
-    size: float
-    relative: float
-
-
 class Listing:
-    """One list of what differs, and what differs by rounding alone.
+    """One list of what differs by more than rounding.
 
     Args:
         digits: Numbers that agree to so many are rounded, not different.
@@ -75,7 +56,6 @@ class Listing:
     def __init__(self, digits: int) -> None:
         self.tolerance = 0.5 * 10.0 ** (1 - digits)
         self.differences: list[ListedDifference] = []
-        self.rounded: list[Rounded] = []
 
     def enter(
         self,
@@ -104,7 +84,6 @@ class Listing:
             scale = max(usual, meaning.scale)
             relative = size / scale if size is not None and scale else math.inf
         if size is not None and relative <= self.tolerance * _ROUNDINGS:
-            self.rounded.append(Rounded(subject, unit, element.name, size, relative))
             return
         left, right = (_finite(value) for value in values)
         share = float(min(max(meaning.share, 0.0), 1.0))

@@ -69,6 +69,11 @@ class Locator:
         names = self._names[side].get(kind, [])
         return names[number] if 0 <= number < len(names) else ""
 
+    def number(self, side: int, kind: str, name: str) -> int:
+        """Return the id of an element of the left (0) or right (1) model; -1 where it has none."""
+        names = self._names[side].get(kind, [])
+        return names.index(name) if name in names else _UNKNOWN
+
     def ids(self, kind: str, name: str) -> ElementIds:
         """Return the ids of an element by its name on the left, or on the right if only there."""
         ours, theirs = (names.get(kind, []) for names in self._names)
@@ -89,9 +94,7 @@ class Locator:
 
     def find_alone(self, side: int, kind: str, name: str) -> ElementPlace:
         """Return where an element stands that only the left (0) or the right (1) has."""
-        names = self._names[side].get(kind, [])
-        number = names.index(name) if name in names else _UNKNOWN
-        line = self._line(side, kind, name, number)
+        line = self._line(side, kind, name, self.number(side, kind, name))
         if side == 0:
             return ElementPlace(kind, name, left_line=line)
         return ElementPlace(kind, name, right_line=line)

@@ -6,7 +6,6 @@ everybody but a simulator.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -165,7 +164,7 @@ def _enter(
     else:
         rows = list(_quantities(left, right))
     for row in rows:
-        meaning = Meaning(_share(row), row.effect, matters=False)
+        meaning = Meaning(row.share, row.effect, matters=False)
         listing.enter("drawing", element, row.name, (row.left, row.right), meaning, row.unit)
 
 
@@ -189,6 +188,7 @@ class _Quantity:
         left, right: Its values, in `unit`.
         effect: What it means.
         unit: SI unit of each number.
+        share: Of a size or a scale, by how much the smaller one is smaller, from 0 to 1.
     """
 
     name: str
@@ -196,6 +196,7 @@ class _Quantity:
     right: Value
     effect: str = ""
     unit: str = ""
+    share: float = 0.0
 
 
 def _quantities(left: PlacedVisual, right: PlacedVisual) -> Iterator[_Quantity]:
@@ -208,10 +209,12 @@ def _quantities(left: PlacedVisual, right: PlacedVisual) -> Iterator[_Quantity]:
     ours, theirs = left.box, right.box
     if ours is None or theirs is None:
         if a.scale != b.scale:
-            yield _Quantity("scale", a.scale, b.scale, _times(a.scale, b.scale))
+            effect, share = _times(a.scale, b.scale), _share(a.scale, b.scale)
+            yield _Quantity("scale", a.scale, b.scale, effect, "", share)
     elif _are_apart(ours.extent, theirs.extent, _SAME * max(*ours.extent, *theirs.extent)):
         effect = _times(ours.extent, theirs.extent)
-        yield _Quantity("size", ours.extent, theirs.extent, effect, "m")
+        share = _share(ours.extent, theirs.extent)
+        yield _Quantity("size", ours.extent, theirs.extent, effect, "m", share)
     elif _are_apart(ours.middle, theirs.middle, _NEAR):
         yield _Quantity("place", ours.middle, theirs.middle, "", "m")
 
@@ -229,11 +232,8 @@ def _times(left: Sequence[float], right: Sequence[float]) -> str:
     return f"the {'left' if ours > theirs else 'right'} is {most / least:.4g} times as large"
 
 
-def _share(row: _Quantity) -> float:
-    """Return how much a visual differs in size, from 0 to 1; 0 of another quantity."""
-    if row.name not in ("size", "scale"):
-        return 0.0
-    if not isinstance(row.left, tuple) or not isinstance(row.right, tuple):
-        return 0.0
-    sizes = math.hypot(*row.left), math.hypot(*row.right)
-    return 1 - min(sizes) / max(sizes) if max(sizes) else 0.0
+def _share(left: Sequence[float], right: Sequence[float]) -> float:
+    """Return by how much the smaller of two extents is smaller, from 0 to 1."""
+    ours, theirs = float(np.linalg.norm(left)), float(np.linalg.norm(right))
+    most = max(ours, theirs)
+    return 1 - min(ours, theirs) / most if most else 0.0

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from ...engines.description.lines import SourceLine
 from ...engines.records import DifferingQuantity
 from ...measures import Deviation
 from ..compare.instead import Instead
@@ -16,7 +17,6 @@ from .gap import FirstTouch, Measure
 from .locate import Localisation
 from .shapley import Method
 from .verdict import CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
-from .written import Place
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Share:
 
     name: str
     values: tuple[DifferingQuantity, ...]
-    place: Place | None
+    place: SourceLine | None
     kind: str
     share: float | None = None
     error: float = 0.0

@@ -9,6 +9,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from ...engines.description.lines import SourceLine
 from ...engines.records import DifferingQuantity, ModelDifference, QuantityValue
 from .causes import MASS_SUBJECTS, Cause, scale_of
 
@@ -16,19 +17,6 @@ _DENSITY = 1000.0  # kg/m³, where an MJCF says none
 _SCALING = {"density": "kg/m³", "mass": "kg"}  # attributes of a geom, and their units
 # Attributes of an MJCF that are called otherwise than the array that they are compiled to.
 _ATTRIBUTES = {"ipos": "pos", "inertia": "diaginertia", "gainprm": "kp", "solref_limit": "solref"}
-
-
-@dataclass(frozen=True)
-class Place:
-    """A line of a file.
-
-    Attributes:
-        file: Its name.
-        line: Its number, from 1.
-    """
-
-    file: str
-    line: int
 
 
 @dataclass(frozen=True)
@@ -45,7 +33,7 @@ class WrittenCause:
 
     name: str
     values: tuple[DifferingQuantity, ...]
-    place: Place | None
+    place: SourceLine | None
 
 
 @dataclass(frozen=True)
@@ -64,7 +52,7 @@ class _Element:
     attributes: Mapping[str, str]
     owners: frozenset[str]
     in_default: bool
-    place: Place
+    place: SourceLine
 
 
 @dataclass(frozen=True)
@@ -79,7 +67,7 @@ class _Weight:
 
     attribute: str
     value: float
-    place: Place
+    place: SourceLine
 
     def key(self) -> tuple[str, float]:
         return self.attribute, self.value
@@ -98,7 +86,7 @@ class _Scaling:
     attribute: str
     left: float
     right: float
-    place: Place
+    place: SourceLine
 
 
 def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[WrittenCause]:
@@ -143,7 +131,7 @@ def _is_moved_mass(cause: Cause) -> bool:
     return cause.kind == "body" and {row.subject for row in cause.differences} >= MASS_SUBJECTS
 
 
-def _of_rows(name: str, rows: Sequence[ModelDifference], places: set[Place]) -> WrittenCause:
+def _of_rows(name: str, rows: Sequence[ModelDifference], places: set[SourceLine]) -> WrittenCause:
     """Return a cause with all quantities of some differences."""
     values = tuple(value for row in rows for value in row.values)
     return WrittenCause(name, values, _only(places))
@@ -157,11 +145,11 @@ def _of_scaling(name: str, scaling: _Scaling) -> WrittenCause:
     return WrittenCause(name, (value,), scaling.place)
 
 
-def _only(places: set[Place]) -> Place | None:
+def _only(places: set[SourceLine]) -> SourceLine | None:
     return next(iter(places)) if len(places) == 1 else None
 
 
-def _places_of_new_weights(ours: Sequence[_Element], theirs: Sequence[_Element]) -> set[Place]:
+def _places_of_new_weights(ours: Sequence[_Element], theirs: Sequence[_Element]) -> set[SourceLine]:
     """Return where the right's file says a density or a mass that the left's says nowhere."""
     known = {weight.key() for weight in _weights(ours)}
     return {weight.place for weight in _weights(theirs) if weight.key() not in known}
@@ -229,7 +217,7 @@ def _elements(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[_Elem
             attributes=attributes,
             owners=frozenset({owner} - {""}),
             in_default=any(outer == "default" for outer, _ in around),
-            place=Place(path.name, parser.CurrentLineNumber),
+            place=SourceLine(path.name, parser.CurrentLineNumber),
         )
         elements.append(element)
         around.append((tag, own))

@@ -1,0 +1,55 @@
+"""A cause is shown by what differs, with names and with digits that tell two values apart."""
+
+from __future__ import annotations
+
+import pytest
+
+from statemachine.engines.records import TURNED, DifferingQuantity
+from statemachine.lab.why import Share
+from statemachine.lab.why.values_page import heading_of, phrase_of, sides_of, texts_of
+
+
+def _share(name: str, kind: str, *values: DifferingQuantity) -> Share:
+    return Share(name, values, None, kind)
+
+
+def test_a_quantity_that_the_cause_does_not_say_is_named_in_the_heading():
+    value = DifferingQuantity("solimp", (0.9, 0.95, 0.001), (0.5, 0.7, 0.01))
+    share = _share("softness of floor", "geom", value)
+    assert heading_of(share) == "softness of floor (solimp)"
+    assert sides_of(share) == ("0.9 0.95 0.001", "0.5 0.7 0.01")
+
+
+def test_several_quantities_stand_in_the_heading_each_with_its_name():
+    values = DifferingQuantity("solref", 0.02, 0.06), DifferingQuantity("solmix", 1.0, 5.0)
+    share = _share("softness of floor", "geom", *values)
+    assert sides_of(share) == ("solref 0.02 and solmix 1", "solref 0.06 and solmix 5")
+
+
+def test_inertia_whose_moments_are_equal_is_told_by_the_angle_of_its_axes():
+    share = _share("inertia of m", "body", DifferingQuantity(TURNED, 0.0, 0.3, "rad"))
+    assert "17.2°" in phrase_of(share)
+    moments = DifferingQuantity("moments", (2.0, 1.0, 1.0), (3.0, 1.0, 1.0), "kg m²")
+    assert not phrase_of(_share("inertia of m", "body", moments))
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "side"), [(None, 0.05, "on the right"), (0.05, None, "on the left")]
+)
+def test_a_filter_that_one_side_has_is_told_with_its_time_constant(left, right, side):
+    value = DifferingQuantity("timeconst", left, right, "s")
+    assert f"50.0 ms {side}" in phrase_of(_share("filter of servo", "actuator", value))
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "texts"),
+    [
+        (1.0, 1.00001, ("1", "1.00001")),
+        (1.0, 10.0, ("1", "10")),
+        ((0.9, 0.95), (0.9, 0.95000001), ("0.9 0.95", "0.9 0.95000001")),
+        ("filterexact", "filter", ("filterexact", "filter")),
+        (-2.374, -2.0, ("-2.374", "-2")),
+    ],
+)
+def test_as_many_digits_as_it_takes_to_tell_two_values_apart(left, right, texts):
+    assert texts_of(DifferingQuantity("x", left, right)) == texts
