@@ -302,7 +302,7 @@ def test_the_interface_s_own_write_at_load_is_told() -> None:
     """The engine's automatic reset is turned off by a flag: no function does it."""
     load = record(SHORT.format(engine="mujoco", code=""), "mujoco").statements[1]
     assert load.changed == ("model.raw.opt.disableflags",)
-    (call,) = (call for call in load.calls if call.function == "MjModel.from_xml_path")
+    (call,) = (call for call in load.calls if call.function == "MjSpec.compile")
     assert_has(call, on="model", count=1, changed=(NEW,))
 
 

@@ -84,7 +84,7 @@ def test_readme_and_guides_are_short() -> None:
     guides = re.findall(r"^\w+$", listed.partition("Students\n")[2].partition("What the")[0], re.M)
     assert len(guides) <= 12
     words = {name: len(PAGES[f"docs/{name}.md"].split()) for name in guides}
-    assert sum(words.values()) - words["api"] <= 10_600  # which names what autodoc inserts
+    assert sum(words.values()) - words["api"] <= 10_900  # which names what autodoc inserts
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from statemachine.cli.main import main
+from statemachine.cli import main
 
 import statemachine as sm
 from statemachine import releases

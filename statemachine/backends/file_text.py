@@ -4,7 +4,7 @@ Of a URDF that is one with the mesh files that it would not find by itself. MuJo
 in the folder of the URDF, or in the `meshdir` of its <compiler>, by the name as it is written. So
 it does not find these:
 
-- `file:///home/me/part.stl`, and a name from the folder of the URDF where `meshdir` is another;
+- `file:///some/place/part.stl`, and a name from the folder of the URDF where `meshdir` is another;
 - `package://robot/meshes/part.stl`: ROS knows where packages are, a file alone does not;
 - `meshes/part.stl` where `meshdir` is "meshes" already. Up to MuJoCo 3 the folders in the name of a
   mesh of a URDF were stripped (`strippath`, whose default was "true"); since 4.0 they are not.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
-from ...errors import StateMachineError
+from ...errors import EngineWarning, StateMachineError
 from ...interface import Model
 from ..recordings import rerun_of
 from ..runs.scenarios import SCENARIOS
@@ -47,8 +48,10 @@ def instead_of(model: Model, asked: str, seed: int = 0) -> Instead:
 def _moves(model: Model, name: str, seed: int) -> bool:
     """Tell whether an experiment of ours moves a model; not where it makes no sense on it."""
     try:
-        rerun = rerun_of(SCENARIOS[name], model, seed=seed)
-        trace = rerun.record(derive=False)
+        # What there is to warn of is told of the run that was asked for.
+        with warnings.catch_warnings(action="ignore", category=EngineWarning):
+            rerun = rerun_of(SCENARIOS[name], model, seed=seed)
+            trace = rerun.record(derive=False)
     except StateMachineError:
         return False
     sides = [(trace, trace.header.joint_labels)]
