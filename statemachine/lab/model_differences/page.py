@@ -158,8 +158,9 @@ def _value_of_fault(fault: FileFault, value: Value, none: str) -> str:
     """Return a value of a fault as text."""
     if value is None:
         return none
-    unit = MOMENT if fault.unit == "kg m²" else fault.unit
-    return value_text(value, unit)
+    if fault.unit == "kg m²":
+        return f"{value_text(value, MOMENT)} kg mm²"
+    return value_text(value, fault.unit)
 
 
 def _gross(result: ModelsComparison) -> str | None:
