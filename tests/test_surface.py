@@ -11,6 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine import cli
 from statemachine.interface import OPTIONS
+from statemachine.interface.read_options import READ_OPTIONS
 
 from .support.requirements import ROOT
 
@@ -40,7 +41,8 @@ def test_a_command_has_as_many_options_as_the_surface_says(command: str) -> None
 
 
 def test_a_side_has_as_many_options_as_the_surface_says() -> None:
-    assert len(OPTIONS) == SURFACE["side"]["options"], OPTIONS
+    options = (*OPTIONS, *READ_OPTIONS)
+    assert len(options) == SURFACE["side"]["options"], options
 
 
 def test_the_public_names_are_those_of_the_surface() -> None:
