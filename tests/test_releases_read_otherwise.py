@@ -12,10 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from statemachine.cli import main
 
 import statemachine as sm
 from statemachine import releases
+from statemachine.cli import main
 from statemachine.errors import BadInputError, EngineWarning
 from statemachine.installed import engine_version
 from statemachine.lab.compare.sides import Request

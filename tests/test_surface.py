@@ -11,7 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine import cli
 from statemachine.interface import OPTIONS
-from statemachine.interface.read_options import READ_OPTIONS
+from statemachine.interface.records import READ_OPTIONS
 
 from .support.requirements import ROOT
 
