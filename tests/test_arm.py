@@ -13,6 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends.bullet import urdf
+from statemachine.backends.bullet.urdf_names import Names
 from statemachine.errors import EngineWarning
 from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir
@@ -164,7 +165,7 @@ def test_every_kind_of_joint(zoo: Any, zoo_urdf: Path, pinocchio: None) -> None:
     witness = sm.Kinematics(zoo_urdf, joint_names=zoo.joint_names)
     # A URDF starts at its root link; the pose of the root in the world is not part of it.
     turn, place = matrix_from_quat(zoo.raw.body_quat[1]), zoo.raw.body_pos[1]
-    random, tips = np.random.default_rng(1), urdf.Names(zoo.raw).tips
+    random, tips = np.random.default_rng(1), Names(zoo.raw).tips
     for qpos in random.uniform(-1, 1, (10, zoo.nq)):
         with opened(zoo, qpos=qpos, derived=True) as (_, data):
             for site in range(zoo.nsite):

@@ -534,7 +534,7 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
 
 
 def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
-    from statemachine.engines.mujoco._sides import same
+    from statemachine.engines.mujoco._quantities import same
     from statemachine.engines.mujoco.differences import differences, edited, entries
     from statemachine.lab.compare.matching import match_models
 

@@ -23,7 +23,7 @@ import pytest
 
 import statemachine as sm
 from statemachine import conformance, releases
-from statemachine.backends.served.release_backend import Server
+from statemachine.backends.served.engine_process import Server
 from statemachine.cli import main
 from statemachine.errors import (
     BadInputError,

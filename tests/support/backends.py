@@ -11,7 +11,8 @@ from typing import Any
 
 import statemachine as sm
 from statemachine import backends, releases
-from statemachine.backends.served.release_backend import ServedEngine, Server, served
+from statemachine.backends.served.engine_process import ServedEngine, Server
+from statemachine.backends.served.release_backend import served
 from statemachine.installed import engine_version, require
 from statemachine.interface import Behaviour
 

@@ -27,6 +27,7 @@ from . import urdf
 from .contacts import Solid, Surfaces
 from .file import MOST_LINKS, UrdfFile
 from .ties import ends_of, mechanisms, movers
+from .urdf_names import Names
 
 if TYPE_CHECKING:
     from ..compiled_types import MjData, MjModel
@@ -66,7 +67,7 @@ class Plan:
     def __init__(self, raw: MjModel, file: UrdfFile | None = None, weighed: bool = False) -> None:
         self.raw, self.file, self.weighed = raw, file, weighed
         self.surfaces = Surfaces(raw)
-        self.names = urdf.Names(raw)
+        self.names = Names(raw)
         self.mechanism = mechanisms(raw)
         self.roots = [root for root in urdf.roots(raw) if self.mechanism[root] == root]
         self.ghost: Any = None

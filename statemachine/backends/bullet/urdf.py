@@ -3,7 +3,6 @@
 URDF knows one joint between two links, no armature, no servo and no site. A site
 becomes a link of its own without mass, fixed to its body, so that an engine that
 reports centres of mass to full precision reports the site to full precision too.
-Numbers are written so that reading them back gives the same float64.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -23,6 +22,8 @@ from ...rotations import matrix_from_quat
 from .. import dense
 from ..compiled_actuators import TransmissionKind
 from ..compiled_kinds import GeomKind
+from .urdf_elements import bare_link, element, inertia_element, joint_element, origin_element
+from .urdf_names import Names
 
 if TYPE_CHECKING:
     from ..compiled_types import MjModel
@@ -37,7 +38,6 @@ _PRIMITIVES: dict[int, str] = {
 # part of the tree's own.
 LIGHT, LIGHTEST = 1e-9, 1e-8
 UNLIMITED = 1e9  # a range or a force where there is none: PyBullet wants a number
-_LONGEST = 200  # PyBullet cuts names at 1,023 bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def write(raw: MjModel, root: int, dialect: Dialect = Dialect(), names: Names | 
     on_world = bool(axes(raw, root)) or dialect.anchored
     if on_world:
         light = floats(raw, root) * min(LIGHT, LIGHTEST * float(raw.body_subtreemass[root]))
-        robot.append(_bare_link("world", light, 1e-3 * light * np.eye(3)))
+        robot.append(bare_link("world", light, 1e-3 * light * np.eye(3)))
     bodies = [body for trunk in (root, *dialect.beside) for body in tree(raw, trunk)]
     for body in bodies:
         robot.append(_link(raw, body, dialect, names))
@@ -127,64 +127,15 @@ def write(raw: MjModel, root: int, dialect: Dialect = Dialect(), names: Names | 
         geoms = range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body])
         for part in sorted({dialect.parts.get(geom, 0) for geom in geoms} - {0}):
             name, fixed = names.part(body, part)
-            link = _bare_link(name, 0.0, np.zeros((3, 3)))
+            link = bare_link(name, 0.0, np.zeros((3, 3)))
             link.extend(_geoms(raw, body, part, dialect))
-            where = _origin(np.zeros(3), np.eye(3))
-            robot.extend([link, _joint(fixed, "fixed", names.links[body], name, where)])
+            where = origin_element(np.zeros(3), np.eye(3))
+            robot.extend([link, joint_element(fixed, "fixed", names.links[body], name, where)])
     for site in range(raw.nsite if dialect.tips else 0):
         if root and int(raw.site_bodyid[site]) in bodies:
             robot.extend(_tip(raw, site, names))
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
-
-
-class Names:
-    """What bodies, joints and sites are called in a URDF, each name once.
-
-    MuJoCo lets a joint and a body, or two things without names, go by one name; a URDF
-    that does is not a file to some readers and the end of the process to others.
-
-    Attributes:
-        links: Of each body's link; joints: of each joint; tips: of each site's link.
-        between: Of the link between two joints of one body, by the first of them.
-        fixed: Of the fixed joint of each body; tips_fixed: of each site's link.
-    """
-
-    def __init__(self, raw: MjModel) -> None:
-        self._taken = links, joints = set[str](), set[str]()
-        bodies = range(raw.nbody)
-        self.links = {b: _once(raw.body(b).name or f"body_{b}", links) for b in bodies}
-        self.joints = {j: _once(raw.joint(j).name or f"joint_{j}", joints) for j in range(raw.njnt)}
-        self.tips = {
-            s: _once(raw.site(s).name or f"site_{s}", links, "_site") for s in range(raw.nsite)
-        }
-        self.between = {j: _once(f"{name}_link", links) for j, name in self.joints.items()}
-        self.fixed = {b: _once(f"{name}_fixed", joints) for b, name in self.links.items()}
-        self.tips_fixed = {s: _once(f"{name}_fixed", joints) for s, name in self.tips.items()}
-        self._parts: dict[tuple[int, int], tuple[str, str]] = {}
-
-    def part(self, body: int, part: int) -> tuple[str, str]:
-        """Of the link of a part of a body, and of its fixed joint."""
-        if (body, part) not in self._parts:
-            name = f"{self.links[body]}_part_{part}"
-            link, fixed = (
-                _once(text, taken)
-                for text, taken in zip((name, f"{name}_fixed"), self._taken, strict=True)
-            )
-            self._parts[body, part] = link, fixed
-        return self._parts[body, part]
-
-
-def _once(name: str, taken: set[str], suffix: str = "") -> str:
-    """A name that is not taken yet, and not so long that a reader cuts it."""
-    first = name = name.encode()[:_LONGEST].decode(errors="ignore")
-    if name in taken and suffix:
-        name = first + suffix
-    number = 2
-    while name in taken:
-        name, number = f"{first}{suffix}_{number}", number + 1
-    taken.add(name)
-    return name
 
 
 def anchor(raw: MjModel, body: int) -> Array:
@@ -218,13 +169,13 @@ def _link(raw: MjModel, body: int, dialect: Dialect, names: Names) -> Element:
     if joints:
         extra, around = _padding(raw, joints[-1], dialect)
         mass, inertia = mass + extra, inertia + dense.product(dense.product(frame.T, around), frame)
-    link = _element(
+    link = element(
         "link",
-        _element(
+        element(
             "inertial",
-            _origin(raw.body_ipos[body] - origin, frame),
-            _element("mass", value=mass),
-            _inertia(inertia),
+            origin_element(raw.body_ipos[body] - origin, frame),
+            element("mass", value=mass),
+            inertia_element(inertia),
         ),
         name=names.links[body],
     )
@@ -248,17 +199,17 @@ def _geom(raw: MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect) ->
     shape = _PRIMITIVES.get(kind, "")
     solids: list[tuple[Array, Element]] = []
     if geom in dialect.hulls:
-        solids.append((pos, _element("mesh", filename=hull_file(geom))))
+        solids.append((pos, element("mesh", filename=hull_file(geom))))
     elif kind == GeomKind.BOX:
-        solids.append((pos, _element(shape, size=2 * size)))
+        solids.append((pos, element(shape, size=2 * size)))
     elif kind == GeomKind.SPHERE:
-        solids.append((pos, _element(shape, radius=size[0])))
+        solids.append((pos, element(shape, radius=size[0])))
     elif shape:
         ends = kind == GeomKind.CAPSULE and not dialect.capsules
         shape = "cylinder" if ends else shape
-        solids.append((pos, _element(shape, radius=size[0], length=2 * size[1])))
+        solids.append((pos, element(shape, radius=size[0], length=2 * size[1])))
         for side in (-1, 1) if ends else ():
-            ball = _element("sphere", radius=size[0])
+            ball = element("sphere", radius=size[0])
             solids.append((pos + side * size[1] * mat[:, 2], ball))
     elif kind == GeomKind.MESH:
         mesh = int(raw.geom_dataid[geom])
@@ -267,13 +218,13 @@ def _geom(raw: MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect) ->
         mat = np.round(dense.product(mat, matrix_from_quat(raw.mesh_quat[mesh]).T), 12)
         pos = np.round(pos - dense.times(mat, raw.mesh_pos[mesh]), 12)
         file = _mesh_file(raw, mesh, dialect.folder)
-        solids.append((pos, _element("mesh", filename=file, scale=raw.mesh_scale[mesh])))
+        solids.append((pos, element("mesh", filename=file, scale=raw.mesh_scale[mesh])))
     elif kind != GeomKind.PLANE:  # which URDF does not know
         raise ValueError(f"geom {geom} has no counterpart in URDF")
     name = raw.geom(geom).name
     for k, (where, solid) in enumerate(solids):
         label = {"name": name} if name and not k else {}  # each name once
-        yield _element(tag, _origin(where, mat), _element("geometry", solid), **label)
+        yield element(tag, origin_element(where, mat), element("geometry", solid), **label)
 
 
 def hull_file(geom: int) -> str:
@@ -297,29 +248,29 @@ def _joints(raw: MjModel, body: int, dialect: Dialect, names: Names) -> Iterator
         turn, place = np.eye(3), np.zeros(3)
     joints = axes(raw, body)
     if not joints:
-        where, name = _origin(place, turn), names.fixed[body]
-        yield _joint(name, "fixed", parent, names.links[body], where)
+        where, name = origin_element(place, turn), names.fixed[body]
+        yield joint_element(name, "fixed", parent, names.links[body], where)
         return
     place = place + dense.times(turn, raw.jnt_pos[joints[0]])
     for joint in joints:
         child = names.links[body]
         if joint != joints[-1]:
             child = names.between[joint]
-            yield _bare_link(child, *_padding(raw, joint, dialect))
+            yield bare_link(child, *_padding(raw, joint, dialect))
         kind = _kind(raw, joint, dialect)
         bounds: dict[str, float] = {}
         if kind != "continuous":
             bounds["lower"], bounds["upper"] = _bounds(raw, joint, dialect)
         dof = int(raw.jnt_dofadr[joint])
         extra = [
-            _element("axis", xyz=raw.jnt_axis[joint]),
-            _element("limit", **bounds, effort=_effort(raw, joint), velocity=100.0),
+            element("axis", xyz=raw.jnt_axis[joint]),
+            element("limit", **bounds, effort=_effort(raw, joint), velocity=100.0),
         ]
         if dialect.dynamics:
             damping, friction = raw.dof_damping[dof], raw.dof_frictionloss[dof]
-            extra.append(_element("dynamics", damping=damping, friction=friction))
-        where = _origin(*_at_zero(raw, joint, place, turn))
-        yield _joint(names.joints[joint], kind, parent, child, where, *extra)
+            extra.append(element("dynamics", damping=damping, friction=friction))
+        where = origin_element(*_at_zero(raw, joint, place, turn))
+        yield joint_element(names.joints[joint], kind, parent, child, where, *extra)
         if joint != joints[-1]:
             parent, turn = child, np.eye(3)
             place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
@@ -361,13 +312,6 @@ def _at_zero(raw: MjModel, joint: int, place: Array, turn: Array) -> tuple[Array
     return place, dense.product(turn, back)
 
 
-def _joint(
-    name: str, kind: str, parent: str, child: str, origin: Element, *extra: Element
-) -> Element:
-    ends = _element("parent", link=parent), _element("child", link=child)
-    return _element("joint", origin, *ends, *extra, name=name, type=kind)
-
-
 def _effort(raw: MjModel, joint: int) -> float:
     """The largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
     on_joint = raw.actuator_trntype == TransmissionKind.JOINT
@@ -381,45 +325,6 @@ def _effort(raw: MjModel, joint: int) -> float:
 def _tip(raw: MjModel, site: int, names: Names) -> Iterator[Element]:
     body, name = int(raw.site_bodyid[site]), names.tips[site]
     mat = matrix_from_quat(raw.site_quat[site])
-    yield _bare_link(name, 0.0, np.zeros((3, 3)))
-    where = _origin(raw.site_pos[site] - anchor(raw, body), mat)
-    yield _joint(names.tips_fixed[site], "fixed", names.links[body], name, where)
-
-
-def _bare_link(name: str, mass: float, inertia: Array) -> Element:
-    """A link without geoms, whose centre of mass is its frame."""
-    inside = _element("inertial", _element("mass", value=mass), _inertia(inertia))
-    return _element("link", inside, name=name)
-
-
-def _inertia(tensor: Array) -> Element:
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor
-    return _element("inertia", ixx=xx, ixy=xy, ixz=xz, iyy=yy, iyz=yz, izz=zz)
-
-
-def _origin(pos: Array, mat: Array) -> Element:
-    return _element("origin", xyz=pos, rpy=_rpy(mat))
-
-
-def _rpy(mat: Array) -> Array:
-    """Angles (3,) with mat = Rz(yaw)·Ry(pitch)·Rx(roll), to full precision everywhere.
-
-    At a pitch of ±90° roll is arbitrary; yaw is computed from the roll that was
-    chosen, so that the product is right whatever it is.
-    """
-    pitch = np.arctan2(-mat[2, 0], np.hypot(mat[0, 0], mat[1, 0]))
-    roll = np.arctan2(mat[2, 1], mat[2, 2])
-    s, c = np.sin(roll), np.cos(roll)
-    yaw = np.arctan2(s * mat[0, 2] - c * mat[0, 1], c * mat[1, 1] - s * mat[1, 2])
-    return np.array([roll, pitch, yaw])
-
-
-def _element(tag: str, *inside: Element, **attributes: Any) -> Element:
-    """An element; a number is the shortest text that reads back as the same float64."""
-    element = Element(tag)
-    for name, value in attributes.items():
-        if not isinstance(value, str):  # no negative zero
-            value = " ".join(map(repr, (np.atleast_1d(value) + 0.0).tolist()))  # noqa: PLW2901
-        element.set(name, value)
-    element.extend(inside)
-    return element
+    yield bare_link(name, 0.0, np.zeros((3, 3)))
+    where = origin_element(raw.site_pos[site] - anchor(raw, body), mat)
+    yield joint_element(names.tips_fixed[site], "fixed", names.links[body], name, where)

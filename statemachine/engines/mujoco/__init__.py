@@ -13,7 +13,8 @@ import numpy as np
 
 from ...errors import MissingEngineError
 from ...installed import require
-from .. import RawEngine, function_of
+from ..methods import function_of
+from ..raw_engine import RawEngine
 
 if TYPE_CHECKING:
     from ...interface import Array, Data, Model

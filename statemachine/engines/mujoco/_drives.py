@@ -28,7 +28,8 @@ from ._gains import (
     motion_of,
     unit_of_ctrl,
 )
-from ._sides import Sides, copies, name_of, same, word_in, zeros
+from ._quantities import same, word_in
+from ._sides import Sides, copies, name_of, zeros
 
 ORDER_OF_SENSORS = "order of sensordata"
 # mjtTrn: what an actuator acts on, and from which site it measures.

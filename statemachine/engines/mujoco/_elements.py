@@ -15,7 +15,9 @@ from ...rotations import HERE, Placement, angle_between, matrix_from_quat
 from ..records import TURNED, DifferingQuantity, Edit, ModelDifference
 from ._gains import Motion, in_units_of, motion_of_tendon
 from ._geoms import NO_TOUCH, touches
-from ._sides import Pairs, Sides, name_of, plain, quantity_of, quat_of, same, zeros
+from ._quantities import plain, quantity_of, same
+from ._rigid_parts import quat_of
+from ._sides import Pairs, Sides, name_of, zeros
 
 # In the place of a field: what a pair has is to be that of its geoms, as edited as these are.
 AS_GEOMS = "pair as its geoms"

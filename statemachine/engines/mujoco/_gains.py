@@ -16,7 +16,7 @@ from ...installed import require
 from ...interface import JointType
 from ..description.records import OF_A_SLIDE
 from ..records import DifferingQuantity, ModelDifference
-from ._sides import quantity_of, same
+from ._quantities import quantity_of, same
 
 GainKind = Literal["motor", "position", "velocity", "damper", "general"]
 Motion = Literal["rotation", "translation", ""]

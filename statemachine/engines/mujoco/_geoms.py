@@ -15,7 +15,8 @@ from ..description.records import CollisionShape
 from ..description.shapes import angle_between, laid_on, likest
 from ..records import DifferingQuantity, Edit, ModelDifference
 from . import _shapes as shapes
-from ._sides import NEAR, Pairs, Sides, copies, name_of, quantity_of, same, zeros
+from ._quantities import quantity_of, same
+from ._sides import NEAR, Pairs, Sides, copies, name_of, zeros
 
 NO_TOUCH = -1e3  # [m] a margin at which nothing touches
 _VERTEX = 1e-6  # [m]: vertices are single precision

@@ -15,7 +15,9 @@ from ...rotations import HERE, angle_between
 from ..description.records import Inertial, motion
 from ..records import TURNED, BodyPair, DifferingQuantity, Edit, ModelDifference, SpecEdit
 from ._fields import word_of
-from ._sides import NEAR, Sides, apart, copies, plain, quat_of, same, zeros
+from ._quantities import plain, same
+from ._rigid_parts import apart, quat_of
+from ._sides import NEAR, Sides, copies, zeros
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
 # What a body weighs: the arrays of each subject.

@@ -11,7 +11,9 @@ from ...installed import require
 from ...interface import Array
 from ..description.records import CollisionShape
 from ..records import DifferingQuantity, Edit, ModelDifference
-from ._sides import Sides, copies, placed, same
+from ._quantities import same
+from ._rigid_parts import placed
+from ._sides import Sides, copies
 
 MESH = 7  # mjtGeom
 PRIMITIVES = {"sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 2, "box": 3}  # sizes of each

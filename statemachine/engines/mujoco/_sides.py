@@ -1,107 +1,26 @@
-"""Two compiled models side by side: their rigid parts, their elements in pairs, how both are told.
-
-What moves as one is compared in one frame: fixed bodies are no difference.
-"""
+"""Two compiled models side by side: their elements in pairs, and how both are told."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ...installed import require
-from ...interface import Array
-from ...rotations import HERE, Placement, matrix_from_quat
-from ..description.records import Inertial
+from ...rotations import Placement
 from ..description.shapes import one_to_one
-from ..description.tree import together
 from ..records import TURNED, BodyPair, Counterparts, DifferingQuantity, Edit, ModelDifference
 from . import _fields as fields
+from ._quantities import differing, plain
+from ._rigid_parts import Solids, apart, placed, quat_of
 
 NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
 _SAME_PLACE = 1e-15  # the same: what composing with frames that are none leaves
 NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
-_ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
 _COUNTED = {"equality": "eq", "camera": "cam"}  # in the names of counts and of views
 
 Pairs = Sequence[tuple[int, int]]
-
-
-def same(left: Any, right: Any) -> bool:
-    """Whether two values are equal, but for rounding."""
-    a, b = np.asarray(left), np.asarray(right)
-    if a.shape != b.shape or "f" not in (a.dtype.kind, b.dtype.kind):
-        return bool(np.array_equal(a, b))
-    # A range without an end is told by its flag.
-    return bool((np.isclose(a, b, _ROUNDING, 1e-15) | np.isinf(a) | np.isinf(b)).all())
-
-
-def plain(value: Any) -> Any:
-    """A number or a tuple, for a result."""
-    return tuple(np.asarray(value).tolist()) if np.ndim(value) else np.asarray(value).item()
-
-
-def word_in(enumeration: str, number: int) -> str:
-    """The word by which an MJCF says an entry of one of the engine's enumerations: "affine"."""
-    return getattr(require("mujoco"), enumeration)(number).name.partition("_")[2].lower()
-
-
-def quantity_of(
-    array: str, left: Any, right: Any, unit: str = "", called: str = ""
-) -> DifferingQuantity:
-    """What two elements have in one array, as a quantity.
-
-    Args:
-        array: Its name in an mjModel; of an option as "opt.o_solref".
-        left: The entry of the first model's element: a number, or some.
-        right: That of the second's.
-        unit: SI unit of each number.
-        called: What the quantity is called; "" for the array's name without its kind.
-    """
-    name = called or fields.word_of(array)
-    if array in fields.CHOICES:
-        words = (word_in(fields.CHOICES[array], int(entry)) for entry in (left, right))
-        return DifferingQuantity(name, *words)
-    if array in fields.FLAGS_OF_ELEMENTS:
-        return DifferingQuantity(name, bool(left), bool(right))
-    if fields.is_beginning(array) and np.size(left) == np.size(right) > 1:
-        end = 1 + max(k for k in range(len(left)) if not same(left[k], right[k]))
-        left, right = left[:end], right[:end]
-        if end == 1:
-            left, right = left[0], right[0]
-    return DifferingQuantity(name, plain(left), plain(right), unit)
-
-
-def differing(
-    row: fields.FieldRow, left: Sequence[Any], right: Sequence[Any]
-) -> tuple[DifferingQuantity, ...]:
-    """The quantities of a row that differ.
-
-    Args:
-        row: Of `fields.ROWS`.
-        left: For each of its arrays the entry of the first model's element.
-        right: Those of the second's.
-    """
-    values: list[DifferingQuantity] = []
-    for array, ours, theirs in zip(row.fields, left, right, strict=True):
-        if array in fields.LIMITS:
-            continue  # a range that is not there says so
-        one, other = _is_unlimited(array, ours), _is_unlimited(array, theirs)
-        if one or other:
-            if one != other:
-                ends = None if one else plain(ours), None if other else plain(theirs)
-                values.append(DifferingQuantity(fields.word_of(array), *ends, row.unit_of(array)))
-        elif not same(ours, theirs):
-            values.append(quantity_of(array, ours, theirs, row.unit_of(array)))
-    return tuple(values)
-
-
-def _is_unlimited(array: str, entry: Any) -> bool:
-    """Tell whether an entry is a range without its flag, which says nothing."""
-    return array in fields.LIMITED and bool(np.isinf(entry).all())
 
 
 def copies(names: Iterable[str], raw: Any, a: int, b: int) -> tuple[Edit, ...]:
@@ -128,91 +47,6 @@ def name_of(raw: Any, kind: str, index: int) -> str:
     on_body = kind in ("geom", "site")
     owner = raw.body(int(getattr(raw, f"{kind}_bodyid")[index])).name if on_body else ""
     return f"{kind} {index}" + (f" on {owner}" if owner else "")
-
-
-def placed(pos: Array, quat: Array) -> Placement:
-    """A pose of the compiled model as a Placement."""
-    return Placement(np.array(pos), matrix_from_quat(np.asarray(quat)))
-
-
-def apart(left: Placement, right: Placement) -> tuple[float, float]:
-    """How far two poses are from each other: [m], and the largest entry of the matrices."""
-    return left.distance(right), float(np.abs(left.mat - right.mat).max())
-
-
-def quat_of(mat: Array) -> Array:
-    """The quaternion (4,), wxyz, of a rotation matrix."""
-    quat = np.empty(4)
-    require("mujoco").mju_mat2Quat(quat, np.ascontiguousarray(mat).reshape(9))
-    return quat
-
-
-def inertial_of(raw: Any, body: int) -> Inertial:
-    """What a body weighs, in its own frame."""
-    axes = matrix_from_quat(raw.body_iquat[body])
-    tensor = axes @ np.diag(raw.body_inertia[body]) @ axes.T
-    return Inertial(float(raw.body_mass[body]), np.array(raw.body_ipos[body]), tensor)
-
-
-class Solids:
-    """The rigid parts of a compiled model, each by the body that is its head.
-
-    Args:
-        raw: An mjModel.
-        led: Bodies that have a counterpart in another model. A mocap body that has none is
-            taken for a part of the world, if a body fixed to it would stand for it.
-    """
-
-    def __init__(self, raw: Any, led: set[int]) -> None:
-        self.raw = raw
-        self._heads = np.array(raw.body_weldid)
-        still = [
-            body for body in np.flatnonzero(raw.body_mocapid >= 0).tolist() if self._stays(body)
-        ]
-        self._heads[np.isin(self._heads, [body for body in still if body not in led])] = 0
-        self._hung = cache(self.hangs)
-
-    def _stays(self, body: int) -> bool:
-        """Whether no keyframe has a mocap body elsewhere, and nothing moves on it."""
-        raw, number = self.raw, self.raw.body_mocapid[body]
-        # Of a file without a keyframe these are empty, and reshape could not tell -1 from them.
-        places = raw.key_mpos.reshape(raw.nkey, raw.nmocap, 3)[:, number]
-        turns = raw.key_mquat.reshape(raw.nkey, raw.nmocap, 4)[:, number]
-        stays = (places == raw.body_pos[body]).all() and (turns == raw.body_quat[body]).all()
-        return bool(stays and not raw.body_dofnum[raw.body_rootid == body].any())
-
-    def head(self, body: int) -> int:
-        """The first body of the rigid part that a body is in."""
-        return int(self._heads[body])
-
-    def members(self, head: int) -> list[int]:
-        """All bodies of a rigid part."""
-        return np.flatnonzero(self._heads == head).tolist()
-
-    def place(self, body: int) -> Placement:
-        """The frame of a body in that of its rigid part."""
-        return HERE if body == self.head(body) else self._hung(body)
-
-    def hangs(self, body: int) -> Placement:
-        """The frame of a body in that of the part that carries it, joints at qpos0."""
-        own = placed(self.raw.body_pos[body], self.raw.body_quat[body])
-        return self.place(int(self.raw.body_parentid[body])) @ own
-
-    def on(self, kind: str, index: int) -> Placement:
-        """The frame of a geom or a site in that of its rigid part."""
-        body, pos, quat = (
-            getattr(self.raw, f"{kind}_{part}")[index] for part in ("bodyid", "pos", "quat")
-        )
-        return self.place(int(body)) @ placed(pos, quat)
-
-    def massive(self, head: int) -> list[int]:
-        """The bodies of a rigid part that have a mass or an inertia."""
-        mass, inertia = self.raw.body_mass, self.raw.body_inertia
-        return [body for body in self.members(head) if mass[body] or inertia[body].any()]
-
-    def inertial(self, *bodies: int) -> Inertial:
-        """Bodies of a rigid part together, in its frame."""
-        return together([inertial_of(self.raw, b).seen_from(self.place(b)) for b in bodies])
 
 
 class Sides:

@@ -22,7 +22,8 @@ from ..description.records import (
 )
 from . import _shapes as shapes
 from ._gains import kind_of_gains
-from ._sides import inertial_of, name_of, placed
+from ._rigid_parts import inertial_of, placed
+from ._sides import name_of
 
 # How many elements of each kind a compiled model has.
 _COUNTS = {

@@ -23,8 +23,9 @@ from ._drives import drives
 from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
 from ._geoms import Geoms
 from ._parts import places, weights
+from ._quantities import plain, quantity_of, same, word_in
 from ._readable import patched_text
-from ._sides import Sides, plain, quantity_of, same, word_in
+from ._sides import Sides
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {

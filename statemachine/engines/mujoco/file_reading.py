@@ -30,7 +30,7 @@ from ..description.urdf import Declared
 from . import _shapes as shapes
 from ._geoms import acting_geoms
 from ._parts import principal
-from ._sides import placed
+from ._rigid_parts import placed
 from .description import describe
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from ..description.reading import ModelReading
 from ..description.records import SCALAR, CollisionShape, Inertial, Robot, RobotJoint
 from ..description.urdf import Declared, DeclaredJoint
 from ._parts import principal
-from ._sides import quat_of
+from ._rigid_parts import quat_of
 from .file_reading import model_of
 
 

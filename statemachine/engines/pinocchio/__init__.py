@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .. import RawEngine, function_of
+from ..methods import function_of
+from ..raw_engine import RawEngine
 
 
 class PinocchioEngine(RawEngine):

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...errors import UnsupportedError
 from ...installed import require
-from .. import RawEngine, function_of
+from ..methods import function_of
+from ..raw_engine import RawEngine
 
 if TYPE_CHECKING:
     from ...backends import pybullet_backend as backend
