@@ -17,20 +17,20 @@ from statemachine.atomic_files import csv_text, replace_csv
 from statemachine.cli import main
 from statemachine.course.grading import classroom
 from statemachine.course.grading.class_table import ClassEntry, few_words, read, rows_of
-from statemachine.course.grading.classroom import (
+from statemachine.course.grading.classroom import judge_all
+from statemachine.course.grading.exercise import LOOK, ExerciseJudge, Grade
+from statemachine.course.grading.faults import FAULTS
+from statemachine.course.grading.faults.examination import Examination, FailedTest, FaultTrial
+from statemachine.course.grading.judges import JUDGES, Judgement
+from statemachine.course.grading.page import class_page, gradescope_results
+from statemachine.course.grading.roster import enrolled
+from statemachine.course.grading.submissions import (
     Submission,
-    enrolled,
     is_one_students,
-    judge_all,
     not_looked_at,
     submission_in,
     submissions,
 )
-from statemachine.course.grading.exercise import LOOK, ExerciseJudge, Grade
-from statemachine.course.grading.faults import FAULTS
-from statemachine.course.grading.faults.run import Examination, FailedTest, FaultTrial
-from statemachine.course.grading.judges import JUDGES, Judgement
-from statemachine.course.grading.page import class_page, gradescope_results
 from statemachine.errors import BadInputError
 from statemachine.show.blocks import Text
 

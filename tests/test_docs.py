@@ -21,18 +21,9 @@ from statemachine.course.notebook import _opening, build, lesson
 from statemachine.course.site import make_path
 from statemachine.errors import BadInputError
 from statemachine.show import terminal
-from statemachine.show.blocks import (
-    Heading,
-    Page,
-    Pipeline,
-    Printed,
-    Question,
-    Slots,
-    Table,
-    Text,
-    Traces,
-)
+from statemachine.show.blocks import Heading, Page, Printed, Question, Table, Text
 from statemachine.show.charts import drawn
+from statemachine.show.pictures import Pipeline, Slots, Traces
 
 from .support.claims import assert_in, refused
 from .support.pages import blocks

@@ -16,8 +16,9 @@ from rich.cells import cell_len
 import statemachine as sm
 from statemachine import cli as command_line
 from statemachine.course.grading.faults import FAULTS, Fault, run
+from statemachine.course.grading.faults.examination import Examination, FailedTest, FaultTrial
 from statemachine.course.grading.faults.patches import PATCHES
-from statemachine.course.grading.faults.run import Examination, FailedTest, FaultTrial, examine
+from statemachine.course.grading.faults.run import examine
 from statemachine.course.grading.page import faults_page
 from statemachine.errors import BadInputError, EngineError
 

@@ -195,14 +195,6 @@ _MOST_LINES = 400
 # Why each is longer; one that was split fails here, and goes.
 _LONGER = {
     "backends/bullet/world.py": "not split yet",
-    "course/grading/classroom.py": "not split yet",
-    "course/grading/faults/run.py": "not split yet",
-    "lab/recordings/recorder.py": "not split yet",
-    "lab/why/setup.py": "not split yet",
-    "processes/sandbox.py": "not split yet",
-    "show/blocks.py": "one list: every block that a page may have",
-    "show/terminal.py": "not split yet",
-    "view/session.py": "not split yet",
 }
 
 

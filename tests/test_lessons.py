@@ -43,18 +43,9 @@ from statemachine.lab.recordings import record_scenario
 from statemachine.lab.runs.in_turns import Ratio
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.show import lesson_template as template
-from statemachine.show import terminal as bar
-from statemachine.show.blocks import (
-    Code,
-    Heading,
-    Page,
-    Printed,
-    Question,
-    Table,
-    Text,
-    Traces,
-    Verdict,
-)
+from statemachine.show import progress as bar
+from statemachine.show.blocks import Code, Heading, Page, Printed, Question, Table, Text, Verdict
+from statemachine.show.pictures import Traces
 
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written

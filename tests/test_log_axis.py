@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine.show.blocks import Traces
 from statemachine.show.charts import draw_picture
+from statemachine.show.pictures import Traces
 
 from .support.claims import assert_has
 

@@ -233,7 +233,7 @@ def test_pybullet_as_it_comes_has_none_of_them() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_energies_are_those_of_the_changed_mass() -> None:
-    from statemachine.lab.recordings.recorder import energies
+    from statemachine.lab.recordings.energies import energies
 
     rows = np.zeros((1, 6)), np.full((1, 6), 0.1)
     models = [model.replace(mass=2 * model.body_mass) for model in on_both("so101")]

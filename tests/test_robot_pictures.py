@@ -20,7 +20,8 @@ from statemachine.course.quiz import Reader
 from statemachine.errors import MissingEngineError
 from statemachine.lab.questions import film
 from statemachine.show import terminal
-from statemachine.show.blocks import Page, Printed, Question, RobotPicture, Text
+from statemachine.show.blocks import Page, Printed, Question, Text
+from statemachine.show.pictures import RobotPicture
 
 from .support.claims import assert_has, assert_in
 from .support.rendering import rendering_environment

@@ -18,7 +18,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.course.grading import exercise, recording
-from statemachine.course.grading.classroom import judge_all, submissions
+from statemachine.course.grading.classroom import judge_all
 from statemachine.course.grading.faults.run import examine
 from statemachine.course.grading.inside.guard import PUBLIC, ROOMS
 from statemachine.course.grading.judges import JUDGES, Judgement
@@ -29,6 +29,7 @@ from statemachine.course.grading.page import (
     grade_page,
     gradescope_results,
 )
+from statemachine.course.grading.submissions import submissions
 from statemachine.errors import BadInputError
 from statemachine.processes import sandbox
 

@@ -23,14 +23,11 @@ import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.lab.recordings import RunMetadata, RunStart, record, write
 from statemachine.measures import Gap
+from statemachine.view.controls import controls_of
 from statemachine.view.live import Command, Live, Tempo
-from statemachine.view.session import (
-    EnginePose,
-    Frame,
-    LiveSession,
-    TraceSession,
-    controls_of,
-)
+from statemachine.view.live_session import LiveSession
+from statemachine.view.session import EnginePose, Frame
+from statemachine.view.trace_session import TraceSession
 from statemachine.view.viser_front import readout, warning
 
 from .support.claims import assert_has, assert_in, refused

@@ -17,8 +17,9 @@ import statemachine as sm
 from statemachine.lab.recordings import record
 from statemachine.show.drawing import drawing_of
 from statemachine.view.live import Live, Tempo
+from statemachine.view.live_session import LiveSession
 from statemachine.view.server import Door
-from statemachine.view.session import LiveSession, TraceSession
+from statemachine.view.trace_session import TraceSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
 from .support.browser import Tab, browser

@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _is_class(options: argparse.Namespace) -> bool:
     """Tell whether files are those of a class, and not one student's."""
-    from ..course.grading.classroom import is_one_students
+    from ..course.grading.submissions import is_one_students
 
     if len(options.files) != 1:
         return len(options.files) > 1

@@ -124,7 +124,7 @@ class TerminalReporter:
 
     def stage(self, what: str) -> AbstractContextManager[Callable[[float], None]]:
         """Show a bar for a stage of the work."""
-        from ..show.terminal import progress
+        from ..show.progress import progress
 
         return progress(what)
 

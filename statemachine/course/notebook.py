@@ -20,7 +20,6 @@ from ..installed import DEFAULT
 from ..lab.questions.film import inline
 from ..show.blocks import (
     LETTERS,
-    Bars,
     Block,
     Code,
     Heading,
@@ -28,18 +27,14 @@ from ..show.blocks import (
     Items,
     Markdown,
     Page,
-    Picture,
-    Pipeline,
     Printed,
     Question,
-    RobotPicture,
     Section,
-    Slots,
     Table,
     Text,
-    Traces,
     Verdict,
 )
+from ..show.pictures import Bars, Picture, Pipeline, RobotPicture, Slots, Traces
 from ..show.terminal import judged, together
 from .lessons import LESSONS, Lesson, module
 from .lessons.pictures import with_picture

@@ -20,7 +20,8 @@ from ..lab.runs.scenarios import scenario
 from ..lab.why import WhyRequest, explain
 from ..lab.why import page as why
 from ..measures.text import reading
-from ..show.blocks import Page, Picture, RobotPicture, Text, Traces
+from ..show.blocks import Page, Text
+from ..show.pictures import Picture, RobotPicture, Traces
 from .lessons import LESSONS, Lesson
 from .lessons.pictures import with_picture
 from .lessons.session import page_of_lesson, take

@@ -31,15 +31,14 @@ from typing import IO, Literal, cast
 
 from . import signal_name
 from .places import View, bare_python
+from .process_tree import PATIENCE, TOKEN, cpu_of, end_all, reap, relatives, wait
 
 GB = 1024**3
 # Address space, of which engines reserve far more than they use.
 MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 2
 _FLOOD = GB // 4  # bytes of output that only a loop without end writes
-_TOKEN = "STATEMACHINE_SANDBOX"
 _NO_MEMORY = "MemoryError|bad_alloc|annot allocate memory"  # at the end of stderr
-_PATIENCE = 2.0  # seconds to end what a command left behind
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 # Where a process cannot limit its computing time, it is watched from outside.
 WATCHED = sys.platform == "win32"
@@ -152,7 +151,7 @@ def run(
         process = subprocess.Popen(
             [*_launched(limits, home), *command],
             cwd=cwd,
-            env=environment | {_TOKEN: token},
+            env=environment | {TOKEN: token},
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=err,
@@ -170,16 +169,16 @@ def run(
             return "flood" if flooded else ""
 
         try:
-            end = _wait(process, began + limits.start, ready, stopped)
+            end = wait(process, began + limits.start, ready, stopped)
             if is_ready := end == "ready":
                 before = cpu_of(process) if WATCHED else 0.0
-                end = _wait(process, time.monotonic() + limits.wall, exceeded, stopped)
+                end = wait(process, time.monotonic() + limits.wall, exceeded, stopped)
             took = time.monotonic() - began
             if is_ready and end == "clock":
                 _ask_where(process, token)
         finally:  # an interrupt too
-            _end_all(process, token)
-            used = _reap(process)
+            end_all(process, token)
+            used = reap(process)
         for file in (out, err):
             file.seek(0)
         stdout, stderr = (file.read(limits.output_most) for file in (out, err))
@@ -329,38 +328,6 @@ def limit_cpu(seconds: float, trace: IO[str]) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (last, last))
 
 
-def cpu_of(process: subprocess.Popen[bytes]) -> float:
-    """How long a process and those that it started have computed so far [s]."""
-    import psutil
-
-    total = 0.0
-    with suppress(psutil.Error):
-        first = psutil.Process(process.pid)
-        for running in (first, *first.children(recursive=True)):
-            with suppress(psutil.Error):
-                times = running.cpu_times()
-                total += times.user + times.system
-    return total
-
-
-def _wait(
-    process: subprocess.Popen[bytes],
-    deadline: float,
-    enough: Callable[[], str],
-    stop: threading.Event,
-) -> str:
-    """What ends the waiting: "code", "clock" (or `stop`), or what `enough` says."""
-    pause = 0.001
-    while True:
-        ended = _has_ended(process)
-        if word := enough():
-            return word
-        remaining = deadline - time.monotonic()
-        if ended or remaining <= 0 or stop.wait(min(pause, remaining)):
-            return "code" if ended else "clock"
-        pause = min(pause * 2, 0.02)
-
-
 def _ask_where(process: subprocess.Popen[bytes], token: str) -> None:
     """Let it write down where it is, if it has a handler for that, and end."""
     if sys.platform == "win32":
@@ -369,68 +336,10 @@ def _ask_where(process: subprocess.Popen[bytes], token: str) -> None:
     with suppress(OSError):  # any of them may end meanwhile
         inside = [
             int(entry.name)
-            for entry in _relatives(process.pid, token)
+            for entry in relatives(process.pid, token)
             if _LAUNCHER.encode() not in (entry / "cmdline").read_bytes()
         ] or inside
     for pid in inside:
         with suppress(OSError):
             os.kill(pid, signal.SIGPROF)
-    _wait(process, time.monotonic() + _PATIENCE / 2, str, threading.Event())
-
-
-def _has_ended(process: subprocess.Popen[bytes]) -> bool:
-    """Whether it has. On POSIX it is not reaped yet then.
-
-    So that its number, and that of its group, is nobody else's when the group is killed.
-    """
-    if sys.platform == "win32" or not hasattr(os, "waitid"):
-        return process.poll() is not None
-    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
-    return os.waitid(os.P_PID, process.pid, options) is not None
-
-
-def _reap(process: subprocess.Popen[bytes]) -> float:
-    """Wait for a process that was ended; how long it had computed [s]."""
-    if sys.platform == "win32" or process.returncode is not None:
-        process.wait()
-        return 0.0
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return usage.ru_utime + usage.ru_stime
-
-
-def _end_all(process: subprocess.Popen[bytes], token: str) -> None:
-    """Kill the command and all that it started."""
-    if sys.platform == "win32":
-        process.kill()
-        return
-    deadline = time.monotonic() + _PATIENCE
-    first = True
-    while True:
-        relatives = [int(entry.name) for entry in _relatives(process.pid, token)]
-        if process.returncode is None:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-        for pid in relatives:
-            with suppress(ProcessLookupError, PermissionError):
-                os.kill(pid, signal.SIGKILL)
-        if time.monotonic() > deadline or not (relatives or first):
-            return
-        first = False  # what was being forked meanwhile shows in the next round
-        time.sleep(0.002)
-
-
-def _relatives(leader: int, token: str) -> set[Path]:
-    """Living processes of the session, or that carry the token, in /proc; without it, none."""
-    mark = f"{_TOKEN}={token}".encode()
-    relatives = set()
-    for entry in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):  # it ended meanwhile, or is another user's
-            # After the name in brackets, which may hold anything.
-            stat = (entry / "stat").read_bytes().rpartition(b")")[2].split()
-            state, session = stat[0], int(stat[3])
-            if state not in b"ZX" and (
-                session == leader or mark in (entry / "environ").read_bytes()
-            ):
-                relatives.add(entry)
-    return relatives
+    wait(process, time.monotonic() + PATIENCE / 2, str, threading.Event())

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from .pictures import Picture
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -105,77 +107,6 @@ class Question:
     always: bool = False
 
 
-@dataclass(frozen=True)
-class Traces:
-    """Curves over one axis; shown where pictures can be.
-
-    Attributes:
-        title: What they show.
-        across: What the horizontal axis is, with its unit; up: the vertical one.
-        curves: (x, y) by name, each a sequence of numbers.
-        log: Whether the vertical axis is logarithmic; what is zero has a level below it.
-        sides: Whether the curves are the sides of a comparison, in the order of their styles.
-        tolerance: Of the values; a line, and what is beyond it is filled.
-        floor: (x, y) of the chaos floor, an area.
-        least: What the vertical axis spans at least.
-    """
-
-    title: str
-    across: str
-    up: str
-    curves: Mapping[str, tuple[Numbers, Numbers]]
-    log: bool = False
-    sides: bool = False
-    tolerance: float | None = None
-    floor: tuple[Numbers, Numbers] | None = None
-    least: float = 0.0
-
-
-@dataclass(frozen=True)
-class Slots:
-    """Two rows of numbered slots and who owns them; shown where pictures can be.
-
-    Attributes:
-        title: What they show.
-        rows: For each row its name and the (owner, start, stop) of its slots.
-    """
-
-    title: str
-    rows: Mapping[str, Sequence[tuple[str, int, int]]]
-
-
-@dataclass(frozen=True)
-class Pipeline:
-    """Stages from left to right, and what covers which; shown where pictures can be.
-
-    Attributes:
-        title: What it shows.
-        stages: Heading and content of each stage.
-        spans: Name of each call, with the first and last stage that it covers.
-    """
-
-    title: str
-    stages: Sequence[tuple[str, Sequence[str]]]
-    spans: Sequence[tuple[str, int, int]]
-
-
-@dataclass(frozen=True)
-class Bars:
-    """Bars for each name; shown where pictures can be.
-
-    Attributes:
-        title: What they show.
-        across: What their length is.
-        names: From top to bottom.
-        bars: By what they are: the length for each name, which is not negative.
-    """
-
-    title: str
-    across: str
-    names: Sequence[str]
-    bars: Mapping[str, Sequence[float]]
-
-
 class TableCell(str):
     """The text of a cell, and what a medium may make of it; elsewhere it is only its text.
 
@@ -203,30 +134,6 @@ class TableCell(str):
         cell = super().__new__(cls, text)
         cell.at, cell.verdict, cell.share, cell.code = at, verdict, share, code
         return cell
-
-
-@dataclass(frozen=True, eq=False)
-class RobotPicture:
-    """The robot where it was, in one pose or moving; shown where pictures can be.
-
-    Attributes:
-        title: What it shows.
-        words: What is to be seen, for who cannot see it.
-        view: What to type to look at the same in a browser.
-        model: Name of the model.
-        poses: Makes qpos (n, nq) of what is drawn solid, and of what is drawn as a ghost over
-            it or None; run only where it is drawn.
-        interval: Simulated time from a pose to the next [s].
-        near: Body to look at from close by; "" for the whole robot.
-    """
-
-    title: str
-    words: str
-    view: str
-    model: str
-    poses: Callable[[], tuple[Poses, Poses | None]]
-    interval: float = 0.08
-    near: str = ""
 
 
 def _one_line(cell: str) -> str:
@@ -371,7 +278,6 @@ class Headline:
         return " ".join(part for part in (f"{self.lead}.", *self.causes, self.end) if part)
 
 
-Picture = Traces | Slots | Pipeline | Bars | RobotPicture
 Block = (
     Heading
     | Text

@@ -17,7 +17,8 @@ from ..atomic_files import replace_bytes
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Array
-from .blocks import Bars, Block, Pipeline, Slots, Traces
+from .blocks import Block
+from .pictures import Bars, Pipeline, Slots, Traces
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero

@@ -19,7 +19,9 @@ from ..models import AnyPath
 from ..release_names import engine_of
 from ..show.drawing import Drawing, drawing_of
 from ..typed_numbers import is_count
-from .session import LiveSession, Session, TraceSession, checked_speed
+from .live_session import LiveSession
+from .session import Session, checked_speed
+from .trace_session import TraceSession
 
 DEFAULT_STATE = "default"  # a keyframe's name that stands for the default state
 

@@ -11,7 +11,7 @@ from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
 from .class_table import ClassEntry, verdict_word
 from .exercise import Grade
-from .faults.run import Examination, FaultTrial
+from .faults.examination import Examination, FaultTrial
 from .judges import JUDGES, Judgement
 
 # What is said where a student's code is not kept from the files of this machine.

@@ -13,10 +13,14 @@ from ...installed import DEFAULT
 from ...lab.runs.reporter import QUIET, Reporter
 from ...models import AnyPath
 from ...processes import checked_jobs
-from . import classroom, exercise
+from . import exercise
 from .class_table import ClassEntry
+from .classroom import judge_all
 from .faults import FAULTS
-from .faults.run import Examination, examine
+from .faults.examination import Examination
+from .faults.run import examine
+from .roster import enrolled
+from .submissions import Submission, not_looked_at, submission_in, submissions
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ def answer(request: CheckRequest, reporter: Reporter = QUIET) -> exercise.Grade:
     file, folder = Path(request.file), None
     if file.is_dir():
         folder = file
-        file = classroom.submission_in(folder)
+        file = submission_in(folder)
     with reporter.stage("check") as progress:
         return exercise.run(file, request.backend, request.time_limit, progress, folder=folder)
 
@@ -133,12 +137,12 @@ def answer_class(request: ClassRequest, reporter: Reporter = QUIET) -> ClassResu
             the table is there and no such table.
         MissingEngineError: The engine is not installed here.
     """
-    submissions: Sequence[classroom.Submission] = classroom.submissions(request.paths)
+    submitted: Sequence[Submission] = submissions(request.paths)
     if request.roster is not None:
-        submissions = classroom.enrolled(submissions, request.roster)
-    with reporter.stage(f"{len(submissions)} files") as progress:
-        entries = classroom.judge_all(
-            submissions,
+        submitted = enrolled(submitted, request.roster)
+    with reporter.stage(f"{len(submitted)} files") as progress:
+        entries = judge_all(
+            submitted,
             request.backend,
             time_limit=request.time_limit,
             jobs=request.jobs,
@@ -146,7 +150,7 @@ def answer_class(request: ClassRequest, reporter: Reporter = QUIET) -> ClassResu
             tests=request.tests,
             progress=progress,
         )
-    return ClassResult(tuple(entries), tuple(classroom.not_looked_at(request.paths)))
+    return ClassResult(tuple(entries), tuple(not_looked_at(request.paths)))
 
 
 def answer_faults(request: FaultsRequest, reporter: Reporter = QUIET) -> Examination:

@@ -15,7 +15,8 @@ from ...lab.runs.drive import Progress
 from ...lab.runs.readings import Tip, read_derived, read_stored
 from ...lab.runs.robot import hold_ctrl
 from ...measures.text import grouped
-from ...show.blocks import Block, Pipeline, Table, Traces
+from ...show.blocks import Block, Table
+from ...show.pictures import Pipeline, Traces
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind

@@ -11,8 +11,9 @@ from ...engines.records import WayBack
 from ...interface import Array, Data, Model, get_state, make_data, reset, set_state, step
 from ...measures import largest
 from ...measures.text import millimetres
-from ...show.blocks import Block, Table, Traces
+from ...show.blocks import Block, Table
 from ...show.lesson_template import where
+from ...show.pictures import Traces
 
 BREAKS = ("extra-step", "late-ctrl")
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)

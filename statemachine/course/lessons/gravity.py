@@ -18,8 +18,9 @@ from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.robot import carried_by_joint, is_the_arm, start_keyframe, touching
 from ...lab.runs.scenarios import SCENARIOS
 from ...measures.text import NONE, apart, position, signed
-from ...show.blocks import Block, Table, Traces
+from ...show.blocks import Block, Table
 from ...show.lesson_template import Blocks, Results, differences, emulated, largest_gap, where
+from ...show.pictures import Traces
 from ._falling import BALANCE, EQUALITY, SERVO, Droop, Forces, droop, milestones
 from ._robot import check_servos, coordinate, start_line, with_joint
 from .session import CodeRun, Options, stepping_loop

@@ -28,8 +28,9 @@ from ...measures import largest, together
 from ...measures.text import position, short_time
 from ...release_names import version_of
 from ...releases import is_here
-from ...show.blocks import Block, Table, Traces
+from ...show.blocks import Block, Table
 from ...show.lesson_template import Blocks, Results, differences, largest_gap, where
+from ...show.pictures import Traces
 from ._robot import check_servos, start_line
 from .session import CodeRun, Options, stepping_loop
 

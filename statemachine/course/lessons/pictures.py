@@ -16,7 +16,8 @@ from ...backends import load
 from ...interface import Array, forward, make_data, reset, step
 from ...lab.runs.robot import TARGET
 from ...lab.runs.scenarios import SCENARIOS
-from ...show.blocks import Page, Printed, RobotPicture
+from ...show.blocks import Page, Printed
+from ...show.pictures import RobotPicture
 
 _ARM, _BOX = "so101/scene", "so101/scene_box"
 _EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later

@@ -11,8 +11,9 @@ from ...interface import JointType, Model, make_data, reset
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import grouped, listed
-from ...show.blocks import Block, Slots, Table
+from ...show.blocks import Block, Table
 from ...show.lesson_template import differences
+from ...show.pictures import Slots
 from .session import CodeRun, Options
 
 NO_NAME = "(no name)"

@@ -19,8 +19,9 @@ from ...lab.runs.in_turns import Ratio, in_turns
 from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import count, duration
 from ...processes import free_memory, resident_memory
-from ...show.blocks import Block, Table, Traces
+from ...show.blocks import Block, Table
 from ...show.lesson_template import by_engine
+from ...show.pictures import Traces
 from ...worlds import make_worlds, reset, step
 from .session import CodeRun, Options
 

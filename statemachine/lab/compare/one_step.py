@@ -31,7 +31,7 @@ from ...interface import (
 from ...measures import RobotScale
 from ...measures.floors import moving_bodies
 from ..recordings import Rerun
-from ..recordings.recorder import put_row
+from ..recordings.repetition import put_row
 from ..runs.drive import Progress, silent
 from .matched import Matched
 from .matching import match_models

@@ -12,7 +12,7 @@ from ...interface import Array, Data, Ints, JointType, Model, forward, step
 from ...measures import ContactNames
 from ...rotations import matrix_from_quat
 from ..recordings.header import labels_of_joints
-from ..recordings.recorder import array_or_nan, is_stale
+from ..recordings.repetition import array_or_nan, is_stale
 from .matched import Matched
 
 KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"

@@ -23,9 +23,9 @@ from ...installed import require_extra
 from ...interface import Array, Model
 from ...measures import nearest
 from ...show import charts as figures
-from ...show.blocks import Picture, RobotPicture
 from ...show.drawing import drawing_of
 from ...show.drawing.scene import Camera, Motion, Pixels, camera_for, framed, poses_through
+from ...show.pictures import Picture, RobotPicture
 from ..compare import Comparison, labels_of
 from ..recordings import Trace
 from ..runs.drive import Progress, silent

@@ -17,8 +17,8 @@ from ...interface import Array, JointType
 from ...measures import COUNT, distances
 from ...measures.text import few, milliseconds, reading, short_time
 from ...show import report_template as template
-from ...show.blocks import Traces
 from ...show.charts import SETTINGS, SIDES, check_suffix, draw_picture, saved
+from ...show.pictures import Traces
 from ...show.report_template import if_true, slots_of
 from ..compare import Comparison, default_tip
 from ..compare.chaos import ChaosFloor

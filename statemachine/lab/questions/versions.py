@@ -6,16 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...measures.text import (
-    NONE,
-    command,
-    listed,
-    quantity,
-    sentence,
-    short_time,
-)
+from ...measures.text import NONE, command, listed, quantity, sentence, short_time
 from ...show import report_template as template
-from ...show.blocks import Bars, Block, Code, Items, Page, Table
+from ...show.blocks import Block, Code, Items, Page, Table
+from ...show.pictures import Bars
 from ...show.report_template import slots_of
 from ..compare import Comparison, Request
 from ..compare.stillness import nothing_moved

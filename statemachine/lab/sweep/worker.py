@@ -31,20 +31,13 @@ from ...measures import ContactNames
 from ...measures.text import listed
 from ...models import resolve
 from ...processes.parallel import settle
-from ..recordings.recorder import energies
+from ..recordings.energies import energies
 from ..runs.controllers import function_file
 from ..runs.drive import check_length, drive, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from .design import Value, digest
-from .request import (
-    PreparedSweep,
-    Sweep,
-    SweepCell,
-    drawn_start,
-    options_at,
-    start_at,
-)
+from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
 from .rows import DONE, FAILED, known
 
 T = TypeVar("T")

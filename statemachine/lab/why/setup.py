@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ...engines import room
-from ...engines.records import DifferingQuantity, Edit, ModelDifference, SpecEdit
+from ...engines.records import Edit, ModelDifference, SpecEdit
 from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.alike import commands_alike, controller_for_right, translated
@@ -17,6 +15,7 @@ from ..compare.matching import Matched
 from ..recordings import Rerun, SideStart, Trace, beginning_with, commands_of, start_of
 from ..runs.scenarios import Controller
 from .causes import EXTRA_ACTUATOR, Cause, built, causes, differences_of
+from .option_differences import differences_by_option, options_that_equalize
 from .order import in_order_of_left, seen_in_order_of_left, slots_of_ctrl, sorted_by_number
 from .request import WhyRequest
 from .run_differences import (
@@ -30,18 +29,6 @@ from .run_differences import (
 )
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
 
-# What the right is given of the left by `Model.replace`, by the name of its cause: each option and
-# the attribute of a Model that has its value. This is the timestep, which a compiled model has no
-# substeps of, and all that is known where there is no compiled model.
-_OPTIONS = {
-    "timestep": {"timestep": "timestep", "substeps": "substeps"},
-    "gravity": {"gravity": "gravity"},
-    "armature": {"armature": "dof_armature"},
-    "damping": {"damping": "dof_damping"},
-    "dry friction": {"frictionloss": "dof_frictionloss"},
-}
-# SI unit of each option that has one.
-_OPTION_UNITS = {"timestep": "s", "gravity": "m/s²"}
 NONE = frozenset[str]()
 
 
@@ -116,7 +103,7 @@ class Setup:
             finer: Differences of files by their single entries, each by itself.
         """
         own = any(self._own_settings)
-        by_option = [] if own else list(self._differences_by_option())
+        by_option = [] if own else list(differences_by_option(*self.models))
         self._by_option = frozenset(row.subject for row in by_option)
         rows = [*self._differences_of_files(finer), *self._difference_of_commands()]
         for side, settings in enumerate(self._own_settings):
@@ -159,21 +146,6 @@ class Setup:
         if commands_alike(translated(left, self.matched, self._starts[1]), right):
             return []
         return [ModelDifference(COMMANDS, "run", "", ())]
-
-    def _differences_by_option(self) -> Iterator[ModelDifference]:
-        """Yield what differs and is equalized by `Model.replace`."""
-        left, right = self.models
-        both_compiled = left.compiled is not None and right.compiled is not None
-        for name, options in _OPTIONS.items():
-            if both_compiled and name != "timestep":
-                continue
-            values: list[DifferingQuantity] = []
-            for option, attribute in options.items():
-                ours, theirs = getattr(left, attribute), getattr(right, attribute)
-                if not np.array_equal(ours, theirs):
-                    values.append(_quantity_of_option(option, ours, theirs))
-            if values and options.keys() <= set(right.capabilities.options):
-                yield ModelDifference(name, "option", "", tuple(values))
 
     @property
     def needs(self) -> dict[str, str]:
@@ -268,7 +240,7 @@ class Setup:
             spec_edits += self._causes[name].spec_edits(run.side)
         model = built(self.models[run.side], tuple(edits), tuple(spec_edits))
         if run.side and not own:
-            options = self._options_of_left(run.equalized & self._by_option)
+            options = options_that_equalize(run.equalized & self._by_option, self.models[0])
             model = model.replace(**options) if options else model
         if run.integrator:
             model = model.replace(integrator=run.integrator)
@@ -277,14 +249,6 @@ class Setup:
             emulated = built(own.emulated, tuple(edits), tuple(spec_edits))
             return own.build(model, emulated, settings, run.without)
         return leave_out(model, run.without)
-
-    def _options_of_left(self, names: frozenset[str]) -> dict[str, Any]:
-        """Return the options of `Model.replace` that equalize some causes."""
-        options: dict[str, Any] = {}
-        for name in sorted(names):
-            for option, attribute in _OPTIONS[name].items():
-                options[option] = getattr(self.models[0], attribute)
-        return options
 
     def _settings_in(self, equalized: frozenset[str]) -> frozenset[str]:
         """Return the settings of an engine as it comes that are among some causes."""
@@ -380,13 +344,6 @@ def _keyframes(
 
 def _start_of_trace(trace: Trace) -> SideStart:
     return SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
-
-
-def _quantity_of_option(option: str, left: Any, right: Any) -> DifferingQuantity:
-    """Return an option of `Model.replace` as a quantity: a number, or an array of some."""
-    if np.ndim(left):
-        left, right = tuple(np.asarray(left).tolist()), tuple(np.asarray(right).tolist())
-    return DifferingQuantity(option, left, right, _OPTION_UNITS.get(option, ""))
 
 
 def _has_extra_actuator(cause: Cause) -> bool:

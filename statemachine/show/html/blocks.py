@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable
 from ...errors import MissingEngineError
 from .. import charts
 from ..blocks import (
-    Bars,
     Block,
     Code,
     Heading,
@@ -18,9 +17,9 @@ from ..blocks import (
     Table,
     TableCell,
     Text,
-    Traces,
     Verdict,
 )
+from ..pictures import Bars, Traces
 from ..terminal import non_breaking
 from .markup import Html, joined, prose, tag
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from ...errors import MissingEngineError
-from ..blocks import Traces
 from ..charts import INK, SIDES, chart
+from ..pictures import Traces
 from .markup import Html, tag
 
 _SIZE = (4.0, 1.3)  # inches

@@ -12,7 +12,8 @@ from ....interface import Array
 from ....measures import distances, same_pairs
 from ....measures.text import figure, quantity, reading, short_time
 from ....show import report_template as template
-from ....show.blocks import Interactive, Traces
+from ....show.blocks import Interactive
+from ....show.pictures import Traces
 from ....show.report_template import slots_of
 from ...compare import Agreement, Comparison, Series
 from ...compare.chaos import ChaosFloor
