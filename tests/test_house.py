@@ -194,7 +194,6 @@ def test_an_import_of_mujoco_is_seen(code: str, expected: bool) -> None:
 _MOST_LINES = 400
 # Why each is longer; one that was split fails here, and goes.
 _LONGER = {
-    "backends/bullet/world.py": "not split yet",
 }
 
 

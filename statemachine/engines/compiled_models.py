@@ -15,12 +15,7 @@ if TYPE_CHECKING:
     from ..interface.records import ReadOptions
     from .description.reading import Comparable, ModelReading
     from .description.records import Robot
-    from .records import (
-        Counterparts,
-        Edit,
-        ModelDifference,
-        SpecEdit,
-    )
+    from .records import Counterparts, Edit, ModelDifference, SpecEdit
 
 
 class CompiledModels:

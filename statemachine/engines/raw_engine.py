@@ -17,12 +17,7 @@ if TYPE_CHECKING:
     from ..show.drawing.scene import Camera, Drawer
     from .call_watch import CallWatch
     from .measured import Phrases
-    from .records import (
-        Dials,
-        EngineTerm,
-        UncommandedJoint,
-        WayBack,
-    )
+    from .records import Dials, EngineTerm, UncommandedJoint, WayBack
 
 
 class RawEngine(CompiledModels):

@@ -29,14 +29,14 @@ def _parts() -> Any:
     from statemachine.backends import hidden_world as _hidden_world
     from statemachine.backends import pybullet_backend
     from statemachine.backends.bullet import driven as bullet_driven
-    from statemachine.backends.bullet import joint_dynamics
+    from statemachine.backends.bullet import joint_dynamics, tree_dynamics
     from statemachine.backends.bullet import plan as bullet_plan
     from statemachine.backends.bullet import world as bullet_world
 
     class Parts:
         data, hidden, driven = _hidden_data, _hidden_world, bullet_driven
         plan, ghost = bullet_plan, bullet_driven
-        law, world = joint_dynamics, bullet_world
+        law, world, dynamics = joint_dynamics, bullet_world, tree_dynamics
         backend, pb = pybullet_backend, bullet_world.pb
 
     return Parts
@@ -122,7 +122,7 @@ def contacts_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
 # The fault, the conformance checks that see it, and the tests of the backend that do.
 PYBULLET_FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
     "xyzw for wxyz": (
-        around("world", "wxyz_from_xyzw")(lambda right, quat: np.array(quat)),
+        around("dynamics", "wxyz_from_xyzw")(lambda right, quat: np.array(quat)),
         {"the_witness_agrees"},
         (),
     ),

@@ -18,9 +18,10 @@ import numpy as np
 from ...backends.bullet.client import pb
 from ...backends.bullet.contacts import Surfaces
 from ...backends.bullet.driven import Act
+from ...backends.bullet.loaded_bodies import UNCLAMPED
 from ...backends.bullet.plan import Plan
 from ...backends.bullet.weights import weights, with_weights, with_weights_of
-from ...backends.bullet.world import UNCLAMPED, World
+from ...backends.bullet.world import World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..records import Dials, Setting
