@@ -8,7 +8,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends import on_default
-from statemachine.backends.repairs import compile_mended
+from statemachine.backends.compiled.repairs import compile_mended
 from statemachine.errors import BadInputError, EngineWarning, ModelError, UnsupportedError
 from statemachine.interface.sites import usual_site
 from statemachine.lab.compare.matching import match_models

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from statemachine.backends.repairs import LEAST, compile_mended, stated_moments
+from statemachine.backends.compiled.repairs import LEAST, compile_mended, stated_moments
 from statemachine.errors import ModelError
 
 mujoco = pytest.importorskip("mujoco")

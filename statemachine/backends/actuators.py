@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array, Ints
-from .compiled_actuators import ActivationKind, BiasKind, CtrlChart, CtrlInput, GainKind
+from .compiled.actuators import ActivationKind, BiasKind, CtrlChart, CtrlInput, GainKind
 from .controls import ctrl_owners
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 # What the controls of an actuator with several are: bits of its ctrlspec, in their order.
 _INPUTS = {

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..interface import Array
-from .compiled_flags import DisableFlag
+from .compiled.flags import DisableFlag
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 
 def bodies_meet(raw: MjModel, a: int, b: int) -> bool:

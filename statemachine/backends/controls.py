@@ -9,7 +9,7 @@ import numpy as np
 from ..interface import Ints
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 
 def ctrl_owners(m: MjModel) -> Ints:

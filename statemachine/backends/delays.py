@@ -18,10 +18,10 @@ from ..errors import BadInputError
 from ..interface import Array, Ints
 from ..processes import free_memory
 from .actuators import commands_needed
-from .compiled_bytes import compile_text, from_binary, saved
+from .compiled.binary_models import compile_text, from_binary, saved
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 SHORTER = 1 - 1e-6
 _LARGE = 1e7  # bytes of buffers, from which on it is asked what memory is free

@@ -1,7 +1,7 @@
 """Small dense algebra that gives the same bits on every processor of a kind.
 
 NumPy's products and solutions go through a BLAS that chooses its kernels by the
-processor, and their last bits differ. Those of `compiled_algebra` do not, and are as quick at
+processor, and their last bits differ. Those of `compiled.algebra` do not, and are as quick at
 these sizes.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..interface import Array
-from .compiled_algebra import dot, factored, product, solved, times
+from .compiled.algebra import dot, factored, product, solved, times
 
 __all__ = ["dot", "factored", "pivoted", "product", "solved", "times"]
 

@@ -14,11 +14,11 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import Array
 from .actuators import servos
-from .compiled_flags import DisableFlag
+from .compiled.flags import DisableFlag
 from .served.release_parts import held
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
     "actuation": DisableFlag.ACTUATION,
@@ -163,7 +163,7 @@ def edited(raw: MjModel, options: dict[str, Any], timestep: float) -> MjModel:
     for name, value in written.items():
         put(raw, name, value)
     if CONSTANTS_FOLLOW & options.keys():
-        from .compiled_stages import set_constants
+        from .compiled.stages import set_constants
 
         set_constants(raw)
     raw.opt.timestep = timestep

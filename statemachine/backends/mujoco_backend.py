@@ -34,9 +34,9 @@ from ..interface.checks import HUGE, TINY, check_vector, engine_steps, unsupport
 from ..interface.records import AS_WRITTEN, Defaults, ReadOptions, StateLayout
 from ..models import AnyPath
 from .compiled import check_numbers, compile_file, compiler_warnings, facts
+from .compiled.spec_files import ENGINE_ERRORS
 from .mujoco.alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from .served.release_parts import constraint_part, contact_arrays
-from .spec_files import ENGINE_ERRORS
 
 # Not RK4: after its step the derived values are neither of the state before nor after.
 INTEGRATORS = {
@@ -161,7 +161,7 @@ class MujocoModel(Model):
         Raises:
             OSError: It cannot be written.
         """
-        from .compiled_bytes import saved
+        from .compiled.binary_models import saved
 
         Path(path).write_bytes(saved(self.raw).tobytes())
 

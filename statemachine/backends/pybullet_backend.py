@@ -48,7 +48,7 @@ from .compiled import (
 from .hidden_data import HiddenModel
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",

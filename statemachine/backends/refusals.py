@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..interface.records import ReadOptions
 from ..models import what_is_there
-from .reading import compile_with
-from .spec_files import ENGINE_ERRORS, reason_of
+from .compiled.reading import compile_with
+from .compiled.spec_files import ENGINE_ERRORS, reason_of
 
 _OPENED = re.compile(r"opening file '(.*)'")
 

@@ -12,10 +12,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .compiled_kinds import EqualityKind
+from .compiled.kinds import EqualityKind
 
 if TYPE_CHECKING:
-    from .compiled_types import MjModel
+    from .compiled.types import MjModel
 
 # A size of a compiled model, as MuJoCo names it, and the kind of element that it counts.
 _KINDS = {

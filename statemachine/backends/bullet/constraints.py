@@ -16,14 +16,14 @@ import numpy as np
 from ...interface import Array
 from ...rotations import INVERSE, matrix_from_quat, times
 from .. import dense
-from ..compiled_kinds import SITE, EqualityKind
-from ..compiled_stages import compute_tendons
+from ..compiled.kinds import SITE, EqualityKind
+from ..compiled.stages import compute_tendons
 from .soft import Soft, SoftRow, bounds_of, shortest_time, soft, soft_row
 from .ties import PLACES, ends_of, linear_sum, movers, moving
 from .world import Tree, World
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 
 def _related(raw: MjModel, dofs: Any) -> Any:

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from ...interface import Array, Contacts
 from ...rotations import matrix_from_quat
 from .. import dense
-from ..compiled_flags import DisableFlag
-from ..compiled_kinds import GeomKind
+from ..compiled.flags import DisableFlag
+from ..compiled.kinds import GeomKind
 from ..contact_rules import bodies_meet, mixed
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 NO_CONTACT = int(DisableFlag.CONTACT | DisableFlag.CONSTRAINT)
 _MOST = 10.0  # PyBullet's largest friction of a pair

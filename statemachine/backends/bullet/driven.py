@@ -28,7 +28,7 @@ from .plan import Plan
 from .world import Tree, World
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
 Act = Callable[[World], None]  # sets something in a world that was opened

@@ -19,16 +19,16 @@ from ...interface import Array
 from ...rotations import matrix_from_quat
 from .. import dense
 from ..compiled import gravity
-from ..compiled_actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
-from ..compiled_flags import DisableFlag
-from ..compiled_kinds import SMALLEST
-from ..compiled_stages import MuscleCurves, muscle_curves
+from ..compiled.actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
+from ..compiled.flags import DisableFlag
+from ..compiled.kinds import SMALLEST
+from ..compiled.stages import MuscleCurves, muscle_curves
 from .constraints import Tendons
 from .soft import bounds_of
 from .world import Tree, World
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 DYNAMICS = (
     ActivationKind.INTEGRATOR,

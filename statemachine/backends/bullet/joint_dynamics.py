@@ -35,7 +35,7 @@ from ...interface import Array
 from ...interface.records import Arrays
 from ...rotations import matrix_from_quat
 from .. import dense
-from ..compiled_flags import DisableFlag, IntegratorKind
+from ..compiled.flags import DisableFlag, IntegratorKind
 from .constraints import Equalities, Tendons
 from .drives import Drives, Medium
 from .soft import (
@@ -53,7 +53,7 @@ from .soft import (
 from .world import Tree, World
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
 _EXPLICIT = (IntegratorKind.EULER, IntegratorKind.RK4)

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from ...interface import Array, JointType
 from ..compiled import new_data
-from ..compiled_bytes import compile_text
-from ..compiled_kinds import GeomKind
-from ..compiled_stages import compute_kinematics, jacobian, mass_matrix
+from ..compiled.binary_models import compile_text
+from ..compiled.kinds import GeomKind
+from ..compiled.stages import compute_kinematics, jacobian, mass_matrix
 from . import urdf
 from .contacts import Solid, Surfaces
 from .file import MOST_LINKS, UrdfFile
@@ -30,7 +30,7 @@ from .ties import ends_of, mechanisms, movers
 from .urdf_names import Names
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjData, MjModel
+    from ..compiled.types import MjData, MjModel
 
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.

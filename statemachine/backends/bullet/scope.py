@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ...errors import UnsupportedError
 from ...interface import Array, JointType
 from ...measures.text import few
-from ..compiled_actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
-from ..compiled_flags import EnableFlag, IntegratorKind
-from ..compiled_kinds import GeomKind
+from ..compiled.actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
+from ..compiled.flags import EnableFlag, IntegratorKind
+from ..compiled.kinds import GeomKind
 from .contacts import NO_CONTACT, damping_ratios
 from .drives import DYNAMICS, in_force
 from .file import MOST_LINKS
@@ -24,7 +24,7 @@ from .ties import acting_tendons, ends_of, joints_of, linear_sum, movers, moving
 from .urdf import floats
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 # What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.

@@ -14,7 +14,7 @@ import numpy as np
 from ...interface import Array
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _TINY = 1e-300  # for a power that is too small for a float
 

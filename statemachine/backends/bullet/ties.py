@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...interface import Array, Ints, JointType
-from ..compiled_actuators import TransmissionKind
-from ..compiled_kinds import SITE, EqualityKind, WrapKind
+from ..compiled.actuators import TransmissionKind
+from ..compiled.kinds import SITE, EqualityKind, WrapKind
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _SUMS = (EqualityKind.JOINT, EqualityKind.TENDON)
 PLACES = (EqualityKind.CONNECT, EqualityKind.WELD)

@@ -20,13 +20,13 @@ import numpy as np
 from ...interface import Array, JointType
 from ...rotations import matrix_from_quat
 from .. import dense
-from ..compiled_actuators import TransmissionKind
-from ..compiled_kinds import GeomKind
+from ..compiled.actuators import TransmissionKind
+from ..compiled.kinds import GeomKind
 from .urdf_elements import bare_link, element, inertia_element, joint_element, origin_element
 from .urdf_names import Names
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _PRIMITIVES: dict[int, str] = {
     GeomKind.BOX: "box",

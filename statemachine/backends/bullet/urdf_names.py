@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 _LONGEST = 200  # PyBullet cuts names at 1,023 bytes
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...interface import Array
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
-from ..compiled_algebra import principal_axes
-from ..compiled_stages import set_constants
+from ..compiled.algebra import principal_axes
+from ..compiled.stages import set_constants
 from ..dense import dot, product, times
 from .client import pb
 from .plan import Plan
@@ -20,7 +20,7 @@ from .trees import FileTree
 from .world import World
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjModel
+    from ..compiled.types import MjModel
 
 
 @dataclass(frozen=True, eq=False)

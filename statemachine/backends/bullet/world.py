@@ -17,14 +17,14 @@ from ...interface import Array
 from ...rotations import INVERSE, matrix_from_quat, xyzw_from_wxyz
 from ...rotations import times as quat_times
 from .. import dense
-from ..compiled_stages import compute_kinematics
+from ..compiled.stages import compute_kinematics
 from .client import Quat, pb, times, turned
 from .plan import Plan
 from .tree_dynamics import TreeDynamics
 from .trees import Tree
 
 if TYPE_CHECKING:
-    from ..compiled_types import MjData
+    from ..compiled.types import MjData
 
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts

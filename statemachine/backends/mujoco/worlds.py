@@ -20,8 +20,8 @@ from ...interface import Array, Ints, Model, State
 from ...interface.checks import check_vector, engine_steps, unsupported
 from ...interface.records import Errors, StateLayout
 from ...interface.worlds import WRITABLE, Worlds, check_memory, without
+from ..compiled.spec_files import ENGINE_ERRORS
 from ..delays import hold, places_of, with_room_of
-from ..spec_files import ENGINE_ERRORS
 from .alarms import (
     FATAL,
     AlarmError,

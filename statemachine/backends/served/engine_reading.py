@@ -21,8 +21,8 @@ from ...interface.read_options import told
 from ...interface.records import AS_WRITTEN, ReadOptions
 from ...release_names import is_release
 from ..compiled import check_numbers, compiler_warnings
+from ..compiled.spec_files import ENGINE_ERRORS, read_spec
 from ..mujoco_backend import MujocoModel
-from ..spec_files import ENGINE_ERRORS, read_spec
 from ..unshared import UnsharedElement, unshared_elements
 from . import release_child as child
 from .engine_process import AnswerError, LoadedModel, LostError, ServedEngine, Server
@@ -89,7 +89,7 @@ def source_of(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineS
 
         moments: dict[str, float] = {}
         if options.balance_inertia:
-            from ..reading import balanced_moments
+            from ..compiled.reading import balanced_moments
 
             moments = balanced_moments(path)
         text = urdf_text(path, options=options, moments=moments)

@@ -11,7 +11,7 @@ from .records import VisualShape
 from .urdf import Declared
 
 if TYPE_CHECKING:
-    from ...backends.repairs import Repair
+    from ...backends.compiled.repairs import Repair
 
 
 @dataclass(frozen=True)

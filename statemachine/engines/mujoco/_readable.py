@@ -241,7 +241,7 @@ def patched_text(raw: Any, edits: Iterable[Edit]) -> Any:
     Raises:
         ModelError: The texts are not found.
     """
-    from ...backends.compiled_bytes import from_binary, saved
+    from ...backends.compiled.binary_models import from_binary, saved
 
     before = bytes(raw.text_data)
     edited = bytearray(before)

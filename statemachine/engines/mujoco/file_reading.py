@@ -34,7 +34,7 @@ from ._rigid_parts import placed
 from .description import describe
 
 if TYPE_CHECKING:
-    from ...backends.repairs import Repair
+    from ...backends.compiled.repairs import Repair
 
 _EDGES = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
@@ -63,7 +63,7 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
         ModelError: It cannot read the file, and nothing mends it; or a URDF makes no sense.
     """
     from ...backends.compiled import compiler_warnings
-    from ...backends.repairs import compile_mended
+    from ...backends.compiled.repairs import compile_mended
 
     version = f"mujoco {require('mujoco').__version__}"
     suffix = path.suffix.lower()

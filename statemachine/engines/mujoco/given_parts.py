@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ...backends.binary import is_binary
-from ...backends.reading import keep_frames, prepare
-from ...backends.spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
+from ...backends.compiled.reading import keep_frames, prepare
+from ...backends.compiled.spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 from ...errors import ModelError
 from ...installed import require
 from ...interface.records import ReadOptions

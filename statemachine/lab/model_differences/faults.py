@@ -11,7 +11,7 @@ from ...engines.description.reading import ModelReading
 from .records import FileFault
 
 if TYPE_CHECKING:
-    from ...backends.repairs import Repair
+    from ...backends.compiled.repairs import Repair
 
 _UNITS = {"kg m^2": "kg m²"}
 

@@ -103,7 +103,7 @@ def _repairs(model: Model) -> tuple[Repair, ...]:
     """Return what was changed of a model's file so that the engine reads it."""
     if model.compiled is None or model.read_options == AS_WRITTEN:
         return ()
-    from ...backends.reading import compile_with  # it imports an engine
+    from ...backends.compiled.reading import compile_with  # it imports an engine
 
     _, repairs = compile_with(model.path, model.read_options)
     return tuple(repairs)

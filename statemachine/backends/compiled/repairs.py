@@ -32,9 +32,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..errors import ModelError, one_line
-from ..interface import Array
-from .repair_record import Repair, label_of
+from ...errors import ModelError, one_line
+from ...interface import Array
+from ..repair_record import Repair, label_of
 from .spec_assets import asset_named, assets_of_file, delete_assets
 from .spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 

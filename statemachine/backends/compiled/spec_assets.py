@@ -9,7 +9,7 @@ from typing import Any
 
 import mujoco
 
-from .repair_record import Repair, label_of
+from ..repair_record import Repair, label_of
 
 # Kinds of elements that are read from a file of their own, with the list of a specification.
 _ASSETS = {"mesh": "meshes", "hfield": "hfields", "texture": "textures", "skin": "skins"}

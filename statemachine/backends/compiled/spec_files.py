@@ -11,7 +11,7 @@ from pathlib import Path
 
 import mujoco
 
-from ..errors import one_line
+from ...errors import one_line
 
 # What MuJoCo raises where it gives up, beside the ValueError of a file that it cannot read. A
 # RuntimeError is one of C++ that the bindings do not know: of memory that cannot be had.
@@ -42,7 +42,7 @@ def read_spec(path: Path, visuals: bool = False) -> mujoco.MjSpec:
     """
     text = None
     if path.suffix != ".xml":
-        from .file_text import text_for
+        from ..file_text import text_for
 
         text = text_for(path, visuals)
     if text is None:

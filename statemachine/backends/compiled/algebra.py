@@ -8,7 +8,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from ..interface import Array
+from ...interface import Array
 
 _TINY = 1e-15  # smallest pivot
 

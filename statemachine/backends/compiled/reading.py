@@ -13,9 +13,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..interface.records import ReadOptions
-from ..measures.text import few, listed
-from .repair_record import Repair
+from ...interface.records import ReadOptions
+from ...measures.text import few, listed
+from ..repair_record import Repair
 from .repairs import balance_all, mend_inertia
 from .spec_assets import assets_of, delete_assets
 from .spec_files import compile_spec, read_spec

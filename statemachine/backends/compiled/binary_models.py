@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled_types import MjModel
+from .types import MjModel
 
 
 def compile_text(text: str) -> MjModel:

@@ -22,13 +22,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError, EngineWarning, ModelError, shown
-from ..interface import Array, Ints, JointType, Keyframe
-from ..interface.checks import HUGE, TINY
-from ..interface.records import AS_WRITTEN, ReadOptions
-from .actuators import control_names, delay_steps, servos
-from .binary import is_binary, read_binary
-from .controls import ctrl_owners
+from ...errors import BadInputError, EngineWarning, ModelError, shown
+from ...interface import Array, Ints, JointType, Keyframe
+from ...interface.checks import HUGE, TINY
+from ...interface.records import AS_WRITTEN, ReadOptions
+from ..actuators import control_names, delay_steps, servos
+from ..binary import is_binary, read_binary
+from ..controls import ctrl_owners
 from .spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
@@ -114,7 +114,7 @@ def _from_binary(path: Path, content: bytes, options: ReadOptions) -> mujoco.MjM
         raise BadInputError(
             f"{path} is binary, compiled already: balance_inertia and meshes are of XML files"
         )
-    from .compiled_bytes import from_binary
+    from .binary_models import from_binary
 
     try:
         return from_binary(content)
@@ -140,7 +140,7 @@ def _compile_xml(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list
         raw, repairs = compile_with(path, options)
         return raw, list(effects(path, options, repairs))
     except (ValueError, *ENGINE_ERRORS) as error:
-        from .refusals import explained
+        from ..refusals import explained
 
         raise ModelError(f"MuJoCo cannot read {path}: {explained(path, options, error)}") from error
 

@@ -1,6 +1,6 @@
 """Numbers by which a compiled model says of what kind an element is: MuJoCo's enumerations.
 
-Those of actuators stand in `compiled_actuators`, what a model's options say in `compiled_flags`.
+Those of actuators stand in `actuators`, what a model's options say in `flags`.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from ..interface import Array
-from .compiled_types import MjData, MjModel
+from ...interface import Array
+from .types import MjData, MjModel
 
 
 def compute_kinematics(model: MjModel, data: MjData) -> None:
