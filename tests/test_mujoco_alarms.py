@@ -16,7 +16,8 @@ import pytest
 
 import statemachine as sm
 from statemachine import worlds
-from statemachine.backends import compiled, mujoco_backend
+from statemachine.backends import mujoco_backend
+from statemachine.backends.compiled import model as compiled
 from statemachine.backends.mujoco import alarms as mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 

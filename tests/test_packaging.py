@@ -63,7 +63,7 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
     )
     tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
     assert tops == {"statemachine", "statemachine_sim.py"}
-    assert not [name for name in names if "test" in name or "__pycache__" in name]
+    assert not [name for name in names if re.search(r"(^|/)tests?[/_]|__pycache__", name)]
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends.compiled import check_numbers
+from statemachine.backends.compiled.model import check_numbers
 from statemachine.errors import EngineWarning, ModelError, StateMachineError
 
 from .support.claims import assert_in, refused, warnings_of

@@ -33,7 +33,7 @@ from ..interface import (
 from ..interface.checks import HUGE, TINY, check_vector, engine_steps, unsupported
 from ..interface.records import AS_WRITTEN, Defaults, ReadOptions, StateLayout
 from ..models import AnyPath
-from .compiled import check_numbers, compile_file, compiler_warnings, facts
+from .compiled.model import check_numbers, compile_file, compiler_warnings, facts
 from .compiled.spec_files import ENGINE_ERRORS
 from .mujoco.alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from .served.release_parts import constraint_part, contact_arrays

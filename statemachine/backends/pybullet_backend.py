@@ -38,7 +38,7 @@ from .bullet.plan import Plan
 from .bullet.scope import as_targets, check, ignored, otherwise, softness
 from .bullet.weights import weighed_as_it_comes
 from .bullet.world import ENGINE_TIMESTEP, World
-from .compiled import (
+from .compiled.model import (
     check_numbers,
     compile_file,
     compiler_warnings,

@@ -67,7 +67,7 @@ def _overlaps(model: Model, places: Mapping[str, Array]) -> list[str]:
     """Return the shapes inside each other in a state, as `measures.overlaps` has them."""
     if model.compiled is None:
         return []
-    from .compiled import contacts_in
+    from .compiled.model import contacts_in
 
     geoms, distances = contacts_in(model.compiled, places)
     if not (distances < 0).any():

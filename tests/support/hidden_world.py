@@ -23,7 +23,7 @@ from typing import Any, cast
 import numpy as np
 
 from statemachine.backends import HiddenModel, HiddenWorld, Moment, mujoco_backend
-from statemachine.backends.compiled import facts
+from statemachine.backends.compiled.model import facts
 from statemachine.backends.mujoco_backend import MujocoModel
 from statemachine.interface import DERIVED, Array, forward, make_data, reset, step
 

@@ -18,7 +18,7 @@ from ...interface import DERIVED, POSES, Array, JointType
 from ...interface.records import Arrays
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
 from .. import dense
-from ..compiled import gravity
+from ..compiled.model import gravity
 from ..hidden_world import HiddenWorld, Memory, Moment, Read, bounded
 from .client import pb
 from .contacts import contacts_of

@@ -18,10 +18,10 @@ import numpy as np
 from ...interface import Array
 from ...rotations import matrix_from_quat
 from .. import dense
-from ..compiled import gravity
 from ..compiled.actuators import ActivationKind, BiasKind, GainKind, TransmissionKind
 from ..compiled.flags import DisableFlag
 from ..compiled.kinds import SMALLEST
+from ..compiled.model import gravity
 from ..compiled.stages import MuscleCurves, muscle_curves
 from .constraints import Tendons
 from .soft import bounds_of

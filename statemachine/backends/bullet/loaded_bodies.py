@@ -14,8 +14,8 @@ import numpy as np
 
 from ...interface import Array
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
-from ..compiled import gravity
 from ..compiled.algebra import quat_of_matrix
+from ..compiled.model import gravity
 from . import urdf
 from .client import as_file, connect, disconnect, load_urdf, pb, times, turned
 from .contacts import NO_CONTACT, Solid

@@ -19,9 +19,9 @@ from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
 from ...interface import Array, JointType
-from ..compiled import new_data
 from ..compiled.binary_models import compile_text
 from ..compiled.kinds import GeomKind
+from ..compiled.model import new_data
 from ..compiled.stages import compute_kinematics, jacobian, mass_matrix
 from . import urdf
 from .contacts import Solid, Surfaces

@@ -20,7 +20,7 @@ from ...interface.checks import unsupported_by
 from ...interface.read_options import told
 from ...interface.records import AS_WRITTEN, ReadOptions
 from ...release_names import is_release
-from ..compiled import check_numbers, compiler_warnings
+from ..compiled.model import check_numbers, compiler_warnings
 from ..compiled.spec_files import ENGINE_ERRORS, read_spec
 from ..mujoco_backend import MujocoModel
 from ..unshared import UnsharedElement, unshared_elements

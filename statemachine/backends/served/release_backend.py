@@ -23,7 +23,7 @@ from ...interface.records import AS_WRITTEN, Defaults, ReadOptions
 from ...release_names import version_of
 from ...releases import python_of
 from ..binary import is_binary
-from ..compiled import facts, fastest
+from ..compiled.model import facts, fastest
 from ..hidden_data import HiddenModel
 from ..mujoco_backend import MujocoModel
 from ..mujoco_backend import load as load_installed

@@ -62,7 +62,7 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
         MissingEngineError: MuJoCo is not installed here.
         ModelError: It cannot read the file, and nothing mends it; or a URDF makes no sense.
     """
-    from ...backends.compiled import compiler_warnings
+    from ...backends.compiled.model import compiler_warnings
     from ...backends.compiled.repairs import compile_mended
 
     version = f"mujoco {require('mujoco').__version__}"
@@ -113,7 +113,7 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
 
 def model_of(raw: Any, path: Path) -> Model:
     """Return a compiled model as a Model."""
-    from ...backends.compiled import check_numbers
+    from ...backends.compiled.model import check_numbers
     from ...backends.mujoco_backend import MujocoModel
 
     check_numbers(raw, str(path))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...backends.binary import is_binary
-from ...backends.compiled import ENGINE_ERRORS, compiler_warnings, read_spec, reason_of
+from ...backends.compiled.model import ENGINE_ERRORS, compiler_warnings, read_spec, reason_of
 from ...errors import ModelError
 from ...interface import Array
 from ..records import Edit, ElementReference, SpecEdit
