@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,12 @@ import numpy as np
 import pytest
 
 from statemachine.lab.model_differences import ListedDifference, ModelsComparison, compare
+from statemachine.lab.model_differences.page import page
+from statemachine.show.blocks import Block, Text, Verdict
 
 from .support.claims import assert_has
 from .support.files import written, written_all
+from .support.processes import Cli
 
 SERVO = """<mujoco><compiler angle="radian"/><option timestep="0.001"/>
   <worldbody><body name="arm"><joint name="joint" {joint} damping="0.1"/>
@@ -35,6 +39,11 @@ def _row(result: ModelsComparison, quantity: str) -> ListedDifference:
     """The one row of a quantity."""
     (row,) = [row for row in result.differences if row.quantity == quantity]
     return row
+
+
+def _page(result: ModelsComparison) -> Sequence[Block]:
+    """The blocks of the page of a comparison."""
+    return page(result, ("left", "right")).blocks
 
 
 def _settled(text: str) -> float:
@@ -135,12 +144,42 @@ def test_an_inertia_that_is_no_solids_is_compared_as_it_is_stated(tmp_path: Path
     spec.compiler.balanceinertia = True
     balanced = spec.compile().body_inertia[-1]
     assert_has(fault, side="left", element="tip", quantity="inertia", unit="kg m²")
-    assert fault.stated == pytest.approx((0.04, 0.01, 0.01))
+    assert fault.stated == pytest.approx((0.01, 0.01, 0.04))
     assert fault.used == pytest.approx(tuple(balanced))
     assert fault.factor == pytest.approx(2.0)
     row = _row(result, "moments")
     assert row.left == pytest.approx((0.01, 0.01, 0.04))
     assert row.right == pytest.approx((0.01, 0.01, 0.02))
+
+
+def test_a_mended_inertia_weighs_what_a_run_feels_of_it(tmp_path: Path) -> None:
+    bad, good = _urdf(ixx=0.1, iyy=0.02, izz=0.02), _urdf(ixx=0.02, iyy=0.02, izz=0.02)
+    felt: list[float] = []
+    for text in (bad, good):
+        spec = mujoco.MjSpec.from_string(text)
+        spec.compiler.balanceinertia = True
+        raw = spec.compile()
+        data = mujoco.MjData(raw)
+        mujoco.mj_forward(raw, data)
+        full = np.zeros((1, 1))
+        mujoco.mj_fullM(raw, data, full)
+        felt.append(float(full[0, 0]))
+    row = _row(_listed(tmp_path, bad, good, "urdf"), "moments")
+    assert row.share == pytest.approx((felt[0] - felt[1]) / felt[0])
+    assert "as mended" in row.effect
+
+
+def test_two_inertias_that_are_mended_to_one_differ_as_stated_alone(tmp_path: Path) -> None:
+    bad = _urdf(ixx=0.1, iyy=0.02, izz=0.02)
+    row = _row(_listed(tmp_path, bad, _urdf(ixx=0.02, iyy=0.11, izz=0.01), "urdf"), "moments")
+    assert row.share == pytest.approx(0.0, abs=1e-12)
+
+
+def test_moments_of_a_fault_stand_in_the_order_of_its_row(tmp_path: Path) -> None:
+    result = _listed(tmp_path, _urdf(iyy=0.5), _urdf(), "urdf")
+    (fault,) = result.faults
+    assert fault.stated == pytest.approx((0.02, 0.5, 0.04))
+    assert fault.stated == pytest.approx(_row(result, "moments").left)
 
 
 def test_principal_moments_stand_in_the_order_of_the_file(tmp_path: Path) -> None:
@@ -213,3 +252,82 @@ def test_a_coupling_that_only_one_file_has_is_told_in_words(tmp_path: Path) -> N
     texts = _urdf(more=more.format(mimic)), _urdf(more=more.format(""))
     row = _row(_listed(tmp_path, *texts, suffix="urdf"), "equality")
     assert (row.left, row.right) == ("k is -2 j +0.5", "nothing")
+
+
+FLEX = """<mujoco><worldbody><flexcomp name="cloth" type="grid" count="3 3 1" radius="0.01"
+  spacing="0.1 0.1 0.1" dim="2"><edge damping="{damping}"/></flexcomp></worldbody></mujoco>"""
+
+
+def test_the_verdict_tells_why_not_all_was_compared(tmp_path: Path) -> None:
+    result = _listed(tmp_path, FLEX.format(damping=1), FLEX.format(damping=5))
+    (why,) = result.skipped
+    (verdict,) = [block for block in _page(result) if isinstance(block, Verdict)]
+    assert not verdict.holds
+    assert why in verdict.text
+
+
+EVERY_JOINT = """<mujoco><worldbody>
+  <body><joint name="free" type="free" damping="{free}"/><geom size="0.1"/></body>
+  <body pos="3 0 0"><joint name="hinge" damping="2" {stop}/><geom size="0.1"/>
+    <body pos="0 0 1"><joint name="slide" type="slide" damping="3"/><geom size="0.1"/>
+      <body pos="0 0 1"><joint name="ball" type="ball" damping="{ball}"/><geom size="0.1"/>
+  </body></body></body></worldbody>
+  <equality><joint joint1="hinge" solref="{solref}"/></equality></mujoco>"""
+EVERY_VALUE = {"free": 1, "ball": 4, "stop": "", "solref": "0.1 1"}
+
+
+def _joints(**changes: Any) -> str:
+    return EVERY_JOINT.format(**(EVERY_VALUE | changes))
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "figures"),
+    [
+        ("0.1 1", "0.2 1", {"timeconst": (0.1, 0.2, "s")}),
+        ("0.1 1", "0.1 2", {"dampratio": (1.0, 2.0, "")}),
+        ("0.1 1", "0.2 2", {"timeconst": (0.1, 0.2, "s"), "dampratio": (1.0, 2.0, "")}),
+        ("-100 -1", "-200 -2", {"": ((-100.0, -1.0), (-200.0, -2.0), "")}),
+        ("0.1 1", "-200 -2", {"": ((0.1, 1.0), (-200.0, -2.0), "")}),
+    ],
+)
+def test_each_number_of_a_positive_solref_has_its_unit(
+    tmp_path: Path, left: str, right: str, figures: dict[str, Any]
+) -> None:
+    result = _listed(tmp_path, _joints(solref=left), _joints(solref=right))
+    values: dict[str, Any] = {}
+    for row in result.differences:
+        values[row.quantity.removeprefix("solref").strip()] = (row.left, row.right, row.unit)
+    assert values == figures
+
+
+def test_the_solref_of_a_stop_is_a_time(tmp_path: Path) -> None:
+    stop = 'range="-1 1" limited="true" solreflimit="{} 1"'
+    sides = (_joints(stop=stop.format(time)) for time in (0.02, 0.03))
+    row = _row(_listed(tmp_path, *sides), "solref timeconst")
+    assert_has(row, left=0.02, right=0.03, unit="s")
+
+
+def test_the_damping_of_a_free_joint_has_the_units_of_both_motions(tmp_path: Path) -> None:
+    row = _row(_listed(tmp_path, _joints(), _joints(free=2)), "damping")
+    assert_has(row, element="free", unit="N·s/m and N·m·s", effect="")
+
+
+def test_every_joint_that_is_compared_is_counted(tmp_path: Path) -> None:
+    result = _listed(tmp_path, _joints(), _joints(ball=5))
+    dampings = [row for row in result.agreements if row.subject == "damping"]
+    assert sum(row.compared for row in dampings) == 4
+    assert sum(row.count for row in dampings) == 3
+
+
+def test_one_joint_is_one_joint(tmp_path: Path) -> None:
+    result = _listed(tmp_path, _urdf(), _urdf(), "urdf")
+    texts = [block.text for block in _page(result) if isinstance(block, Text)]
+    assert any("of 1 joint put" in text for text in texts)
+
+
+def test_a_long_name_of_a_file_is_not_broken_before_its_suffix(tmp_path: Path, here: Cli) -> None:
+    folder = "a_folder_with_a_long_name_x"
+    (tmp_path / folder).mkdir()
+    written_all(tmp_path / folder, {"left.urdf": _urdf(), "right.urdf": _urdf(mass=2)})
+    printed = here("compare", "--models", f"{folder}/left.urdf", f"{folder}/right.urdf").stdout
+    assert "right.urdf" in printed.split("touching")[0].split()

@@ -67,7 +67,7 @@ def test_an_unbalanced_inertia_gets_the_moments_that_balanceinertia_gives(tmp_pa
     raw = spec.compile()
     (repair,) = reading.repairs
     assert (repair.kind, repair.name, repair.quantity) == ("body", "arm", "inertia")
-    assert repair.stated == pytest.approx((1e-4, 1e-5, 1e-5))
+    assert repair.stated == pytest.approx((1e-5, 1e-4, 1e-5))
     assert repair.used == pytest.approx(tuple(raw.body("arm").inertia))
     assert repair.factor == pytest.approx(4)
     assert reading.compiled.body_inertia == pytest.approx(raw.body_inertia)
@@ -91,7 +91,7 @@ def test_the_spec_states_what_the_file_states(tmp_path):
     path = arm(tmp_path, moving=inertial(UNBALANCED))
     spec = compile_mended(path).spec
     assert [body.name for body in spec.bodies] == ["world", "base", "arm", "tip"]
-    assert stated_moments(spec.body("arm")) == pytest.approx([1e-4, 1e-5, 1e-5])
+    assert stated_moments(spec.body("arm")) == pytest.approx([1e-5, 1e-4, 1e-5])
     assert stated_moments(spec.body("base")) is None
 
 
@@ -99,7 +99,7 @@ def test_an_inertia_with_a_negative_moment_gets_their_mean(tmp_path):
     path = arm(tmp_path, moving=inertial(INDEFINITE))
     assert "positive eigenvalues" in refusal(path)
     (repair,) = compile_mended(path).repairs
-    assert repair.stated == pytest.approx((4e-4, 1e-4, -2e-4))
+    assert repair.stated == pytest.approx((-2e-4, 4e-4, 1e-4))
     assert repair.used == pytest.approx((1e-4, 1e-4, 1e-4))
     assert repair.factor == math.inf
 

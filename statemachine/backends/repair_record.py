@@ -23,9 +23,9 @@ class Repair:
             "site", "pair", "sensor".
         name: Of the element; "body 3" for one without a name, by its place in the file.
         body: Name of the body that has the element; "" for what is of no body.
-        quantity: "inertia", the three principal moments, largest first; "mass"; "file" of a mesh, a
-            texture, a height field or a skin; "mesh" or "hfield" of a geom or a site; "geom" of a
-            pair or a sensor that refers to a deleted one.
+        quantity: "inertia", the three principal moments, in the order of the axes of the file (ixx,
+            iyy, izz); "mass"; "file" of a mesh, a texture, a height field or a skin; "mesh" or
+            "hfield" of a geom or a site; "geom" of a pair or a sensor that refers to a deleted one.
         stated: What the file says, in `unit`: a number, three moments, a name; None where it says
             nothing.
         used: What the compiled model has instead; None where the element was deleted.

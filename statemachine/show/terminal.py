@@ -329,9 +329,13 @@ def _loud(cell: str) -> str:
 
 
 def _broken(cell: str, width: int) -> str:
-    """A cell in whose names that are too long there are blanks, if possible behind a sign."""
+    """A cell in whose names that are too long there are blanks, if possible behind a sign.
+
+    The suffix of a file stays with its name.
+    """
     much = rf"(?=\S{{{width + 1}}})"
-    return re.sub(rf"{much}(?:\S{{0,{width - 1}}}[_/.@-]|\S{{{width}}})", r"\g<0> ", cell)
+    sign = r"(?:[_/@-]|\.(?!\w{1,5}(?:\s|$)))"
+    return re.sub(rf"{much}(?:\S{{0,{width - 1}}}{sign}|\S{{{width}}})", r"\g<0> ", cell)
 
 
 def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> Sequence[int]:

@@ -26,6 +26,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -166,22 +167,38 @@ def _body(spec: mujoco.MjSpec, name: str, number: int) -> Any:
 
 
 def stated_moments(body: Any) -> Array | None:
-    """Return the principal moments (3,) that a body of a specification states, largest first.
+    """Return the principal moments (3,) that a body of a specification states.
 
     Args:
         body: A mujoco.MjsBody that was not compiled.
 
     Returns:
-        Moments of inertia [kg m^2]; None where the file gives no inertia.
+        Moments of inertia [kg m^2], in the order of the axes that the file states them along (ixx,
+        iyy, izz), each where its own axis is nearest; None where the file gives no inertia.
     """
     full = np.array(body.fullinertia)
     if not np.isnan(full[0]):
         xx, yy, zz, xy, xz, yz = full
         matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return np.linalg.eigvalsh(matrix)[::-1]
+        return _moments_by_axis(matrix)
     if not body.explicitinertial:
         return None
-    return np.sort(body.inertia)[::-1]
+    return np.array(body.inertia)
+
+
+def _moments_by_axis(matrix: Array) -> Array:
+    """Return the principal moments (3,) of an inertia, each at the axis that its own is nearest to.
+
+    Args:
+        matrix: The inertia (3, 3) [kg m^2].
+    """
+    moments, own = np.linalg.eigh(matrix)
+    cosines = np.abs(own)  # of an axis of the matrix, by row, with a principal one, by column
+    # Rounded, so that two orders that are as near are a matter of no last digit.
+    order = max(
+        permutations(range(3)), key=lambda order: round(float(cosines[range(3), order].sum()), 9)
+    )
+    return moments[list(order)]
 
 
 def balance_all(spec: mujoco.MjSpec, reason: str) -> list[Repair]:
@@ -199,7 +216,7 @@ def balance_all(spec: mujoco.MjSpec, reason: str) -> list[Repair]:
         moments = stated_moments(body)
         if moments is None or not moments.any():
             continue
-        largest, middle, smallest = moments.tolist()
+        smallest, middle, largest = np.sort(moments).tolist()
         if largest > middle + smallest or smallest < _LEAST_EIGENVALUE:
             repairs += _balance(spec, body, _Fault(reason, body.name, None, None))
     return repairs

@@ -49,6 +49,8 @@ class ModelReading:
         floats: Whether its base was given a free joint, of which the file says nothing.
         settings: Names of the options that the source tells of; None where it tells of all.
         notes: What a reader should know, in sentences.
+        mended: As `model`, but with the masses and inertias that a run has; None where none was
+            mended.
     """
 
     model: Model
@@ -61,3 +63,9 @@ class ModelReading:
     floats: bool = False
     settings: frozenset[str] | None = None
     notes: tuple[str, ...] = ()
+    mended: Model | None = None
+
+    @property
+    def run_model(self) -> Model:
+        """The Model with the masses and inertias that a run has."""
+        return self.model if self.mended is None else self.mended

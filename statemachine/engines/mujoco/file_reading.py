@@ -7,6 +7,7 @@ them.
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -91,6 +92,12 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
         *_visuals(raw, _mesh_files(mended.spec)),
         *_unread_visuals(mended.spec, mended.repairs),
     )
+    run_model: Model | None = None
+    if any(repair.kind == "body" for repair in mended.repairs):
+        run_raw = copy.copy(raw)
+        if declared is not None:
+            _state_frictions(run_raw, declared)
+        run_model = model_of(run_raw, path)
     _restate(raw, mended.spec, mended.repairs)
     if declared is not None:
         _state_frictions(raw, declared)
@@ -108,6 +115,7 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
         declared=declared,
         floats=floats,
         notes=notes,
+        mended=run_model,
     )
 
 

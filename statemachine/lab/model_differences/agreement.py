@@ -13,6 +13,7 @@ from ...engines.description.records import OF_A_SLIDE, SCALAR, CollisionShape, R
 from ...engines.description.shapes import likest
 from ...engines.description.urdf import Declared
 from ..compare.matching import MatchedTrees
+from .quantities import unit_of_free_joint
 from .records import SUBJECTS, PoseGap, QuantityAgreement
 
 POSES = 100  # at which the same positions are put into both
@@ -121,8 +122,7 @@ def _of_pair(
         yield _Compared("places", "m", a.name, float(np.linalg.norm(off_frame.pos)), reach)
         turn = math.atan2(*_turn(off_frame.mat))
         yield _Compared("places", "rad", a.name, turn, math.pi)
-    if a.kind in SCALAR:
-        yield from _of_joint(a, b, declared)
+    yield from _of_joint(a, b, declared)
 
 
 def _turn(mat: np.ndarray) -> tuple[float, float]:
@@ -134,12 +134,11 @@ def _turn(mat: np.ndarray) -> tuple[float, float]:
 def _of_joint(
     left: RobotJoint, right: RobotJoint, declared: Sequence[Declared | None]
 ) -> Iterator[_Compared]:
-    """Yield what two hinges, or two slides, are set to."""
-    slides = left.kind == "slide"
+    """Yield what two joints of one kind are set to."""
     if left.limits is not None and right.limits is not None:
         span = max(left.limits[1] - left.limits[0], right.limits[1] - right.limits[0])
         for ours, theirs in zip(left.limits, right.limits, strict=True):
-            unit = "m" if slides else "rad"
+            unit = _unit_of(left, "rad")
             yield _Compared("limits", unit, left.name, abs(ours - theirs), span)
     for subject, (field, of_a_hinge) in _OF_JOINTS.items():
         if not _is_said(subject, left.name, declared[0]):
@@ -149,8 +148,15 @@ def _of_joint(
         ours, theirs = getattr(left, field), getattr(right, field)
         if ours is None or theirs is None or not math.isfinite(ours) or not math.isfinite(theirs):
             continue
-        unit = OF_A_SLIDE[of_a_hinge] if slides else of_a_hinge
+        unit = _unit_of(left, of_a_hinge)
         yield _Compared(subject, unit, left.name, abs(ours - theirs), max(abs(ours), abs(theirs)))
+
+
+def _unit_of(joint: RobotJoint, of_a_hinge: str) -> str:
+    """Return the unit of a quantity of a joint that has this one of a hinge."""
+    if joint.kind == "slide":
+        return OF_A_SLIDE[of_a_hinge]
+    return unit_of_free_joint(of_a_hinge) if joint.kind == "free" else of_a_hinge
 
 
 def _is_said(subject: str, joint: str, declared: Declared | None) -> bool:

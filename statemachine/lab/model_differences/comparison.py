@@ -6,13 +6,14 @@ import os
 import platform
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ... import __version__
 from ...backends import load
 from ...engines import room
-from ...engines.description.match import Matching, alike_names
+from ...engines.description.match import Matching, Pair, alike_names
 from ...engines.description.reading import ModelReading
 from ...engines.description.tree import GroupTree
 from ...errors import EngineWarning, StateMachineError, check_name
@@ -74,7 +75,7 @@ def compare(
     matched = match_models(*models, names, one_world=one_world)
     trees = match_trees(*models, names, one_world=one_world)
     partners = {models[0].joint_names[a]: models[1].joint_names[b] for a, b in matched.joints}
-    effects = Effects(models, trees, names, partners)
+    effects = Effects(readings, trees, _as_run(readings, trees, names), names, partners)
     locator = Locator(readings, matched)
     listing = Listing(digits)
     skipped = CompiledDifferences(listing, readings, matched, effects, locator).enter()
@@ -103,6 +104,26 @@ def compare(
         versions=versions,
         skipped=tuple(skipped),
     )
+
+
+def _as_run(
+    readings: Sequence[ModelReading], trees: MatchedTrees, names: Mapping[str, str]
+) -> MatchedTrees:
+    """Return the rigid parts with the masses and inertias that a run has, paired as those stated.
+
+    Args:
+        readings: Both sides.
+        trees: The rigid parts with the masses and inertias that the files state.
+        names: Which name on the left is which on the right.
+    """
+    if all(reading.mended is None for reading in readings):
+        return trees
+    run = match_trees(readings[0].run_model, readings[1].run_model, names)
+    pairs: list[Pair] = []
+    for pair in trees.matching.pairs:
+        left, right = run.left.groups[pair.left.number], run.right.groups[pair.right.number]
+        pairs.append(replace(pair, left=left, right=right))
+    return replace(run, matching=replace(trees.matching, pairs=tuple(pairs)))
 
 
 def _has_no_world(reading: ModelReading) -> bool:

@@ -8,12 +8,14 @@ import numpy as np
 
 from ...engines.description.reading import ModelReading
 from ...engines.records import TURNED, DifferingQuantity, ModelDifference
+from ...interface import JointType
 from ..compare.matching import Matched
 from ..why.causes import differences_of
 from .effects import Effects, Meaning, ServoParts
 from .listing import CompiledCause, Listing
 from .locating import ElementIds, Locator
 from .meanings import Meanings
+from .quantities import of_free_joint, split_solref
 from .records import Value
 
 # What a difference of an element of each kind is a matter of, by its subject.
@@ -103,7 +105,7 @@ class CompiledDifferences:
         of_other_kinds = self._enter_kinds(lonely)
         for row in rows:
             if row.kind == "model":
-                skipped.append(f"{row.title}: compared as a whole only, and it differs")
+                skipped.append(f"{row.title} are compared as a whole only, and differ")
             if row.subject == "extra joint" and row.where in of_other_kinds:
                 continue
             if not (self._goes_with_a_joint(row, lonely) or self._is_unknown(row)):
@@ -206,9 +208,15 @@ class CompiledDifferences:
         if row.kind == "body" and row.subject == "parent":
             yield DifferingQuantity("parent", *self._parents(ids))
             return
-        yield from row.values
+        is_free = row.kind == "joint" and self._is_free(ids)
+        for value in split_solref(row.values):
+            yield of_free_joint(value) if is_free else value
         if not row.values:
             yield DifferingQuantity(row.subject, "as it is", "another")
+
+    def _is_free(self, ids: ElementIds) -> bool:
+        """Tell whether a joint of the left is a free one."""
+        return ids.left >= 0 and self._matched.left.jnt_type[ids.left] == JointType.FREE
 
     def _right_name(self, kind: str, ids: ElementIds) -> str:
         """Return the name of an element on the right; "" where that has none."""

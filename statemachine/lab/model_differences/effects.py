@@ -1,9 +1,9 @@
 """What a difference means for a motion, and how much it weighs.
 
-All of it is computed at the zero of the joints, from what the two compiled models have: M_ii, the
-inertia that a joint feels, its armature included; the torque of the weight that it carries, its
-axis level; the spring that a servo is, as the joint feels it: r² kp, with the moment arm r of the
-actuator, gear included.
+All of it is computed at the zero of the joints, from what the two compiled models have in a run,
+where a fault of a file is mended: M_ii, the inertia that a joint feels, its armature included; the
+torque of the weight that it carries, its axis level; the spring that a servo is, as the joint feels
+it: r² kp, with the moment arm r of the actuator, gear included.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...engines.description.match import Pair
+from ...engines.description.reading import ModelReading
 from ...engines.description.records import SCALAR, Inertial, RobotJoint
 from ...engines.description.tree import GRAVITY, Group
 from ...engines.records import TURNED
-from ...interface import Array, Model
+from ...interface import Array
 from ...measures.text import milliseconds, rounded
 from ...rotations import HERE, Placement
 from ..compare.matching import MatchedTrees
@@ -53,26 +54,28 @@ class Effects:
     """What differences of two models mean.
 
     Args:
-        models: Both.
-        trees: Their rigid parts.
+        readings: Both.
+        stated: Their rigid parts, with the masses and inertias that the files state.
+        trees: Their rigid parts, with those that a run has.
         renamed: By the name of a joint of the first that in its tree, where it is another one.
         partners: By the name of a joint of the first that of its counterpart.
     """
 
     def __init__(
         self,
-        models: Sequence[Model],
+        readings: Sequence[ModelReading],
+        stated: MatchedTrees,
         trees: MatchedTrees,
         renamed: Mapping[str, str],
         partners: Mapping[str, str],
     ) -> None:
         self._trees, self._renamed, self._partners = trees, renamed, partners
-        self.left, self.right = SideLoads(models[0], trees.left), SideLoads(models[1], trees.right)
+        self._stated = stated
+        left, right = readings[0].run_model, readings[1].run_model
+        self.left, self.right = SideLoads(left, trees.left), SideLoads(right, trees.right)
         self.reach = max(trees.left.reach, trees.right.reach)
-        self._pairs: dict[int, Pair] = {}  # by the body of the left model
-        for pair in trees.matching.pairs:
-            for link, _ in pair.left.links:
-                self._pairs[link.body] = pair
+        self._pairs = _by_body(trees)
+        self._stated_pairs = _by_body(stated)
 
     # Joints
 
@@ -165,8 +168,8 @@ class Effects:
 
     @property
     def root(self) -> Pair:
-        """The rigid parts that carry all others."""
-        return self._trees.matching.pairs[0]
+        """The rigid parts that carry all others, as the files state them."""
+        return self._stated.matching.pairs[0]
 
     def joints_of_parts(self) -> Iterator[tuple[RobotJoint, RobotJoint]]:
         """Yield the joints that carry two parts which are one."""
@@ -229,31 +232,22 @@ class Effects:
         pair = self.pair(body)
         if pair is None:
             return Meaning(0.5)
-        left, right = self._inertials(pair, body, other)
-        off = left.tensor - right.tensor
-        size = float(np.abs(np.linalg.eigvalsh(off)).max())
-        largest = max(_largest_moment(left), _largest_moment(right))
-        relative = size / largest if largest else 0.0
+        stated = _inertials(self._stated_pairs[body], body, other)
+        left, right = _inertials(pair, body, other)
+        relative = _relative(*stated)  # of what is shown; the share is of what moves
         if not self._moves(pair):
             return Meaning(0.0, _STILL, relative=relative, matters=False)
+        is_mended = _is_mended(stated[0], left) or _is_mended(stated[1], right)
+        mended = ", as mended" if is_mended else ""
         joint, inertia = pair.right.joint, self._inertia_of(pair)
         if joint is not None and joint.kind == "hinge" and inertia:
+            off = left.tensor - right.tensor
             share = abs(float(joint.axis @ off @ joint.axis)) / inertia
-            return Meaning(share, f"{share:.2%} of M_ii", relative=relative)
-        return Meaning(relative, relative=relative)
-
-    def _inertials(self, pair: Pair, body: int, other: int) -> tuple[Inertial, Inertial]:
-        """Return what a body and its counterpart weigh, in the frame of the right's part.
-
-        Where both parts are made of the same bodies, they are compared body by body; else each part
-        as a whole.
-        """
-        ours, theirs = _weighed(pair.left), _weighed(pair.right)
-        if len(theirs) > 1 and _are_alike(ours, theirs):
-            for left, right in zip(ours, theirs, strict=True):
-                if left.body == body and right.body == other:
-                    return left.inertial.seen_from(pair.align), right.inertial
-        return pair.left.inertial.seen_from(pair.align), pair.right.inertial
+            effect = f"{share:.2%} of M_ii{mended}"
+            return Meaning(share, effect, relative=relative)
+        share = _relative(left, right)
+        effect = f"{share:.1%} of the larger{mended}" if mended else ""
+        return Meaning(share, effect, relative=relative)
 
     def of_place(self, body: int, quantity: str, size: float) -> Meaning:
         """Return what another place of a body on the part that carries it means.
@@ -305,11 +299,25 @@ class Effects:
         return Meaning(tilt / math.pi, effect, relative=tilt / math.pi / 4)
 
 
+def _by_body(trees: MatchedTrees) -> dict[int, Pair]:
+    """Return the pair of rigid parts that each body of the left model is in, by its id."""
+    pairs: dict[int, Pair] = {}
+    for pair in trees.matching.pairs:
+        for link, _ in pair.left.links:
+            pairs[link.body] = pair
+    return pairs
+
+
 def _slowing(loads: Sequence[JointLoad]) -> str:
-    """Return in what time M_ii / damping a joint of each side slows down, in words."""
+    """Return in what time M_ii / damping a joint of each side slows down, in words.
+
+    Of a ball and a free joint, which have no one M_ii, nothing is said.
+    """
     words: list[str] = []
     for load in loads:
         damping = load.joint.damping
+        if math.isnan(load.inertia):
+            continue
         if damping and load.inertia > 0:
             words.append(milliseconds(load.inertia / damping, 3))
         else:
@@ -363,6 +371,32 @@ def _are_alike(left: Sequence[_WeighedBody], right: Sequence[_WeighedBody]) -> b
         return False
     pairs = zip(left, right, strict=True)
     return all(ours.place.distance(theirs.place) <= _ON_ITS_AXIS for ours, theirs in pairs)
+
+
+def _inertials(pair: Pair, body: int, other: int) -> tuple[Inertial, Inertial]:
+    """Return what a body and its counterpart weigh, in the frame of the right's part.
+
+    Where both parts are made of the same bodies, they are compared body by body; else each part
+    as a whole.
+    """
+    ours, theirs = _weighed(pair.left), _weighed(pair.right)
+    if len(theirs) > 1 and _are_alike(ours, theirs):
+        for left, right in zip(ours, theirs, strict=True):
+            if left.body == body and right.body == other:
+                return left.inertial.seen_from(pair.align), right.inertial
+    return pair.left.inertial.seen_from(pair.align), pair.right.inertial
+
+
+def _relative(left: Inertial, right: Inertial) -> float:
+    """Return how far two inertias are apart, as a part of the larger moment of both."""
+    size = float(np.abs(np.linalg.eigvalsh(left.tensor - right.tensor)).max())
+    largest = max(_largest_moment(left), _largest_moment(right))
+    return size / largest if largest else 0.0
+
+
+def _is_mended(stated: Inertial, used: Inertial) -> bool:
+    """Tell whether a run has another inertia than the file states."""
+    return not np.array_equal(stated.tensor, used.tensor)
 
 
 def _largest_moment(inertial: Inertial) -> float:

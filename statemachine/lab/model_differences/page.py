@@ -9,6 +9,7 @@ from ...measures.text import (
     after,
     capital,
     command,
+    count,
     few,
     grouped,
     reading,
@@ -174,10 +175,14 @@ def _verdict(result: ModelsComparison) -> Slots:
     matter = [row for row in result.differences if row.matters]
     # A verdict that is False does not hold; one that is None is left out.
     slots: Slots = {"none_differ": None, "not_all_compared": None, "differ": None}
+    slots["why_not_all"] = None
     if matter:
         slots["differ"] = False
     elif result.skipped:
         slots["not_all_compared"] = False
+        further = len(result.skipped) - 1
+        more = f" (and {further} more, below)" if further else ""
+        slots["why_not_all"] = result.skipped[0] + more
     else:
         slots["none_differ"] = True
     subjects = ", ".join(dict.fromkeys(row.subject for row in matter))
@@ -236,7 +241,7 @@ def _poses(result: ModelsComparison) -> Slots:
     posed = result.posed
     is_off = posed.joints and posed.distance > 1e-5
     return {
-        "joints": posed.joints or None,
+        "joints": count(posed.joints, "joint") if posed.joints else None,
         "distance": _tiny(posed.distance, "m"),
         "angle": _tiny(posed.angle, "rad"),
         "poses": posed.poses,
@@ -249,7 +254,10 @@ def _notes(result: ModelsComparison) -> list[str]:
     """Return what a reader should know, in sentences."""
     notes = [f"left: {note}" for note in result.left.notes]
     notes += [f"right: {note}" for note in result.right.notes]
-    return [*notes, *result.notes, *result.skipped]
+    skipped = result.skipped
+    if not any(row.matters for row in result.differences):
+        skipped = skipped[1:]  # the verdict tells the first
+    return [*notes, *result.notes, *skipped]
 
 
 def _name(side: FileSide) -> str:
@@ -274,8 +282,8 @@ class _SubjectAgreement:
 
     def counts(self) -> str:
         """Return how many figures are equal, of how many."""
-        count = sum(agreement.count for agreement in self.agreements)
-        return f"{count} of {sum(agreement.compared for agreement in self.agreements)}"
+        equal = sum(agreement.count for agreement in self.agreements)
+        return f"{equal} of {sum(agreement.compared for agreement in self.agreements)}"
 
     def apart(self) -> str:
         """Return how far the figures are apart at the worst, in each unit."""

@@ -88,7 +88,8 @@ class FileFault:
         side: "left" or "right".
         kind: Of the element, as MJCF calls it: "body", "mesh", "geom", …
         element: Its name.
-        quantity: What of it: "inertia", its principal moments; "mass"; "file" of a mesh; …
+        quantity: What of it: "inertia", its principal moments in the order of the file's
+            axes; "mass"; "file" of a mesh; …
         unit: SI unit of each number; "" without one.
         stated: What the file says; None where it says nothing.
         used: What a run has instead; None where the element is left out.
