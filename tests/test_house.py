@@ -91,9 +91,9 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
     """Inside functions and for type checking included, and by the packages of what is imported."""
     graph = pytest.importorskip("grimp").build_graph(PACKAGE.name)
     imported = {name: set(graph.find_modules_directly_imported_by(name)) for name in graph.modules}
-    for name in imported:
-        packages = set[str]().union(*map(_packages_of, imported[name]))
-        imported[name] |= packages - _packages_of(name) - {name}
+    for name, modules in imported.items():
+        packages = set[str]().union(*map(_packages_of, modules))
+        modules.update(packages - _packages_of(name) - {name})
     assert sum(map(len, imported.values())) > len(imported)  # it does read imports
     TopologicalSorter(imported).prepare()
 

@@ -224,7 +224,8 @@ def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Sl
     typed = None
     if able:
         experiment = "waves" if result.has_actuators else "gravity"  # runs on any such robot
-        typed = command(["statemachine", "compare", experiment, *sides, "--why"])
+        words = _readable_sides(result, sides)
+        typed = command(["statemachine", "compare", experiment, *words, "--why"])
     lines = [f"{capital(name)}: {why}." for name, why in refused.items()]
     some = len(able) if able and refused else None
     return {
@@ -234,6 +235,19 @@ def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Sl
         "refused_too": if_true(refused),
         "refused": Items(lines),
     }
+
+
+def _readable_sides(result: ModelsComparison, sides: Sequence[str]) -> list[str]:
+    """Return both sides as one types them for a run, with the options that read a refused file."""
+    words: list[str] = []
+    for side, word in zip(("left", "right"), sides, strict=True):
+        faults = [fault for fault in result.faults if fault.side == side]
+        words.append(word)
+        if any(fault.unit == "kg m²" for fault in faults):
+            words.append("balance_inertia=on")
+        if any(fault.used is None for fault in faults):
+            words.append("meshes=off")
+    return words
 
 
 def _poses(result: ModelsComparison) -> Slots:
