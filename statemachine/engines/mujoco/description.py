@@ -125,14 +125,23 @@ def _notes(raw: Any, actuators: tuple[Actuator, ...]) -> list[str]:
     """What no other format has a word for."""
     of_joints = (raw.eq_type == _EQUALITY_OF_JOINTS) & (raw.eq_obj2id >= 0)
     linear = of_joints & ~raw.eq_data[:, 2:5].any(axis=1)
-    counted = {
-        "further equality constraints": raw.neq - np.count_nonzero(linear),
-        "tendons": raw.ntendon,
-        "contact pairs of its own": raw.npair,
-        "pairs of bodies that never touch (exclude)": raw.nexclude,
-        "bodies freed of weight (gravcomp)": np.count_nonzero(raw.body_gravcomp),
-    }
-    said = [f"{count} {what}" for what, count in counted.items() if count]
+    freed = np.count_nonzero(raw.body_gravcomp)
+    counted = (  # how many, what one is, and what several are
+        (
+            raw.neq - np.count_nonzero(linear),
+            "further equality constraint",
+            "further equality constraints",
+        ),
+        (raw.ntendon, "tendon", "tendons"),
+        (raw.npair, "contact pair of its own", "contact pairs of its own"),
+        (
+            raw.nexclude,
+            "pair of bodies that never touch (exclude)",
+            "pairs of bodies that never touch (exclude)",
+        ),
+        (freed, "body freed of weight (gravcomp)", "bodies freed of weight (gravcomp)"),
+    )
+    said = [f"{count} {one if count == 1 else several}" for count, one, several in counted if count]
     notes = [f"it has {', '.join(said)}"] if said else []
     return notes + [text for i, drive in enumerate(actuators) if (text := _beyond(raw, i, drive))]
 
