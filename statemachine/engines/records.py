@@ -135,6 +135,10 @@ class Counterparts:
 # The figure of a difference that is the angle [rad] by which the second model's element is turned.
 TURNED = "turned by"
 
+# What the subject of a difference begins with that is of the order in which the joints of one body
+# turn it: the names of these joints follow. Each quantity is called by the joint that it is of.
+ORDER_OF_JOINTS = "order of the joints "
+
 # What a compiled model has of a quantity: a word where the engine has a list of them; None where it
 # has none at all.
 QuantityValue = float | str | bool | tuple[float, ...] | None

@@ -136,8 +136,7 @@ def match(
         above = pairs.get(group.parent)
         named = right.by_joint.get(group.joint.name)
         if named is not None and named.number not in taken:
-            hung = above is not None and above.right.number == named.parent
-            add(group, named, "name", moved=not hung)
+            add(group, named, "name", moved=not _hang_alike(left, right, (group, named), above))
         elif above is not None:
             placed = _placed(left, right, group, above, taken)
             if placed is not None:
@@ -147,6 +146,30 @@ def match(
         tuple(group for group in left.groups if group.number not in pairs),
         tuple(group for group in right.groups if group.number not in taken),
     )
+
+
+def _hang_alike(
+    left: GroupTree, right: GroupTree, groups: tuple[Group, Group], above: Pair | None
+) -> bool:
+    """Tell whether two groups hang on counterparts.
+
+    What hangs on a body hangs on the last of its joints; which one that is does not matter.
+
+    Args:
+        left: A description.
+        right: Another.
+        groups: A group of each.
+        above: The first one's parent and its counterpart, if it has one.
+    """
+    group, other = groups
+    if above is None or other.parent < 0:
+        return False
+    if above.right.number == other.parent:
+        return True
+    are_first = [
+        tree.carrier(one).number == one.parent for tree, one in ((left, group), (right, other))
+    ]
+    return all(are_first) and right.groups[other.parent].is_of_body(above.right)
 
 
 def _bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
@@ -196,7 +219,11 @@ def _placed(
     joint = group.joint
     assert joint is not None
     place, nearest = None, _NEAR
-    for other in (g for g in right.children(above.right.number) if g.number not in taken):
+    children = right.children(above.right.number)
+    ours, theirs = left.of_body(above.left), right.of_body(above.right)
+    if len(ours) == len(theirs) and theirs[-1].number != above.right.number:
+        children += right.children(theirs[-1].number)  # the body's joints are in another order
+    for other in (g for g in children if g.number not in taken):
         hers = other.joint
         if hers is None or hers.kind != joint.kind or hers.name in left.by_joint:
             continue

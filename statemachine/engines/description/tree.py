@@ -46,6 +46,15 @@ class Group:
         """What it moves by against its parent."""
         return self.links[0][0].joint
 
+    @property
+    def body(self) -> int:
+        """The id of its first link's body in a compiled model; -1 where it is of none."""
+        return self.links[0][0].body
+
+    def is_of_body(self, other: Group) -> bool:
+        """Tell whether it and another group are of the joints of one body."""
+        return self.number == other.number or (self.body >= 0 and self.body == other.body)
+
     @cached_property
     def inertial(self) -> Inertial:
         """All of its links together, in the group's frame."""
@@ -107,6 +116,15 @@ class GroupTree:
     def children(self, number: int) -> list[Group]:
         """Groups that hang on a group."""
         return [group for group in self.groups if group.parent == number]
+
+    def of_body(self, group: Group) -> list[Group]:
+        """Return the groups of a group's body, one for each joint; the last has its mass."""
+        return [one for one in self.groups if one.is_of_body(group)]
+
+    def carrier(self, group: Group) -> Group:
+        """Return the group that a group's body hangs on; of the root itself."""
+        first = self.of_body(group)[0]
+        return self.groups[first.parent] if first.parent >= 0 else first
 
     @cached_property
     def frames(self) -> dict[str, tuple[int, Placement]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...backends.controls import ctrl_owners
 from ...installed import require
+from ...interface import JointType
 from ..records import (
     Counterparts,
     DifferingQuantity,
@@ -49,6 +50,8 @@ _REFERENCES = {
     4: ("target", "refsite"),
     5: ("target",),
 }
+_ON_JOINT, _ON_JOINT_IN_PARENT = 0, 1  # mjtTrn
+_SCALAR = (JointType.SLIDE, JointType.HINGE)
 _SO3 = 6  # mjtTrn: of a ball joint, or of a site in the frame of another
 # Where the law of an actuator's own state is another, these are one thing with it.
 _OF_A_FILTER = ("dynamics", "range of its activation")
@@ -282,6 +285,8 @@ def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:
     targets = list(zip(kinds, ids, strict=False))
     names = [name_of(raw, target, i) for target, i in targets if i >= 0]
     word = word_in("mjtTrn", kind)
+    if kind == _ON_JOINT_IN_PARENT and int(raw.jnt_type[ids[0]]) in _SCALAR:
+        kind = _ON_JOINT  # only of a ball or a free joint is the frame of the force another
     ids[: len(targets)] = [sides.there(side, target, i) for target, i in targets]
     return (kind, *ids), f"{word} {', '.join(names)}"
 

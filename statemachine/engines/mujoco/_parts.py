@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import chain, permutations, product
+from itertools import chain, combinations, permutations, product
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,19 @@ from ...installed import require
 from ...interface import Array, JointType
 from ...rotations import HERE, angle_between
 from ..description.records import Inertial, motion
-from ..records import TURNED, BodyPair, DifferingQuantity, Edit, ModelDifference, SpecEdit
+from ..records import (
+    ORDER_OF_JOINTS,
+    TURNED,
+    BodyPair,
+    DifferingQuantity,
+    Edit,
+    ModelDifference,
+    SpecEdit,
+)
 from ._fields import word_of
 from ._quantities import plain, same
 from ._rigid_parts import apart, quat_of
-from ._sides import NEAR, Sides, copies, zeros
+from ._sides import NEAR, Sides, copies, name_of, zeros
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
 # What a body weighs: the arrays of each subject.
@@ -247,6 +255,7 @@ def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
         values = (DifferingQuantity("joints", *numbers),)
         yield sides.tell("joints", "body", pair.left, values, refused="it has other joints")
         return
+    yield from _order(sides, pair, joints)
     if pair.moved or parent is None:
         yield sides.tell("parent", "body", pair.left, refused="it hangs on another part")
         return
@@ -268,6 +277,50 @@ def _axis(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDiffere
     if kind in (_HINGE, _BALL) and np.linalg.norm(off) > NEAR:
         value = DifferingQuantity("anchor", plain(anchor), plain(right.jnt_pos[b]), "m")
         yield sides.tell("anchor", "joint", a, (value,), [("jnt_pos", (b,), anchor)])
+
+
+def _order(
+    sides: Sides, pair: BodyPair, joints: list[tuple[int, int]]
+) -> Iterator[ModelDifference]:
+    """Which joint of a body turns which: of two that do not commute, the later hangs on the other.
+
+    Joints that commute, such as two slides, move a body alike in any order.
+    """
+    values: list[DifferingQuantity] = []
+    names: list[str] = []
+    for (a, there), (other, other_there) in combinations(sorted(joints), 2):
+        owners = {int(sides.right.jnt_bodyid[joint]) for joint in (there, other_there)}
+        if there < other_there or len(owners) > 1 or _commute(sides.left, a, other):
+            continue
+        first, second = name_of(sides.left, "joint", a), name_of(sides.left, "joint", other)
+        names += [first, second]
+        here, reverse = f"{second} hangs on {first}", f"{first} hangs on {second}"
+        values.append(DifferingQuantity(second, here, reverse))
+    if values:
+        subject = ORDER_OF_JOINTS + ", ".join(dict.fromkeys(names))
+        why = "a joint cannot be put before another one of its body in a compiled model"
+        yield sides.tell(subject, "body", pair.left, values, refused=why)
+
+
+def _commute(raw: Any, a: int, b: int) -> bool:
+    """Tell whether two joints of a body move it alike, whichever comes first.
+
+    They do where the Lie bracket of their twists is zero.
+    """
+    if _BALL in (int(raw.jnt_type[a]), int(raw.jnt_type[b])):
+        return False
+    (turn, shift), (other_turn, other_shift) = _twist(raw, a), _twist(raw, b)
+    turning = np.cross(turn, other_turn)
+    shifting = np.cross(turn, other_shift) - np.cross(other_turn, shift)
+    return bool(max(np.abs(turning).max(), np.abs(shifting).max()) <= NEAR)
+
+
+def _twist(raw: Any, joint: int) -> tuple[Array, Array]:
+    """Return the angular (3,) and linear (3,) velocity of a hinge or slide, in its body's frame."""
+    axis = np.array(raw.jnt_axis[joint])
+    if int(raw.jnt_type[joint]) == _SLIDE:
+        return np.zeros(3), axis
+    return axis, np.cross(raw.jnt_pos[joint], axis)
 
 
 def _place(

@@ -90,7 +90,7 @@ def match_models(
     matching = trees.matching
     joints = _joints(matching)
     # A body with several joints is several parts of a description, of which the last has its mass.
-    by_body = {solid.left: solid for solid in map(_solid, matching.pairs)}
+    by_body = {solid.left: solid for solid in _solids(trees)}
     solids = (*by_body.values(), *_led(left, right, names))
     by_name = _by_name(left.body_names, right.body_names, names)
     bodies = _and_further(((solid.left, solid.right) for solid in solids), by_name)
@@ -194,9 +194,17 @@ def _description(model: Model) -> Robot:
     return room(DEFAULT).describe(model.compiled, model.path.name)
 
 
-def _solid(pair: Pair) -> BodyPair:
-    bodies = [group.links[0][0].body for group in (pair.left, pair.right)]
-    return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
+def _solids(trees: MatchedTrees) -> Iterator[BodyPair]:
+    """Yield the bodies of pairs of groups: of a body with several joints one for each."""
+    for pair in trees.matching.pairs:
+        moved = pair.moved and not _bodies_hang_alike(trees, pair)
+        yield BodyPair(pair.left.body, pair.right.body, pair.align, moved)
+
+
+def _bodies_hang_alike(trees: MatchedTrees, pair: Pair) -> bool:
+    """Tell whether the bodies of two groups hang on counterparts, in whatever order they turn."""
+    above = trees.matching.of(trees.left.carrier(pair.left).number)
+    return above is not None and trees.right.carrier(pair.right).is_of_body(above.right)
 
 
 def _led(left: Model, right: Model, names: Mapping[str, str]) -> list[BodyPair]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -199,18 +199,34 @@ def posed(trees: MatchedTrees, seed: int) -> PoseGap:
     ranges = _common_ranges(matching)
     root = matching.pairs[0]
     distance, link, angle = 0.0, root.left.name, 0.0
+    links = [_same_link(trees, pair) for pair in matching.pairs]
     for k in range(POSES):
         drawn = {names: random.uniform(*ends) if k else 0.0 for names, ends in ranges.items()}
         ours = left.poses({name: position for (name, _), position in drawn.items()})
         theirs = right.poses({name: position for (_, name), position in drawn.items()})
         start = theirs[root.right.number] @ root.align @ ours[root.left.number].inverse
-        for pair in matching.pairs:
+        for pair in links:
             a, b = start @ ours[pair.left.number], theirs[pair.right.number] @ pair.align
             far = a.distance(b)
             if far > distance:
                 distance, link = far, pair.left.name
             angle = max(angle, a.angle(b))
     return PoseGap(POSES, seed, distance, angle, link, joints=len(ranges))
+
+
+def _same_link(trees: MatchedTrees, pair: Pair) -> Pair:
+    """Return a pair of groups, or the whole bodies where their joints come in another order.
+
+    A body with several joints is several groups, of which only the last is a link of the file; in
+    another order the group of one joint is no counterpart of the other side's as to its pose.
+    """
+    ours, theirs = trees.left.of_body(pair.left), trees.right.of_body(pair.right)
+    if not pair.moved or len(ours) != len(theirs):
+        return pair
+    counterparts = [trees.matching.of(group.number) for group in ours]
+    if any(other is None or not other.right.is_of_body(pair.right) for other in counterparts):
+        return pair
+    return replace(pair, left=ours[-1], right=theirs[-1])
 
 
 def _common_ranges(matching: Matching) -> dict[tuple[str, str], tuple[float, float]]:

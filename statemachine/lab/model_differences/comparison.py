@@ -219,7 +219,7 @@ def _notes(
 ) -> Iterator[str]:
     """Yield what a reader should know, in sentences."""
     yield from matched.notes
-    yield from _frames_elsewhere(trees.matching)
+    yield from _frames_elsewhere(trees)
     yield from _suggestions(trees.matching)
     formats = [reading.format for reading in readings]
     if formats.count("URDF") == 1:
@@ -239,18 +239,23 @@ def _notes(
                 )
 
 
-def _frames_elsewhere(matching: Matching) -> Iterator[str]:
+def _frames_elsewhere(trees: MatchedTrees) -> Iterator[str]:
     """Yield that the frame of a link is put elsewhere on the same solid, or has another name."""
-    for pair in matching.pairs:
-        if pair.by != "root" and pair.align is not HERE:
+    pairs = [pair for pair in trees.matching.pairs if pair.by != "root"]
+    for pair in pairs:
+        if pair.align is not HERE:
             far, turn = pair.align.distance(HERE), pair.align.angle(HERE)
             yield (
                 f"the frame of link {pair.left.name!r} is put elsewhere on the same solid, "
                 f"{rounded(far, 'm')} and {rounded(turn, 'rad')} off: it moves alike, and its pose "
                 "reads otherwise"
             )
-    pairs = [(pair.left.name, pair.right.name) for pair in matching.pairs if pair.by != "root"]
-    names = [f"{a} is {b}" for a, b in pairs if a != b]
+    names: dict[str, None] = {}
+    for pair in pairs:
+        # A body with several joints is several groups, of which the last goes by its name.
+        left, right = trees.left.of_body(pair.left)[-1], trees.right.of_body(pair.right)[-1]
+        if left.name != right.name and pair.left.name != pair.right.name:
+            names[f"{left.name} is {right.name}"] = None
     if names:
         yield f"links go by other names: {', '.join(names)}"
 

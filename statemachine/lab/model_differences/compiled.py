@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...engines.description.reading import ModelReading
-from ...engines.records import TURNED, DifferingQuantity, ModelDifference
+from ...engines.records import ORDER_OF_JOINTS, TURNED, DifferingQuantity, ModelDifference
 from ...interface import JointType
 from ..compare.matching import Matched
 from ..why.causes import differences_of
@@ -171,6 +171,9 @@ class CompiledDifferences:
         if (row.kind, row.subject) in _EFFORTS and self._is_same_effort(row):
             return
         for value in self._quantities(row, ids):
+            quantity = value.quantity
+            if row.subject.startswith(ORDER_OF_JOINTS):
+                element, quantity = self._locator.find("joint", value.quantity), "order"
             subject = self._subject(row, value.quantity)
             values = self._said(row, ids, value)
             if values[0] == values[1]:
@@ -178,7 +181,7 @@ class CompiledDifferences:
             self._listing.enter(
                 subject,
                 element,
-                value.quantity,
+                quantity,
                 values,
                 self._meanings.of(row, ids, value, values),
                 value.unit,
@@ -190,6 +193,8 @@ class CompiledDifferences:
         is_weight = row.kind == "body" and row.subject in ("mass", "centre of mass", "inertia")
         if is_weight and quantity in _OF_WEIGHT:
             return _OF_WEIGHT[quantity]
+        if row.subject.startswith(ORDER_OF_JOINTS):
+            return "structure"
         if row.kind in _OF_KIND:
             return _OF_KIND[row.kind]
         return _SUBJECTS.get(row.kind, {}).get(row.subject, "further")

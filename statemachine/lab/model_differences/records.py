@@ -11,7 +11,7 @@ Value = float | str | bool | tuple[float, ...] | None
 
 # What a difference is a matter of, in the order in which a reader wants what weighs alike.
 SUBJECTS = {
-    "structure": "What is in one of them only",
+    "structure": "What is in one of them only, or hangs elsewhere",
     "places": "Where the joints are, at zero",
     "tool frame": "Frames that are fixed to a link",
     "armature": "Armature: the rotor's inertia as the joint feels it",
