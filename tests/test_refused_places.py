@@ -64,7 +64,7 @@ def test_a_balanced_inertia_is_told_with_its_moments(tmp_path: Path) -> None:
     assert "A + B >= C" in result.refusal
     (repair,) = result.repairs
     assert (repair.name, repair.quantity) == ("tip", "inertia")
-    assert repair.stated == pytest.approx((3e-5, 1e-5, 1e-5))
+    assert repair.stated == pytest.approx((1e-5, 1e-5, 3e-5))
     assert repair.used == pytest.approx((5e-5 / 3,) * 3)
 
 

@@ -8,7 +8,7 @@ with.
 - `compiled`: what the compiled models differ in, as `..why` has it
 - `declared`: what the text of a file says and no compiled model keeps
 - `faults`, `only_read`, `visuals`: what was mended; what no engine uses; what is only drawn
-- `meanings`, `effects`, `loads`: what a difference means for a motion
+- `meanings`, `effects`, `loads`, `weighed_bodies`: what a difference means for a motion
 - `listing`, `locating`: the list, and the line of each file that an entry stands at
 - `agreement`: how well the rest agrees
 """

@@ -16,14 +16,15 @@ import numpy as np
 
 from ...engines.description.match import Pair
 from ...engines.description.reading import ModelReading
-from ...engines.description.records import SCALAR, Inertial, RobotJoint
-from ...engines.description.tree import GRAVITY, Group
+from ...engines.description.records import SCALAR, RobotJoint
+from ...engines.description.tree import GRAVITY
 from ...engines.records import TURNED
 from ...interface import Array
 from ...measures.text import milliseconds, rounded
 from ...rotations import HERE, Placement
 from ..compare.matching import MatchedTrees
 from .loads import JointLoad, ServoParts, SideLoads
+from .weighed_bodies import inertials, is_mended, relative_gap
 
 _STILL = "stands still"
 _ON_ITS_AXIS = 1e-9  # [m], and of entries of matrices: what is less is rounding
@@ -232,20 +233,20 @@ class Effects:
         pair = self.pair(body)
         if pair is None:
             return Meaning(0.5)
-        stated = _inertials(self._stated_pairs[body], body, other)
-        left, right = _inertials(pair, body, other)
-        relative = _relative(*stated)  # of what is shown; the share is of what moves
+        stated = inertials(self._stated_pairs[body], body, other)
+        left, right = inertials(pair, body, other)
+        relative = relative_gap(*stated)  # of what is shown; the share is of what moves
         if not self._moves(pair):
             return Meaning(0.0, _STILL, relative=relative, matters=False)
-        is_mended = _is_mended(stated[0], left) or _is_mended(stated[1], right)
-        mended = ", as mended" if is_mended else ""
+        any_mended = is_mended(stated[0], left) or is_mended(stated[1], right)
+        mended = ", as mended" if any_mended else ""
         joint, inertia = pair.right.joint, self._inertia_of(pair)
         if joint is not None and joint.kind == "hinge" and inertia:
             off = left.tensor - right.tensor
             share = abs(float(joint.axis @ off @ joint.axis)) / inertia
             effect = f"{share:.2%} of M_ii{mended}"
             return Meaning(share, effect, relative=relative)
-        share = _relative(left, right)
+        share = relative_gap(left, right)
         effect = f"{share:.1%} of the larger{mended}" if mended else ""
         return Meaning(share, effect, relative=relative)
 
@@ -335,72 +336,6 @@ def _effort(loads: Sequence[JointLoad], values: Sequence[float]) -> str:
         if load.load > 0:
             words.append(f"its load: {rounded(load.load, load.unit('N·m'))}")
     return " / ".join(dict.fromkeys(words))
-
-
-@dataclass(frozen=True, eq=False)
-class _WeighedBody:
-    """A body with a mass or an inertia.
-
-    Attributes:
-        body: Its id.
-        name: Its name.
-        place: Its frame in that of its rigid part.
-        inertial: What it weighs, in the frame of its part.
-    """
-
-    body: int
-    name: str
-    place: Placement
-    inertial: Inertial
-
-
-def _weighed(group: Group) -> list[_WeighedBody]:
-    """Return the bodies of a part that have a mass or an inertia."""
-    bodies: list[_WeighedBody] = []
-    for link, place in group.links:
-        inertial = link.inertial
-        if inertial is not None and (inertial.mass or inertial.tensor.any()):
-            seen = inertial.seen_from(place)
-            bodies.append(_WeighedBody(link.body, link.name, place, seen))
-    return bodies
-
-
-def _are_alike(left: Sequence[_WeighedBody], right: Sequence[_WeighedBody]) -> bool:
-    """Tell whether two parts are made of bodies of the same names in the same places."""
-    if [body.name for body in left] != [body.name for body in right]:
-        return False
-    pairs = zip(left, right, strict=True)
-    return all(ours.place.distance(theirs.place) <= _ON_ITS_AXIS for ours, theirs in pairs)
-
-
-def _inertials(pair: Pair, body: int, other: int) -> tuple[Inertial, Inertial]:
-    """Return what a body and its counterpart weigh, in the frame of the right's part.
-
-    Where both parts are made of the same bodies, they are compared body by body; else each part
-    as a whole.
-    """
-    ours, theirs = _weighed(pair.left), _weighed(pair.right)
-    if len(theirs) > 1 and _are_alike(ours, theirs):
-        for left, right in zip(ours, theirs, strict=True):
-            if left.body == body and right.body == other:
-                return left.inertial.seen_from(pair.align), right.inertial
-    return pair.left.inertial.seen_from(pair.align), pair.right.inertial
-
-
-def _relative(left: Inertial, right: Inertial) -> float:
-    """Return how far two inertias are apart, as a part of the larger moment of both."""
-    size = float(np.abs(np.linalg.eigvalsh(left.tensor - right.tensor)).max())
-    largest = max(_largest_moment(left), _largest_moment(right))
-    return size / largest if largest else 0.0
-
-
-def _is_mended(stated: Inertial, used: Inertial) -> bool:
-    """Tell whether a run has another inertia than the file states."""
-    return not np.array_equal(stated.tensor, used.tensor)
-
-
-def _largest_moment(inertial: Inertial) -> float:
-    return float(np.linalg.eigvalsh(inertial.tensor)[-1])
 
 
 def _is_about(off: Placement, joint: RobotJoint) -> bool:
