@@ -84,7 +84,8 @@ def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
 # Writes in place, and the second file after a moment.
 IN_PLACE = """
 import contextlib, time
-from statemachine.lab.recordings import files, whole
+import statemachine.atomic_files as whole
+from statemachine.lab.recordings import files
 @contextlib.contextmanager
 def beside(*targets):
     yield [str(target) for target in targets]

@@ -141,7 +141,7 @@ def test_each_branch_of_a_template_can_be_filled_in(name: str) -> None:
     tables = getattr(module(name), "tables", lambda *_results: {})
     alone = ("code", "printed", *tables({"pybullet": taken.result}, taken.result))
     slots |= {block: block for block in alone}
-    text = (ROOT / "statemachine" / "lessons" / f"{name}.md").read_text("utf-8")
+    text = (ROOT / "statemachine" / "course" / "lessons" / f"{name}.md").read_text("utf-8")
     conditions = sorted(set(re.findall(r"<!-- if (?:not )?(\w+) -->", text)))
     pages = {
         values: template.filled(text, slots | dict(zip(conditions, values, strict=True)))

@@ -56,8 +56,8 @@ ENGINE_OF = {
     "fingertip": "pinocchio",
 }
 ROBOT = (
-    "<mujoco><worldbody><body name='a'><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
-    "<joint name='j'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>"
+    "<mujoco><worldbody><body name='a'><inertial mass='1' pos='.5 0 0' diaginertia='1 1 1'/>"
+    "<joint name='j' axis='0 1 0'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>"
 )
 SUBMITTED = ("submissions/ann.py", "submissions/bob.py")
 MADE = ("path/", "reference/", "comparisons/")  # by `make docs`
