@@ -32,7 +32,14 @@ from statemachine.processes import sandbox
 from .support.claims import assert_in, refused
 from .support.exercises import RIGHT, SOLUTION, TEMPLATE, WRONG, Attempt
 from .support.files import written, written_all
-from .support.processes import Cli, in_its_own_python, processes_with, soon, without_estimates
+from .support.processes import (
+    Cli,
+    files_below,
+    in_its_own_python,
+    processes_with,
+    soon,
+    without_estimates,
+)
 from .support.requirements import ROOT, need_engine
 
 Prepared = tuple[Sequence[AnyWorld], list[Any]]
@@ -314,7 +321,7 @@ def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) 
         env={**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)},
         stderr=subprocess.PIPE,
     ) as process:
-        assert soon(lambda: len(list(here.glob("*/*/*/scratch/begun"))) >= len(JUDGES))
+        assert soon(lambda: len(files_below(here, "*/*/*/scratch/begun")) >= len(JUDGES))
         assert len(processes_with(here)) >= len(JUDGES)
         process.send_signal(number)
         process.communicate(timeout=300)

@@ -25,7 +25,7 @@ from statemachine.show.as_json import dumps
 from .support.claims import refused
 from .support.explained import ALONE, ARM, SWING, changed, explained
 from .support.files import written, written_all
-from .support.processes import lives, soon, without_estimates
+from .support.processes import files_below, lives, soon, without_estimates
 from .support.requirements import ROOT
 
 forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
@@ -215,7 +215,7 @@ def test_no_fork_stays(tmp_path: Path, number: int) -> None:
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
-    assert soon(lambda: len(list(tmp_path.glob("*.pid"))) >= 3)
+    assert soon(lambda: len(files_below(tmp_path, "*.pid")) >= 3)
     (os.killpg if number == signal.SIGINT else os.kill)(run.pid, number)
     _, err = run.communicate(timeout=300)
     assert run.returncode == (130 if number == signal.SIGINT else -number)

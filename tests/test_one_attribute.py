@@ -358,7 +358,7 @@ def test_what_is_compiled_anew_moves_as_the_left_to_the_last_bit(name: str, tmp_
 
 PAIR = """<mujoco><compiler angle="radian"/><option gravity="3 0 -9.81"/><worldbody>
 <body pos="0.02 0 0"><joint name="a" axis="0 1 0"/><geom size="0.02" pos="0 0 0.03"/></body>
-<body pos="-0.02 0 0"><joint name="b" axis="0 1 0"/><geom size="0.025" pos="0 0 0.03"/></body>
+<body pos="-0.03 0 0"><joint name="b" axis="0 1 0"/><geom size="0.025" pos="0 0 0.03"/></body>
 </worldbody><equality><joint {}/></equality></mujoco>"""
 
 

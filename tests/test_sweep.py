@@ -48,7 +48,7 @@ from statemachine.lab.sweep.worker import differing, run_batch
 
 from .support.claims import assert_has, refused
 from .support.files import written
-from .support.processes import in_its_own_python, soon, without_estimates
+from .support.processes import files_below, in_its_own_python, soon, without_estimates
 from .support.requirements import ROOT
 
 pytest.importorskip("pyarrow")
@@ -685,7 +685,7 @@ def test_a_sweep_that_is_stopped_or_killed_keeps_what_was_done_and_goes_on(
         on = ("--scheduler", request.getfixturevalue("cluster").scheduler_address)
     words, out = slow_sweep(policy, "--json", *on), tmp_path / "out"
     driver = start(*words)
-    assert soon(lambda: list(out.glob(begun)), 120)
+    assert soon(lambda: files_below(out, begun), 120)
     time.sleep(0.4)  # its workers begin, and must not say that they were interrupted
     for _ in how.split():
         (os.killpg if how.startswith("SIGINT") else os.kill)(

@@ -89,6 +89,17 @@ def soon(so: Callable[[], object], seconds: float = 300.0) -> bool:
     return bool(so())
 
 
+def files_below(folder: Path, pattern: str) -> list[Path]:
+    """Return the files that match, of a folder that others change meanwhile.
+
+    `Path.glob` of Python 3.11 raises where a folder goes while it is read.
+    """
+    try:
+        return list(folder.glob(pattern))
+    except FileNotFoundError:
+        return []
+
+
 def processes_with(part: object) -> list[int]:
     """Processes in whose command line something stands."""
     found = []
