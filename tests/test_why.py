@@ -61,7 +61,7 @@ def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) ->
     assert row.values == (DifferingQuantity("integrator", "rk4", "its own"),)
     assert row.chosen == ("left", "euler")
     assert result.verdict.holds
-    assert "can be chosen: type integrator=" in shown(report.page(result))
+    assert "can be chosen: type integrator=" in shown(report.page(result, details=True))
 
 
 def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
@@ -545,7 +545,9 @@ def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(
 @pytest.mark.slow
 def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
     for result in explanations.values():
-        assert max(map(len, shown(report.page(result)).splitlines())) <= 80
+        for details in (False, True):
+            lines = shown(report.page(result, details)).splitlines()
+            assert max(map(len, lines)) <= 80
         json.loads(dumps(result))
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from statemachine.engines.records import TURNED, DifferingQuantity
 from statemachine.lab.why import Share
-from statemachine.lab.why.values_page import heading_of, phrase_of, sides_of, texts_of
+from statemachine.lab.why.values_page import heading_of, sides_of, texts_of, wording_of
 
 
 def _share(name: str, kind: str, *values: DifferingQuantity) -> Share:
@@ -28,9 +28,10 @@ def test_several_quantities_stand_in_the_heading_each_with_its_name():
 
 def test_inertia_whose_moments_are_equal_is_told_by_the_angle_of_its_axes():
     share = _share("inertia of m", "body", DifferingQuantity(TURNED, 0.0, 0.3, "rad"))
-    assert "17.2°" in phrase_of(share)
+    assert wording_of(share) == "turned axes"
+    assert sides_of(share)[1] == "17.2°"
     moments = DifferingQuantity("moments", (2.0, 1.0, 1.0), (3.0, 1.0, 1.0), "kg m²")
-    assert not phrase_of(_share("inertia of m", "body", moments))
+    assert wording_of(_share("inertia of m", "body", moments)) == "values"
 
 
 @pytest.mark.parametrize(
@@ -38,7 +39,14 @@ def test_inertia_whose_moments_are_equal_is_told_by_the_angle_of_its_axes():
 )
 def test_a_filter_that_one_side_has_is_told_with_its_time_constant(left, right, side):
     value = DifferingQuantity("timeconst", left, right, "s")
-    assert f"50.0 ms {side}" in phrase_of(_share("filter of servo", "actuator", value))
+    share = _share("filter of servo", "actuator", value)
+    assert wording_of(share) == f"filter {side}"
+    assert "50.0 ms" in sides_of(share)
+
+
+def test_a_value_that_several_elements_have_alike_is_told_once():
+    share = _share("friction of 9 geoms", "geom", *[DifferingQuantity("friction", 0.0, 1.0)] * 9)
+    assert sides_of(share) == ("0", "1")
 
 
 @pytest.mark.parametrize(

@@ -240,11 +240,8 @@ def _drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[Re
 
     match block:
         case Page(title, origin):
-            return [
-                "",
-                RichText(_shown(title, plain), "bold"),
-                coded(origin, "dim"),
-            ]
+            heading = RichText(_shown(title, plain), "bold")
+            return ["", heading, coded(origin, "dim")] if origin else ["", heading]
         case Heading(text):
             return ["", coded(text, "bold")]
         case Text(text, (_, linked)):

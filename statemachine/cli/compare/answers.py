@@ -119,10 +119,7 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
     except EndedEarlyError as error:
         until_then = CompareRequest(request.run, uncertainty=request.uncertainty)
         return _run_compare(options, until_then, f"No cause is named: {error}.")
-    lines = [*request.run.taken]
-    if request.run.is_traces:
-        lines.append(why.PLAYED)
-    return show(why.page(result, lines), result, options.json)
+    return show(why.page(result, getattr(options, "details", False)), result, options.json)
 
 
 def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause: str = "") -> int:

@@ -4,138 +4,257 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
-from ...measures.text import NONE, capital, percent, quantity, short_time
+from ...engines.description.lines import SourceLine
+from ...measures.text import NONE, quantity
+from ...show.blocks import Text
+from ...show.markdown import plain_text
+from ...show.templates import PageContent, render_blocks
 from ..compare.stillness import nothing_moved
-from .values_page import heading_of, phrase_of, sides_of
+from .explanation import Explanation, Share
+from .gap import FirstTouch
+from .values_page import CauseWording, heading_of, sides_of, texts_of, wording_of
 
 if TYPE_CHECKING:
-    from . import Explanation, Share
+    from .locate import Localisation
 
 _INTERACTS = 0.5  # of the gap, between alone and last: it is said with the cause
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 
-# Line one: what a side has nothing of, and what the gap comes from.
-MISSING = {
-    "actuators": "The {side} has no actuators, the {other} has: --actuators {other} gives it those",
-    "floor": "The {side} has no floor, the {other} has: --floor {other} gives it that",
-}
-ANSWERS = {
-    "rounding": "The two sides move alike: {gap}",
-    "alike": "The two sides move alike, although they differ: {gap}",
-    "within": "The gap of {gap} is within its tolerance of {tolerance}, and may be chance: the "
-    "chaos floor is {floor}, from {draws} perturbed runs of each side",
-    "inside": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}, from "
-    "{draws} perturbed runs of each side",
-    "cannot be told": "Whether the gap of {gap} is more than chance cannot be told: the chaos "
-    "floor is {floor}, from {draws} perturbed runs of each side",
-    "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
-    "bare": "{cause}: {part} of the {gap}",
-    "hidden": "The differences do not cause the {gap}: without them it is {brought}",
-    "masked": "No single difference causes the {gap}: the differences act together",
-    "together": "No single difference causes the {gap}: all of them together explain {part}",
-    "located": (
-        "{part} of the {gap} comes from {cause}, which no setting that both read makes the same"
-    ),
-    "one engine": (
-        "The cause was not found: {part} of the {gap} goes without {cause} on both sides, but both "
-        "compute that in the same way, so it is where the gap shows and not what causes it"
-    ),
-    "one engine, integrator": (
-        "The cause was not found: {part} of the {gap} goes when both sides run with {without}, but "
-        "both integrate in the same way, so it is where the gap shows and not what causes it"
-    ),
-    "refused": (
-        "{part} of the {gap} goes without {cause} on both sides; it may come from {refused}, which "
-        "cannot be made the same"
-    ),
-    "still": "{part} of the {gap} goes without {cause}, but so does the motion: a weak hint",
-    "switched": "{part} of the {gap} comes from {cause} (left: {left}, right: {right})",
-    "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
-}
-TOUCH = "Until the first touch, {what} at {time}, the gap of the {quantity} is {before} at most."
-INTERACT = "{answer}, but {alone} alone and {last} last: it acts together with others"
-HIDDEN = (
-    "With the left's values on the right the gap is {brought}, not {gap}: the differences hide a "
-    "part of it. Of the {brought}, {located} is localised and {unexplained} unexplained"
-)
-PARTS = "{explained} of the gap is explained, {located} is localised, {unexplained} is unexplained"
+PlaceWording = Literal["switched", "still", "refused", "one engine", "one integrator", "located"]
+
+
+@dataclass(frozen=True)
+class CauseSentence(PageContent):
+    """What a sentence says of the cause that takes away most.
+
+    Attributes:
+        wording: Which sentence it is.
+        heading: Name of the cause, and of its quantity where that needs one.
+        element: Name of the element that the cause is of.
+        left, right: The values of both sides, with their units.
+        place: The line of the right's file that says it; None where that is not known.
+        part: What it takes away, as a part of the gap.
+        gap: The gap, with its unit.
+        alone, last: What it takes away as the only one, and after all others; None where that
+            could not be run.
+    """
+
+    template = "why_cause.md.j2"
+    wording: CauseWording
+    heading: str
+    element: str
+    left: str
+    right: str
+    place: SourceLine | None
+    part: float
+    gap: str
+    alone: float | None
+    last: float | None
+
+    @property
+    def interacts(self) -> bool:
+        """Whether it takes away alone much more, or much less, than last."""
+        if self.alone is None or self.last is None:
+            return False
+        return abs(self.alone - self.last) > _INTERACTS
+
+
+@dataclass(frozen=True)
+class PlaceSentence(PageContent):
+    """What a sentence says of what was left out on both sides.
+
+    Attributes:
+        wording: Which sentence it is.
+        cause: What was left out.
+        without: What a run without it is.
+        left, right: Its values, where one side has it and the other does not.
+        part: What goes with it, as a part of the gap.
+        gap: The gap, with its unit.
+        refused: Names of the first differences that cannot be equalized.
+    """
+
+    template = "why_place.md.j2"
+    wording: PlaceWording
+    cause: str
+    without: str
+    left: str
+    right: str
+    part: float
+    gap: str
+    refused: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class AnswerSentence(PageContent):
+    """What the sentence of the verdict may say.
+
+    Attributes:
+        result: The explanation.
+        nothing_moved: What is said where nothing moves; "" where something does.
+        gap, floor, brought: Of the explanation, with their unit.
+        cause_words: The sentence on the largest cause; "" where the verdict is another.
+        place_words: That on what was left out; "" where the verdict is another.
+    """
+
+    template = "why_answer.md.j2"
+    result: Explanation
+    nothing_moved: str
+    gap: str
+    floor: str
+    brought: str
+    cause_words: str
+    place_words: str
+
+    @property
+    def has_gap(self) -> bool:
+        """Whether there is any gap."""
+        return self.result.gap > 0
+
+
+@dataclass(frozen=True)
+class MissingSentence(PageContent):
+    """What one side has nothing of.
+
+    Attributes:
+        part: "actuators" or "floor".
+        side, other: "left" and "right": who has none, and who has.
+    """
+
+    template = "why_missing.md.j2"
+    part: str
+    side: str
+    other: str
+
+
+@dataclass(frozen=True)
+class TouchSentence(PageContent):
+    """What the run itself shows: that the sides are together until they touch.
+
+    Attributes:
+        touch: The first contact.
+        quantity: What the gap is measured in.
+        unit: Of the quantity.
+    """
+
+    template = "why_touch.md.j2"
+    touch: FirstTouch
+    quantity: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class PartsSentence(PageContent):
+    """The parts of a gap.
+
+    Attributes:
+        is_wider: Whether the gap is wider with all causes equalized: of that one are the parts.
+        gap: As the sides come, in `unit`.
+        brought: With all causes equalized, in `unit`.
+        unit: Of the quantity.
+        explained, located, unexplained: Parts of the gap.
+    """
+
+    template = "why_parts.md.j2"
+    is_wider: bool
+    gap: float
+    brought: float
+    unit: str
+    explained: float
+    located: float
+    unexplained: float
+
+
+def sentence_of(content: PageContent) -> str:
+    """Return the one paragraph of a content, as plain text."""
+    (block,) = render_blocks(content)
+    assert isinstance(block, Text)
+    return plain_text(block.text)
 
 
 def missing(parts: Sequence[tuple[str, str]]) -> list[str]:
     """Say what one side has nothing of, and how to give it the other's: lines without their end."""
     other = {"left": "right", "right": "left"}
-    return [MISSING[part].format(side=side, other=other[side]) for side, part in parts]
+    return [sentence_of(MissingSentence(part, side, other[side])) for side, part in parts]
 
 
 def answer(result: Explanation) -> str:
     """Say what the gap comes from, in a sentence without its end."""
-    gap = amount(result, result.gap)
+    cause, place, still = "", "", ""
     match result.verdict.answer:
         case "nothing moved":
-            return nothing_moved(result.motion, result.instead)
-        case "rounding" | "alike" as kind:
-            size = f"{gap} is rounding" if result.gap else "the gap is 0"
-            return ANSWERS[kind].format(gap=size)
-        case "within" | "inside" | "cannot be told" as kind:
-            return ANSWERS[kind].format(
-                gap=gap,
-                tolerance=amount(result, result.tolerance),
-                floor=amount(result, result.floor),
-                draws=result.draws,
-            )
-        case "hidden":
-            brought = amount(result, result.brought or 0.0)
-            return ANSWERS["hidden"].format(gap=gap, brought=brought)
-        case "masked":
-            return ANSWERS["masked"].format(gap=gap)
-        case "together":
-            return ANSWERS["together"].format(gap=gap, part=percent(result.explained))
-        case "unexplained":
-            return ANSWERS["unexplained"].format(gap=gap, part=percent(result.unexplained))
+            still = nothing_moved(result.motion, result.instead)
         case "cause":
-            return _by_cause(result)
-    return _by_place(result)
+            cause = sentence_of(_of_cause(result))
+        case "located" | "switched" | "one engine" | "refused" | "still":
+            place = sentence_of(_of_place(result))
+        case _:
+            pass
+    return sentence_of(
+        AnswerSentence(
+            result=result,
+            nothing_moved=still,
+            gap=amount(result, result.gap),
+            floor=amount(result, result.floor),
+            brought=amount(result, result.brought or 0.0),
+            cause_words=cause,
+            place_words=place,
+        )
+    )
 
 
-def _by_cause(result: Explanation) -> str:
-    """Say which cause takes away most, and what it does together with others."""
+def _of_cause(result: Explanation) -> CauseSentence:
+    """Return what is said of the cause that takes away most."""
     cause = next(row for row in result.shares if row.share)
+    wording = wording_of(cause)
     left, right = sides_of(cause)
-    phrase = phrase_of(cause)
-    kind = "bare" if phrase or NONE in (left, right) else "cause"
-    said = ANSWERS[kind].format(
-        cause=capital(phrase if phrase else heading_of(cause)),
+    if wording in ("filter on the left", "filter on the right"):
+        times = next(value for value in cause.values if value.quantity == "timeconst")
+        left, right = texts_of(times)
+    element = cause.name.rpartition(" of ")[2]
+    return CauseSentence(
+        wording=wording,
+        heading=heading_of(cause),
+        element=element,
         left=left,
         right=right,
-        part=percent(abs(cause.share or 0.0)),
+        place=cause.place,
+        part=abs(cause.share or 0.0),
         gap=amount(result, result.gap),
+        alone=cause.alone,
+        last=cause.last,
     )
-    alone, last = cause.alone, cause.last
-    if alone is not None and last is not None and abs(alone - last) > _INTERACTS:
-        return INTERACT.format(answer=said, alone=percent(alone), last=percent(last))
-    return said
 
 
-def _by_place(result: Explanation) -> str:
-    """Say without what most of the gap goes."""
-    kind = str(result.verdict.answer)
+def _of_place(result: Explanation) -> PlaceSentence:
+    """Return what is said of what takes away most when it is left out."""
     place = max(result.found_in, key=lambda place: place.share)
-    if kind == "one engine" and place.values:
-        kind = "one engine, integrator"
-    names = [row.name for row in refused(result)]
     left, right = _switch(result, place.name)
+    names = tuple(row.name for row in refused(result))
     cause = f"the {place.name}" if place.values else place.name
-    return ANSWERS[kind].format(
+    return PlaceSentence(
+        wording=_wording_of_place(result, place),
         cause=cause,
+        without=place.without,
         left=left,
         right=right,
-        part=percent(place.share),
-        without=place.without,
+        part=place.share,
         gap=amount(result, result.gap),
-        refused=", ".join(names[:2]),
+        refused=names[:2],
     )
+
+
+def _wording_of_place(result: Explanation, place: Localisation) -> PlaceWording:
+    """Return which sentence says where the gap goes."""
+    match result.verdict.answer:
+        case "one engine":
+            return "one integrator" if place.values else "one engine"
+        case "switched" | "still" | "refused" as wording:
+            return wording
+        case _:
+            return "located"
 
 
 def _switch(result: Explanation, name: str) -> tuple[str, str]:
@@ -159,29 +278,24 @@ def proofs(result: Explanation) -> tuple[str, ...]:
     touch = result.touch
     if touch is None or not touch.time or touch.before >= _PROOF * result.gap:
         return ()
-    said = TOUCH.format(
-        what=touch.what,
-        time=short_time(touch.time),
-        before=amount(result, touch.before),
-        quantity=result.quantity,
-    )
-    return (said,)
+    return (sentence_of(TouchSentence(touch, result.quantity, result.unit)),)
 
 
 def parts(result: Explanation) -> str:
     """Say the three parts of a gap, in a sentence without its end."""
-    if result.verdict.answer == "hidden" and result.brought:
-        wider = result.gap / result.brought  # parts of the wider gap
-        return HIDDEN.format(
-            gap=amount(result, result.gap),
-            brought=amount(result, result.brought),
-            located=percent(wider * result.located),
-            unexplained=percent(wider * result.unexplained),
+    brought = 0.0 if result.brought is None else result.brought
+    is_wider = result.verdict.answer == "hidden" and brought > 0
+    wider = result.gap / brought if is_wider else 1.0  # parts of the wider gap
+    return sentence_of(
+        PartsSentence(
+            is_wider=is_wider,
+            gap=result.gap,
+            brought=brought,
+            unit=result.unit,
+            explained=result.explained,
+            located=wider * result.located,
+            unexplained=wider * result.unexplained,
         )
-    return PARTS.format(
-        explained=percent(result.explained),
-        located=percent(result.located),
-        unexplained=percent(result.unexplained),
     )
 
 

@@ -129,7 +129,7 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
         redundant=_redundant(shares) if explained > UNEXPLAINED else (),
         impossible=division.impossible,
         unmatched=matched.only,
-        missing=missing_parts(left, right),
+        missing=_missing(request),
         notes=_notes(matched, left, right),
         unread=_unread(matched, request, gap),
         still=_still(causes, left, trials.traces[0]),
@@ -141,6 +141,7 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
         runs=trials.count,
         took=time.perf_counter() - began,
         provenance=(provenance(left), provenance(right)),
+        right_file=right.path.name,
     )
 
 
@@ -151,6 +152,14 @@ def _motion(trials: Trials, matched: Matched) -> MotionExtent:
         labels = trace.header.joint_labels
         sides.append((trace, [labels[pair[side]] for pair in matched.joints]))
     return motion_of(sides, SEEN, float(trials.ruler.time[-1]))
+
+
+def _missing(request: WhyRequest) -> tuple[tuple[str, str], ...]:
+    """Return what one side has nothing of and the other has, as far as it acts in what is run."""
+    parts = missing_parts(request.left, request.right)
+    if request.scenario.options.get("actuation", True):
+        return parts
+    return tuple((side, part) for side, part in parts if part != "actuators")
 
 
 def _match(request: WhyRequest) -> Matched:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from ...engines.description.file_changes import AttributeChange
 from ...engines.description.lines import SourceLine
 from ...engines.records import DifferingQuantity
 from ...measures import Deviation
 from ..compare.instead import Instead
 from ..compare.matching import Only
 from ..compare.motion import MotionExtent
+from ..compare.typed_command import TypedCommand
 from ..runs.provenance import Provenance
 from .gap import FirstTouch, Measure
 from .locate import Localisation
@@ -37,6 +39,9 @@ class Share:
         note: Why there is no share, or what else is to be said.
         chosen: Of an integrator the side that can choose, "left" or "right", and the one to choose;
             else None.
+        changes: What of the right's file undoes it, attribute by attribute; empty where that is not
+            known.
+        not_written: Why no attribute of the right's file undoes it; "" where some do.
     """
 
     name: str
@@ -49,6 +54,8 @@ class Share:
     last: float | None = None
     note: str = ""
     chosen: tuple[Literal["left", "right"], str] | None = None
+    changes: tuple[AttributeChange, ...] = ()
+    not_written: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,6 +106,8 @@ class Explanation:
         runs: How many runs it took.
         took: What it took by the clock [s].
         provenance: What each side was computed with.
+        right_file: Name of the right's file, without its folder.
+        command: What asks something of these sides again; None where nothing was typed.
     """
 
     experiment: str
@@ -138,6 +147,8 @@ class Explanation:
     runs: int
     took: float
     provenance: tuple[Provenance, Provenance]
+    right_file: str = ""
+    command: TypedCommand | None = field(default=None, metadata={"json": False})
 
     @property
     def verdict(self) -> GapVerdict:

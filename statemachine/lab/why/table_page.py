@@ -7,15 +7,24 @@ from collections.abc import Sequence
 
 from ...measures.text import NONE, capital, percent
 from ...show.blocks import Block, Section, Table, TableCell
-from . import Explanation, Share
 from .answer_page import amount
+from .explanation import Explanation, Share
 from .locate import Localisation
-from .values_page import relative_difference, texts_of, title_of
+from .values_page import (
+    distinct,
+    heading_of,
+    relative_difference,
+    sides_of,
+    texts_of,
+    title_of,
+)
 
 _SAME = "″"  # in the rows of a cause's further quantities, which have one part with the first
 _SHOWN = 12  # rows; the rest is folded away
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
+_SUMMARY_HEADS = ("what", "left", "right", "part", "right's file")
+MOST_ROWS = 8  # of the first screen
 _HEADS = ("what", "left", "right", "part", "alone", "last")
 _WORDS = frozenset({0, 1, 2})  # columns
 _TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
@@ -28,16 +37,64 @@ _MEASURES = {
 Row = tuple[str, ...]
 
 
-def table(result: Explanation, able: Sequence[Share], small: Sequence[Share]) -> list[Block]:
-    """Return the differences, the largest share first.
+def summary_table(result: Explanation, most: int) -> Table:
+    """Return the causes of the first screen, the largest share first; the rest is one row.
 
     Args:
         result: The explanation.
-        able: The causes that can be equalized.
-        small: Those of them without an effect, which are one row.
+        most: How many rows it has before the one that counts the rest.
     """
+    acting = [row for row in able(result) if has_effect(row) or not result.verdict.divides]
+    parts: list[tuple[Row, float]] = []
+    for row in acting:
+        parts.append((_summary_of_cause(result, row), row.share or 0.0))
+    for place in result.found_in:
+        parts.append((_summary_of_place(place), place.share))
+    parts.sort(key=lambda pair: -abs(pair[1]))
+    shown = [row for row, _ in parts[:most]]
+    more = len(able(result)) + len(result.found_in) - len(shown)
+    if more:
+        share = result.explained + result.located - sum(part for _, part in parts[:most])
+        shown.append(_row_of_rest(more, share if result.verdict.divides else None))
+    heads = _SUMMARY_HEADS
+    if all(row[4] == NONE for row in shown):  # nothing stands in the file
+        heads, shown = heads[:4], [row[:4] for row in shown]
+    return Table(heads, shown, words=frozenset({0, 1, 2, 4}))
+
+
+def _summary_of_cause(result: Explanation, row: Share) -> Row:
+    """Return a cause in one row, with the line of the right's file that says it."""
+    left, right = sides_of(row)
+    place = f"{row.place.file}:{row.place.line}" if row.place else NONE
+    return capital(heading_of(row)), left, right, _parts(result, row)[0], place
+
+
+def _summary_of_place(place: Localisation) -> Row:
+    """Return what was localised in one row."""
+    left, right = place.values or (NONE, NONE)
+    return f"{capital(place.name)} (localised)", left, right, percent(place.share), NONE
+
+
+def _row_of_rest(count: int, share: float | None) -> Row:
+    """Return the row that counts the causes that have none of their own.
+
+    Args:
+        count: How many they are.
+        share: What they take away together, as a part of the gap; None where it was not divided.
+    """
+    return f"{count} more", NONE, NONE, percent(share), NONE
+
+
+def able(result: Explanation) -> list[Share]:
+    """Return the causes that can be equalized."""
+    return [row for row in result.shares if not row.note]
+
+
+def tables(result: Explanation) -> list[Block]:
+    """Return the differences, the largest share first; those without an effect are one row."""
+    small = without_effect(result, able(result))
     rows: list[Row] = []
-    for row in able:
+    for row in able(result):
         if row not in small:
             rows += _rows_of_cause(result, row)
     rows += [_row_of_place(place) for place in result.found_in]
@@ -57,11 +114,11 @@ def table(result: Explanation, able: Sequence[Share], small: Sequence[Share]) ->
     return [shown, Section("", heading, [more], folded=True)]
 
 
-def without_effect(result: Explanation, able: Sequence[Share]) -> list[Share]:
+def without_effect(result: Explanation, rows: Sequence[Share]) -> list[Share]:
     """Return the differences without an effect, if there are several."""
     if not result.verdict.divides:
         return []
-    small = [row for row in able if not has_effect(row)]
+    small = [row for row in rows if not has_effect(row)]
     return small if len(small) > 1 else []
 
 
@@ -97,7 +154,7 @@ def _rows_of_cause(result: Explanation, row: Share) -> list[Row]:
     if not row.values:
         return [(capital(row.name), NONE, NONE, *parts)]
     rows: list[Row] = []
-    for value in sorted(row.values, key=relative_difference, reverse=True):
+    for value in sorted(distinct(row.values), key=relative_difference, reverse=True):
         left, right = texts_of(value)
         rows.append((capital(title_of(row, value)), left, right, *parts))
         parts = (_SAME, _SAME, _SAME)

@@ -5,7 +5,8 @@ A quantity is named unless the name of its cause says what it is: "mass of lower
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 _OFF = ("place", "anchor", "com", "axis")  # quantities of which only the distance is said
 _SHOWN = 3  # quantities that a sentence has
 _DIGITS = range(4, 18)  # of a number: as many as it takes to tell two apart
+# Which sentence tells a cause.
+CauseWording = Literal["values", "bare", "turned axes", "filter on the right", "filter on the left"]
 # Causes whose one quantity needs no name, beside those whose name says it.
 _SAID = {
     *("moments", "com", "place", "anchor", "drives", "farthest corner", "farthest point"),
@@ -30,7 +33,7 @@ def needs_name(row: Share, value: DifferingQuantity) -> bool:
     name = value.quantity
     if row.kind == "engine" or not name:
         return False
-    if len(row.values) > 1:
+    if len(distinct(row.values)) > 1:
         return True
     words = row.name.replace("(", " ").replace(")", " ").split(" ")
     return not (name in _SAID or name in row.name or set(name.split()) <= {*words})
@@ -43,7 +46,7 @@ def title_of(row: Share, value: DifferingQuantity) -> str:
 
 def heading_of(row: Share) -> str:
     """Return the name of a cause; with that of its quantity, where it has one that needs it."""
-    return title_of(row, row.values[0]) if len(row.values) == 1 else row.name
+    return title_of(row, row.values[0]) if len(distinct(row.values)) == 1 else row.name
 
 
 def sides_of(row: Share) -> tuple[str, str]:
@@ -53,51 +56,51 @@ def sides_of(row: Share) -> tuple[str, str]:
     """
     if not row.values:
         return NONE, NONE
-    values = _largest_first(row)
-    left, right = zip(*(_named(row, value) for value in values[:_SHOWN]), strict=True)
+    values = _largest_first(distinct(row.values))
+    pairs = [_named(value, alone=len(values) == 1) for value in values[:_SHOWN]]
+    left, right = zip(*pairs, strict=True)
     more = f" and {len(values) - _SHOWN} more" if len(values) > _SHOWN else ""
     if more:
         return ", ".join(left) + more, ", ".join(right) + more
     return listed([text for text in left if text]), listed([text for text in right if text])
 
 
-def _largest_first(row: Share) -> list[DifferingQuantity]:
-    """Return the quantities of a cause; of more than a sentence has, those that differ most."""
-    if len(row.values) <= _SHOWN:
-        return list(row.values)
-    return sorted(row.values, key=relative_difference, reverse=True)
+def distinct(values: Sequence[DifferingQuantity]) -> list[DifferingQuantity]:
+    """Return the quantities of a cause without those that several elements have alike."""
+    return list(dict.fromkeys(values))
 
 
-def _named(row: Share, value: DifferingQuantity) -> tuple[str, str]:
-    """Return the texts of a quantity with its name; a side without it among others has "" ."""
-    texts: list[str] = []
-    for text in texts_of(value):
-        if text == NONE and len(row.values) > 1:
-            texts.append("")
-        elif len(row.values) > 1:
-            texts.append(f"{value.quantity} {text}")
-        else:
-            texts.append(text)
+def _largest_first(values: Sequence[DifferingQuantity]) -> list[DifferingQuantity]:
+    """Return quantities; of more than a sentence has, those that differ most come first."""
+    if len(values) <= _SHOWN:
+        return list(values)
+    return sorted(values, key=relative_difference, reverse=True)
+
+
+def _named(value: DifferingQuantity, alone: bool) -> tuple[str, str]:
+    """Return the texts of a quantity with its name, which one that is alone does not need.
+
+    A side without it among others has "".
+    """
+    left, right = texts_of(value)
+    if alone:
+        return left, right
+    texts = ["" if text == NONE else f"{value.quantity} {text}" for text in (left, right)]
     return texts[0], texts[1]
 
 
-def phrase_of(row: Share) -> str:
-    """Return a cause in a sentence of its own where its values say too little; else ""."""
-    element = row.name.rpartition(" of ")[2]
+def wording_of(row: Share) -> CauseWording:
+    """Return which sentence tells a cause: with its values, unless these say too little."""
     names = {value.quantity: value for value in row.values}
     if row.kind == "body" and row.name.startswith("inertia") and names.keys() == {TURNED}:
-        _, angle = texts_of(names[TURNED])
-        return (
-            f"the inertia axes of {element} are turned by {angle} on the right, its moments are "
-            "equal"
-        )
+        return "turned axes"
     times = names.get("timeconst")
-    if row.name.startswith("filter of ") and times and None in (times.left, times.right):
-        left, right = texts_of(times)
+    if row.name.startswith("filter of ") and times is not None:
         if times.left is None:
-            return f"{element} filters its command with {right} on the right, not on the left"
-        return f"{element} filters its command with {left} on the left, not on the right"
-    return ""
+            return "filter on the right"
+        if times.right is None:
+            return "filter on the left"
+    return "bare" if NONE in sides_of(row) else "values"
 
 
 def texts_of(value: DifferingQuantity) -> tuple[str, str]:

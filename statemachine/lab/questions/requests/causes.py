@@ -11,9 +11,11 @@ from ...compare.alike import for_left
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
 from ...compare.sides import Request, with_options
+from ...compare.typed_command import typed_command
 from ...runs.reporter import QUIET, Reporter
 from ...why.trials import Measure
 
+_PLAYED = "the models were run again, with the recorded starts and commands"
 MEASURES: tuple[Measure, ...] = ("worst", "end", "rms")
 
 
@@ -83,4 +85,8 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> why.Explanati
             uncertain=request.uncertainty,
             jobs=request.jobs,
         )
-        return why.explain(question, progress)
+        result = why.explain(question, progress)
+    notes = [*run.taken]
+    if run.is_traces:
+        notes.append(_PLAYED)
+    return replace(result, notes=(*notes, *result.notes), command=typed_command(run))

@@ -1,0 +1,101 @@
+"""The command that asks something of two sides again, to be typed with other options."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...installed import DEFAULT, PAIR
+from .labels import typed_option
+from .sides import Request, Side
+
+_WIDTH = 74  # of a line of a command, which is set in
+
+
+@dataclass(frozen=True)
+class TypedCommand:
+    """A command of `compare`, without the question that is asked.
+
+    Attributes:
+        words: As they are typed, each by itself.
+    """
+
+    words: tuple[str, ...]
+
+    def lines(self, *further: str) -> str:
+        """Return the command as one types it, continued on further lines where it is long.
+
+        Where a word is longer than a line, such as the path of a file, dots stand for all that was
+        typed.
+
+        Args:
+            *further: Words that follow: the question, and its options.
+        """
+        typed = [shlex.quote(word) for word in self.words]
+        if max(map(len, typed)) > _WIDTH:
+            typed = [*typed[:2], "..."]
+        lines: list[str] = []
+        line = ""
+        for word in (*typed, *map(shlex.quote, further)):
+            if line and len(line) + 1 + len(word) > _WIDTH:
+                lines.append(f"{line} \\")
+                line = f"  {word}"
+            else:
+                line = f"{line} {word}" if line else word
+        return "\n".join([*lines, line])
+
+
+def typed_command(run: Request) -> TypedCommand:
+    """Return the command that runs something on two sides, or opens two traces."""
+    words = ["statemachine", "compare", *run.what]
+    if run.model:
+        words.append(run.model)
+    for side in run.sides:
+        words += _words_of_side(side)
+    for name, value in run.options.items():
+        if name == "timestep":
+            words += ["--timestep", f"{value}"]
+        else:
+            words.append(typed_option(name, value))
+    if not run.sides and tuple(run.backends) != PAIR:
+        for backend in run.backends:
+            words += ["--backend", backend]
+    words += _words_of_run(run)
+    return TypedCommand(tuple(words))
+
+
+def _words_of_side(side: Side) -> list[str]:
+    """Return a side as one types it; what runs on the usual engine does not name it."""
+    backend = str(side.chosen_backend())
+    model = side.model if backend == DEFAULT else f"{side.model}@{backend}"
+    return [model, *(typed_option(name, value) for name, value in side.options.items())]
+
+
+def _words_of_run(run: Request) -> list[str]:
+    """Return the options that say how something is run."""
+    words: list[str] = []
+    if run.menagerie is not None:
+        words += ["--menagerie", str(run.menagerie)]
+    if run.seconds is not None:
+        words += ["--seconds", f"{run.seconds:g}"]
+    if run.seed:
+        words += ["--seed", str(run.seed)]
+    if run.every != 1:
+        words += ["--every", str(run.every)]
+    if run.keyframe is not None:
+        words += ["--keyframe", run.keyframe]
+    for left, right in run.names.items():
+        words += ["--map", f"{left}={right}"]
+    words += _words_of_parts(run.sides)
+    return words
+
+
+def _words_of_parts(sides: Sequence[Side]) -> list[str]:
+    """Return the options by which one side has parts of the other's file."""
+    words: list[str] = []
+    for side, giver in zip(sides, ("right", "left"), strict=False):
+        if side.taken is not None:
+            for part in side.taken.parts:
+                words += [f"--{part}", giver]
+    return words

@@ -1,0 +1,130 @@
+"""What to change on the right, as blocks of a page: lines of its file, and settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...engines.description.file_changes import AttributeChange
+from ...installed import DEFAULT
+from ...measures.text import NONE
+from ...show.blocks import Block
+from ...show.templates import PageContent, render_blocks
+from .explanation import Explanation, Share
+from .table_page import has_effect
+from .values_page import distinct, texts_of, title_of
+
+
+@dataclass(frozen=True)
+class SettingChange:
+    """A quantity that the right is to have as the left has it, where no line of its file is known.
+
+    Attributes:
+        name: What it is, and of what; the file and the line before it, where they are known.
+        left, right: Its values, with their units.
+        is_lacking: Whether the right has nothing of it that a value could tell.
+    """
+
+    name: str
+    left: str
+    right: str
+    is_lacking: bool = False
+
+
+@dataclass(frozen=True)
+class WhyChanges(PageContent):
+    """What to change on the right.
+
+    Attributes:
+        result: The explanation.
+    """
+
+    template = "why_changes.md.j2"
+    result: Explanation
+
+    @property
+    def engine(self) -> str:
+        """The engine of which the settings are that come with it; "" of none."""
+        return engine_as_it_comes(self.result) if self._acting else ""
+
+    @property
+    def in_file(self) -> tuple[AttributeChange, ...]:
+        """Attributes of the right's file."""
+        changes: list[AttributeChange] = []
+        for row in self._acting:
+            changes += row.changes
+        return tuple(changes)
+
+    @property
+    def settings(self) -> tuple[SettingChange, ...]:
+        """What else is to be changed."""
+        changes: list[SettingChange] = []
+        for row in self._acting:
+            if not row.changes:
+                changes += _settings_of(row)
+        return tuple(changes)
+
+    @property
+    def has_changes(self) -> bool:
+        """Whether anything is to be changed."""
+        return bool(self._acting)
+
+    @property
+    def brought(self) -> float | None:
+        """The gap with all of these changed; None where that is not known."""
+        return self.result.brought if self._acting else None
+
+    @property
+    def others_may_be_missing(self) -> bool:
+        """Whether differences are left out that have no effect here, and may have one elsewhere."""
+        return 0 < len(self._acting) < len(self._able) and len(self.result.first) > 1
+
+    @property
+    def side(self) -> str:
+        """The side that alone has integrators to choose from; "" of none."""
+        return next((row.chosen[0] for row in self.result.shares if row.chosen), "")
+
+    @property
+    def integrator(self) -> str:
+        """The integrator that is to be chosen there; "" of none."""
+        return next((row.chosen[1] for row in self.result.shares if row.chosen), "")
+
+    @property
+    def _able(self) -> list[Share]:
+        return [row for row in self.result.shares if not (row.note or row.chosen)]
+
+    @property
+    def _acting(self) -> list[Share]:
+        return [row for row in self._able if has_effect(row)]
+
+
+def steps(result: Explanation) -> list[Block]:
+    """Say what to change, where, and what is left of the gap with everything changed."""
+    return render_blocks(WhyChanges(result)) if result.verdict.divides else []
+
+
+def _settings_of(row: Share) -> list[SettingChange]:
+    """Return what to change for one cause: a row for each quantity."""
+    if not row.values:
+        return [SettingChange(_placed(row, row.name), NONE, NONE)]
+    changes: list[SettingChange] = []
+    for value in distinct(row.values):
+        left, right = texts_of(value)
+        is_lacking = (left, right) == ("there", NONE)
+        changes.append(SettingChange(_placed(row, title_of(row, value)), left, right, is_lacking))
+    return changes
+
+
+def _placed(row: Share, name: str) -> str:
+    """Return a name behind the file and the line that say the cause, where they are known."""
+    return f"{row.place.file}, line {row.place.line}: {name}" if row.place else name
+
+
+def engine_as_it_comes(result: Explanation) -> str:
+    """Return an engine with its own settings, where such settings are causes; else ""."""
+    if not any(row.kind == "engine" for row in result.shares):
+        return ""
+    for label, made in zip(result.labels, result.provenance, strict=True):
+        comes_with_its_own = ":engine" in label or "engine defaults" in label
+        if comes_with_its_own and made.backend != DEFAULT:
+            return made.backend
+    return ""
