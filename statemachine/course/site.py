@@ -115,7 +115,7 @@ def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     asked = scenario(name)
     left = load(asked.model, backend=backends[0])
     right = load(asked.model, backend=backends[1], defaults="engine")
-    page = why.page(explain(WhyRequest(left, right, asked)))
+    page = why.page(explain(WhyRequest(left, right, asked)), details=True)
     return replace(
         page,
         title=f"{name}, engines as they come: why",
