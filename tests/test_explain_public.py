@@ -63,6 +63,9 @@ def test_public_robots(path):
     assert {each.name.partition(" of ")[0] for each in found.shares} == {"mass", "damping"}
     assert len(found.shares) == 2
     assert_has(found, brought=0.0)
+    if found.verdict.answer == "nothing moved":  # gravity alone, on what lies in a plane
+        assert found.instead is not None
+        return
     assert found.verdict.holds
     if found.verdict.divides:
         assert sum(each.share or 0.0 for each in found.shares) == pytest.approx(1.0, abs=0.02)

@@ -27,6 +27,7 @@ from statemachine.errors import (
     EngineWarning,
     MissingEngineError,
     StateMachineError,
+    UnknownNameError,
 )
 from statemachine.lab.recordings import record_scenario
 from statemachine.lab.runs.scenarios import scenario
@@ -41,12 +42,13 @@ from statemachine.lab.sweep import (
     read_manifest,
     run_sweep,
 )
-from statemachine.lab.sweep.design import parse_vary, with_kinds
+from statemachine.lab.sweep.design import parse_vary
 from statemachine.lab.sweep.folder import locked, settle_manifest
+from statemachine.lab.sweep.kinds import VariableNames, with_kinds
 from statemachine.lab.sweep.rows import KEY, RowWriter, counted, remove_failed
 from statemachine.lab.sweep.worker import differing, run_batch
 
-from .support.claims import assert_has, refused
+from .support.claims import assert_has, assert_in, refused
 from .support.files import written
 from .support.processes import files_below, in_its_own_python, soon, without_estimates
 from .support.requirements import ROOT
@@ -164,7 +166,7 @@ def start(tmp_path: Path) -> Start:
 )
 def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
     options = ("timestep", "damping", "contacts", "integrator")
-    (vary,) = with_kinds(parse_vary([word]), options, ("gain",))
+    (vary,) = with_kinds(parse_vary([word]), VariableNames(options, parameters=("gain",)))
     assert_has(vary, values=values, times=times, bounds=None, numeric=isinstance(values[0], float))
 
 
@@ -183,6 +185,9 @@ def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
         (("timestep=1",), "longer than the run"),
         (("damping[elbow]=1",), "no joint named 'elbow'"),
         (("damping=1", "damping[elbow_flex]=1"), "both varied"),
+        (("mass.gripper=0.5x",), "--vary 'mass[gripper]=0.5x'"),
+        (("meshes=1",), "meshes must be True or False"),
+        (("balance_inertia[base]=on",), "balance_inertia is varied as a whole"),
         (("gravity[w]=1",), "no axis named 'w'"),
         (("qpos=1",), "qpos[JOINT]"),
         (("qpos[elbow]=1",), "no joint named 'elbow'"),
@@ -196,7 +201,7 @@ def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
         ({"backends": ("mujocco",)}, "Did you mean 'mujoco'"),
         ({"spread": "1"}, "an uncertainty reads like"),
         ({"what": "policy.py:still", "vary": ("gian=1",)}, "Did you mean 'gain'"),
-        ({"what": "policy.py:still", "vary": ("seed=1",)}, "no thing to vary named 'seed'"),
+        ({"what": "policy.py:still", "vary": ("seed=1",)}, "nothing to vary is named 'seed'"),
         ({"what": "policy.py:missing"}, "has no function missing"),
         ({"what": "policy.py:still", "keyframe": "away"}, "no keyframe named 'away'"),
     ],
@@ -232,6 +237,60 @@ def test_what_is_refused_before_anything_runs(
 def test_a_request_checks_itself(asked: Any, says: str) -> None:
     with pytest.raises(StateMachineError, match=re.escape(says)):
         dataclasses.replace(small("hold"), **asked)
+
+
+TWO_NAMES = """
+def walk(model, data, gain=1.0, friction=1.0):
+    return None
+"""
+
+MOTOR = """
+<mujoco><option timestep="0.01"/><worldbody><body name="link" pos="0 0 1">
+  <joint name="hinge" type="hinge" axis="0 1 0"/>
+  <geom name="rod" type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3"/>
+</body></worldbody><actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
+"""
+
+
+@pytest.mark.parametrize(
+    ("word", "kind", "says"),
+    [
+        ("friction=1,2", BadInputError, "a parameter of walk and an option of the robot"),
+        ("kp=1,2", BadInputError, "position servos, and motor.xml has none"),
+        ("gian=1,2", UnknownNameError, "Did you mean 'gain'"),
+        ("gain[hinge]=1,2", BadInputError, "has no parts"),
+    ],
+)
+def test_a_name_of_nothing_of_both_or_without_effect_is_refused_in_one_line(
+    word: str, kind: type[Exception], says: str, tmp_path: Path
+) -> None:
+    function = f"{written(tmp_path / 'walk.py', TWO_NAMES)}:walk"
+    model = str(written(tmp_path / "motor.xml", MOTOR))
+    with pytest.raises(kind, match=re.escape(says)) as caught:
+        prepared(small(function, word, model=model))
+    message = str(caught.value)
+    assert "\n" not in message
+    if not word.startswith("gain["):  # what there is
+        assert_in(message, "walk takes gain and friction", "motor.xml has actuation, gravity")
+        assert "kp" not in message.partition("motor.xml has actuation")[2]
+
+
+def test_a_parameter_of_the_function_and_one_of_the_robot_vary_in_one_sweep(tmp_path: Path) -> None:
+    function = f"{written(tmp_path / 'walk.py', TWO_NAMES.replace('friction', 'other'))}:walk"
+    model = str(written(tmp_path / "motor.xml", MOTOR))
+    ready = prepared(small(function, "gain=1,2", "mass[link]=0.5x,1x", model=model))
+    assert [vary.kind for vary in ready.design.factors] == ["parameter", "option"]
+
+
+def test_how_a_file_is_read_is_varied_where_it_is_loaded(tmp_path: Path) -> None:
+    """One of its moments is larger than the two others together: MuJoCo refuses it as it is."""
+    inertial = '<inertial pos="0 0 -0.1" mass="1" diaginertia="0.1 0.01 0.01"/><geom name="rod"'
+    model = str(written(tmp_path / "odd.xml", MOTOR.replace('<geom name="rod"', inertial)))
+    sweep = small("gravity", "balance_inertia=on,off", model=model)
+    with pytest.warns(EngineWarning, match="balance_inertia: link had moments"):
+        rows = {row["vary.balance_inertia"]: row for row in in_process(sweep)}
+    assert (rows[True]["status"], rows[False]["status"]) == ("done", "failed")
+    assert rows[False]["error_class"] == "ModelError"
 
 
 def test_many_cells_are_told_beforehand() -> None:
@@ -493,7 +552,8 @@ def test_every_kind_of_factor_has_a_meaning() -> None:
         "damping=1,2": ("N·m·s/rad or N·s/m", "damping of the model"),
         "contacts=on": ("", "contacts of the model"),
     }
-    found = with_kinds(parse_vary(told), ["damping", "contacts"], ["mass"])
+    names = VariableNames(["damping", "contacts"], parameters=["mass"])
+    found = with_kinds(parse_vary(told), names)
     assert [(vary.unit_on(), vary.meaning) for vary in found] == list(told.values())
 
 
@@ -736,7 +796,7 @@ def test_cells_that_failed_are_run_again_if_asked(
     assert Counter(dict(counted(tmp_path / "out")).values())["BadInputError"] == 6
     # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
     code = (
-        "import os, signal, sys; from statemachine import sweep\n"
+        "import os, signal, sys; from statemachine.lab import sweep\n"
         "from statemachine.cli import main\n"
         "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "main(sys.argv[1:])"

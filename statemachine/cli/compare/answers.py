@@ -63,7 +63,8 @@ def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     from ...lab.questions.requests.models import answer
 
     result = answer(request, TerminalReporter())
-    return show(model_diff.page(result, request.labels, options.all), result, options.json)
+    page = model_diff.page(result, request.labels, options.all, details=options.details)
+    return show(page, result, options.json)
 
 
 def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
@@ -77,7 +78,8 @@ def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     labels = run.backends
     if run.sides:
         labels = run.sides[0].label, run.sides[1].label
-    page = one_step.page(result, numbered(labels), Path(run.what[0]).name)
+    experiment = Path(run.what[0]).name
+    page = one_step.page(result, numbered(labels), experiment, details=options.details)
     return show(page, result, options.json)
 
 
@@ -87,7 +89,8 @@ def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     from ...lab.questions.requests.converge import answer
 
     result = answer(request, TerminalReporter())
-    page = convergence.page(result, Path(request.run.what[0]).name)
+    experiment = Path(request.run.what[0]).name
+    page = convergence.page(result, experiment, details=options.details)
     return show(page, result, options.json)
 
 
@@ -102,7 +105,7 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     comparisons = answer(request, TerminalReporter())
     if options.junit is not None:
         write_tests(options.junit, comparisons)
-    page = versions.page(comparisons, request.run)
+    page = versions.page(comparisons, request.run, details=options.details)
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
     return show(page, comparisons, options.json)
@@ -119,7 +122,7 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
     except EndedEarlyError as error:
         until_then = CompareRequest(request.run, uncertainty=request.uncertainty)
         return _run_compare(options, until_then, f"No cause is named: {error}.")
-    return show(why.page(result, getattr(options, "details", False)), result, options.json)
+    return show(why.page(result, details=options.details), result, options.json)
 
 
 def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause: str = "") -> int:
@@ -137,7 +140,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause:
         asked = explain_request_of(options, request.run)
     result = answer(request, reporter)
     if files.html is None:
-        page = comparison.page(result, no_cause)
+        page = comparison.page(result, no_cause, details=options.details)
     else:
         page = comparison.whole_page(result, asked, typed(options, request.run), reporter)
         line = write_page(files.html, result.run.traces, _shown(request.run), page)

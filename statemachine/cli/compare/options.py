@@ -88,6 +88,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-why", action="store_true", help="with --html: skip the search for causes"
     )
+    parser.add_argument(
+        "--details",
+        action="store_true",
+        help="all that is known, and not only the verdict and the worst of it",
+    )
     add_json(parser)
     parser.add_argument(
         "--junit",
@@ -101,7 +106,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     _add_pictures(parser.add_argument_group("pictures"))
     _add_models(parser.add_argument_group("comparing descriptions of a robot"))
     first = ("what", "backend", "why", "html", "converge", "seconds", "tolerance", "one_step")
-    shorten_help(parser, first=(*first, "versions", "models", "json"))
+    shorten_help(parser, first=(*first, "versions", "models", "details", "json"))
 
 
 def _add_sides(group: argparse._ArgumentGroup) -> None:

@@ -34,13 +34,19 @@ from .subject_page import APART, MOMENT, Slots, subject_blocks, value_text
 _READ = ("file", "read", "links", "joints", "touching", "drawn", "mass")  # rows of the sides
 
 
-def page(result: ModelsComparison, sides: Sequence[str], everything: bool = False) -> Page:
+def page(
+    result: ModelsComparison,
+    sides: Sequence[str],
+    everything: bool = False,
+    details: bool = False,
+) -> Page:
     """Say what differs, the weightiest first; then what is equal, and how well.
 
     Args:
         result: The comparison.
         sides: Both as one types them for a run.
         everything: Whether every figure has a row of its own.
+        details: Whether all of it is shown, and not the first screen alone.
     """
     by_subject = grouped((row.subject, row) for row in result.differences)
     differences: list[Block] = []

@@ -35,12 +35,13 @@ _RECORDED = (
 )
 
 
-def page(result: CompareResult, no_cause: str = "") -> Page:
+def page(result: CompareResult, no_cause: str = "", details: bool = False) -> Page:
     """Return the page of a comparison, for a terminal.
 
     Args:
         result: What was found.
         no_cause: Why no cause can be named, where one was asked for.
+        details: Whether all of it is shown, and not the first screen alone.
     """
     return _page(result, why_not=_what_next(result, no_cause))
 

@@ -38,12 +38,13 @@ ByVerdict = Mapping[LimitVerdict, Sequence[GapLimit]]
 _FINER = ("at h", *(f"h/{finer}" for finer in FINER[1:]))
 
 
-def page(result: Convergence, experiment: str) -> Page:
+def page(result: Convergence, experiment: str, details: bool = False) -> Page:
     """Return the page of what vanishes with the timestep, and what does not.
 
     Args:
         result: What was found.
         experiment: What was run.
+        details: Whether all of it is shown, and not the first screen alone.
     """
     by_verdict = grouped((limit.verdict, limit) for limit in result.whole)
     return template.page(

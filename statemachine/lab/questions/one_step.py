@@ -20,13 +20,14 @@ from ..compare.stages import FORCES
 from .compared_names import moment
 
 
-def page(result: OneStep, labels: tuple[str, str], experiment: str) -> Page:
+def page(result: OneStep, labels: tuple[str, str], experiment: str, details: bool = False) -> Page:
     """Return the page of what each stage of a step gives on both sides: what differs first.
 
     Args:
         result: What was found.
         labels: What the sides are called.
         experiment: What was run.
+        details: Whether all of it is shown, and not the first screen alone.
     """
     left, right = labels
     return template.page(

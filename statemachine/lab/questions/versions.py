@@ -69,12 +69,13 @@ class _NextRelease:
         )
 
 
-def page(comparisons: Sequence[Comparison], request: Request) -> Page:
+def page(comparisons: Sequence[Comparison], request: Request, details: bool = False) -> Page:
     """Return the page of releases, each compared with the next, and commands that ask why.
 
     Args:
         comparisons: Of each release with the next.
         request: What was run.
+        details: Whether all of it is shown, and not the first screen alone.
     """
     pairs = [_NextRelease.of(comparison) for comparison in comparisons]
     slots = slots_of(_releases_of(pairs), _changes_of(pairs, request))

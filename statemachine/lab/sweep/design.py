@@ -12,12 +12,12 @@ import math
 import re
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from ...errors import BadInputError, shown, unknown_name
+from ...errors import BadInputError, shown
 from ...installed import require_extra
 from ...interface import Array, JointType
 from ...typed_numbers import typed_float
@@ -50,6 +50,7 @@ _MEANINGS: dict[Kind, str] = {
 }
 _OWN = "{} as a multiple of the model's own value: 0.5 is half of it"
 _NAME = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]+)\])?")
+_DOTTED = re.compile(r"([A-Za-z_]\w*)\.(\S+)")
 _RANGE = re.compile(r"([^:]*):([^:]*)(?::([0-9]+))?")
 _SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 _DIGITS = 32  # hexadecimal, of a digest
@@ -128,7 +129,7 @@ def is_number(value: object) -> bool:
 
 
 def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
-    """Read words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi; `with_kinds` tells what they vary.
+    """Read words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi; `with_kinds` says what they vary.
 
     Args:
         words: As typed behind `--vary`.
@@ -146,26 +147,15 @@ def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
     return factors
 
 
-def with_kinds(
-    factors: Iterable[Vary], options: Collection[str], parameters: Collection[str] = ()
-) -> tuple[Vary, ...]:
-    """Return the same factors, each with its kind.
-
-    Args:
-        factors: As parsed.
-        options: Names that `Model.replace` takes on the backends of the sweep.
-        parameters: Of the user's function.
-
-    Raises:
-        UnknownNameError: There is nothing of this name.
-        BadInputError: What is typed is no value of that factor.
-    """
-    return tuple(replace(vary, kind=_kind(vary, options, parameters)) for vary in factors)
-
-
 def _parsed(word: str) -> Vary:
     label, sign, text = word.partition("=")
     match = _NAME.fullmatch(label.strip())
+    dotted = _DOTTED.fullmatch(label.strip())
+    if sign and dotted:
+        raise BadInputError(
+            f"{label.strip()}: the name of an element stands in brackets, as in --vary "
+            f"'{dotted[1]}[{dotted[2]}]={text}'"
+        )
     if not (sign and match):
         raise BadInputError(
             "--vary wants NAME=a,b,c, NAME=from:to:count or, with --samples, NAME=from:to; got "
@@ -223,47 +213,6 @@ def _value(word: str) -> tuple[Value, bool]:
     if not math.isfinite(number):
         raise BadInputError(f"{word} is not a finite number")
     return number + 0.0, times  # no negative zero
-
-
-def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
-    """Return what a factor varies, and check that it can be varied as it is typed.
-
-    Raises:
-        UnknownNameError: There is nothing of its name.
-        BadInputError: It is varied as a whole and has no parts, or the other way round, or it has
-            no value of the model's own that could be multiplied.
-    """
-    name = vary.name
-    kind = _kind_of_name(vary, options, parameters)
-    if kind == "model" and vary.place:
-        raise BadInputError("model is varied as a whole: model=so101/scene,so101/scene_box")
-    if kind == "state" and not vary.place:
-        raise BadInputError(f"{name} is varied one coordinate at a time: {name}[JOINT]=…")
-    if kind == "option" and name in parameters:
-        raise BadInputError(
-            f"{name} is an option of the model and a parameter of the function: give the "
-            "parameter another name"
-        )
-    if vary.times and kind != "option":
-        raise BadInputError(f"{vary.label} has no value of the model's own: leave the x out")
-    return kind
-
-
-def _kind_of_name(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
-    """Return what is varied by its name.
-
-    Raises:
-        UnknownNameError: There is nothing of this name.
-    """
-    if vary.name == MODEL:
-        return "model"
-    if vary.name in STATES:
-        return "state"
-    if vary.name in options:
-        return "option"
-    if vary.name in parameters and not vary.place:
-        return "parameter"
-    raise unknown_name("thing to vary", vary.name, [*options, MODEL, *STATES, *parameters])
 
 
 @dataclass(frozen=True)

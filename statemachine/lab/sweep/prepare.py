@@ -17,14 +17,17 @@ from ...backends.starts import overlap_warning, places_in
 from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import require_extra
 from ...interface import Model, make_data
+from ...interface.checks import as_switch
 from ...interface.options import OptionValue, checked_options
+from ...interface.records import AS_WRITTEN, READ_OPTIONS
 from ...models import resolve
 from ..compare.perturbed import EXACT, parse_uncertainty
-from ..runs.controllers import is_function, parameters_of
+from ..runs.controllers import function_place, is_function, parameters_of
 from ..runs.drive import check_length, cost_of_a_second, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
-from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc, with_kinds
+from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc
+from .kinds import variable_names, with_kinds
 from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
 from .rows import require_parquet
 from .worker import digest_of, load_of
@@ -62,8 +65,9 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     places = {name: os.path.abspath(name) if Path(name).is_file() else name for name in names}
     parameters = parameters_of(sweep.what) if function else ()
     models, backends, said = _loaded(sweep, [*places.values()], _switched_off(sweep, typed))
-    options = dict.fromkeys(name for model in models for name in model.capabilities.options)
-    factors = with_kinds(typed, options, [name for name in parameters if name != "seed"])
+    called = function_place(sweep.what)[1] if function else ""
+    can_vary = [name for name in parameters if name != "seed"]
+    factors = with_kinds(typed, variable_names(models, called, can_vary))
     design = Design(factors, sweep.samples, sweep.design_seed)
     cells = design.size * sweep.seeds * len(backends)
     if cells > _MOST:
@@ -103,7 +107,8 @@ def prepared(sweep: Sweep) -> PreparedSweep:
 def _switched_off(sweep: Sweep, factors: Sequence[Vary]) -> dict[str, OptionValue]:
     """Return the options with which models are loaded to be checked.
 
-    What an experiment switches off is nothing to refuse; a switch that is varied may be off.
+    What an experiment switches off is nothing to refuse; a switch that is varied may be off, and
+    a file may be read in the way that refuses least.
     """
     options: dict[str, OptionValue] = {}
     if not is_function(sweep.what):
@@ -111,6 +116,11 @@ def _switched_off(sweep: Sweep, factors: Sequence[Vary]) -> dict[str, OptionValu
     for vary in factors:
         if vary.label in _SWITCHES and False in vary.values:
             options[vary.label] = False
+        if vary.label in READ_OPTIONS:
+            usual = getattr(AS_WRITTEN, vary.label)
+            others = [value for value in vary.values if value != usual]
+            if others:
+                options[vary.label] = others[0]
     return options
 
 
@@ -180,7 +190,9 @@ def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
 
     def check(model: Model) -> None:
         for value in values:
-            if vary.kind == "option":
+            if vary.name in READ_OPTIONS:
+                as_switch(value, vary.name)
+            elif vary.kind == "option":
                 checked_options(model, options_at(model, [(vary, value)]))
             elif vary.kind == "state":
                 start_at(model, [(vary, value)])

@@ -26,6 +26,7 @@ from ...errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ...installed import DEFAULT, silence
 from ...interface import Array, Data, Model, forward, make_data, reset
 from ...interface.options import OptionValue
+from ...interface.records import READ_OPTIONS
 from ...interface.sites import usual_site
 from ...measures import ContactNames
 from ...measures.text import listed
@@ -36,7 +37,7 @@ from ..runs.controllers import function_file
 from ..runs.drive import check_length, drive, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
-from .design import Value, digest
+from .design import Value, Vary, digest
 from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
 from .rows import DONE, FAILED, known
 
@@ -159,9 +160,13 @@ def _model(
     name = _model_name(ready, cell)
     varied = ready.settings(cell, "option")
     # A switch may be what lets an engine take the file at all: `load` is told.
-    switches = {v.name: value for v, value in varied if isinstance(value, bool)}
-    first: dict[str, OptionValue] = {**scenario.options, **switches}
-    rest = [(v, value) for v, value in varied if not isinstance(value, bool)]
+    first: dict[str, OptionValue] = dict(scenario.options)
+    rest: list[tuple[Vary, Value]] = []
+    for vary, value in varied:
+        if isinstance(value, bool) or vary.name in READ_OPTIONS:
+            first[vary.name] = value
+        else:
+            rest.append((vary, value))
     key = repr((name, ready.files[name], cell.backend, first, sweep))
 
     def loaded() -> tuple[Model, Scenario]:
