@@ -13,8 +13,10 @@ from .methods import mandatory
 if TYPE_CHECKING:
     from ..interface import Array, Data, Model
     from ..interface.records import ReadOptions
+    from .description.file_form import FileForm
     from .description.reading import Comparable, ModelReading
     from .description.records import Robot
+    from .description.xml_source import XmlSource
     from .records import Counterparts, Edit, ModelDifference, SpecEdit
 
 
@@ -158,6 +160,24 @@ class CompiledModels:
 
         Raises:
             ModelError: It cannot be compiled so.
+        """
+
+    @mandatory
+    @abstractmethod
+    def file_form(
+        self, source: XmlSource, raw: Any, other_path: Path, other: Any, geoms: Mapping[int, int]
+    ) -> FileForm:
+        """What writes differences as attributes of a file.
+
+        Args:
+            source: The file.
+            raw: What was compiled of it.
+            other_path: The file of the other side.
+            other: What was compiled of that.
+            geoms: For each geom of the file its counterpart on the other side.
+
+        Raises:
+            ModelError: The file of the other side is no XML.
         """
 
     @mandatory

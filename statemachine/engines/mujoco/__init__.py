@@ -45,6 +45,7 @@ class MujocoEngine(RawEngine):
     integrator = function_of(".mujoco.differences:integrator")
     edited = function_of(".mujoco.differences:edited")
     can_be_respecified = function_of(".mujoco.respecified:can_be_respecified")
+    file_form = function_of(".mujoco.file_form:file_form")
     respecified = function_of(".mujoco.respecified:respecified")
     in_places_of = function_of(".mujoco.respecified:in_places_of")
     counts = function_of(".mujoco.given_parts:counts")

@@ -1,0 +1,106 @@
+"""The elements of an MJCF by the ids that they have in the compiled model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+from ..description.file_form import NotWrittenError
+from ..description.xml_source import XmlElement, XmlSource
+
+_SECTIONS = {"actuator": "actuator", "tendon": "tendon", "equality": "equality", "key": "keyframe"}
+_TAGS = {"joint": ("joint", "freejoint"), "geom": ("geom",), "site": ("site",), "body": ("body",)}
+_ACCESS = {"equality": "eq"}  # where the method of an mjModel is called otherwise
+# What adds no level to the tree of bodies.
+THROUGH = ("frame",)
+# What makes elements that the file does not have one by one.
+_MAKES_ELEMENTS = ("replicate", "composite", "flexcomp", "attach", "model")
+# The list of names in a compiled model, and the count, by the kind of an element.
+_COUNTS = {
+    **{"joint": "njnt", "geom": "ngeom", "site": "nsite", "body": "nbody", "actuator": "nu"},
+    **{"tendon": "ntendon", "equality": "neq", "key": "nkey", "pair": "npair"},
+}
+
+
+class MjcfElements:
+    """The elements of an MJCF that a compiled model was made of.
+
+    Args:
+        source: The file.
+        raw: Its mjModel.
+    """
+
+    def __init__(self, source: XmlSource, raw: Any) -> None:
+        self._source, self._raw = source, raw
+
+    @cached_property
+    def bodies(self) -> list[XmlElement]:
+        """The world and the bodies, in the order of the compiled model."""
+        worlds = [each for each in self._source.elements if each.tag == "worldbody"]
+        bodies = [each for each in self._source.elements if each.tag == "body"]
+        return [*worlds[:1], *[body for body in bodies if body.is_in("worldbody")]]
+
+    @cached_property
+    def is_listed(self) -> bool:
+        """Whether the file has its elements one by one."""
+        return not any(element.tag in _MAKES_ELEMENTS for element in self._source.elements)
+
+    def find(self, kind: str, number: int) -> XmlElement:
+        """Return the element of the file with an id of the compiled model.
+
+        Raises:
+            NotWrittenError: The file has no such element that one could name.
+        """
+        if kind not in _COUNTS:
+            raise NotWrittenError(f"what it has of {kind} is no attribute of one element")
+        name = getattr(self._raw, _ACCESS.get(kind, kind))(number).name
+        named = [element for element in self._all(kind) if element.name == name and name]
+        if len(named) == 1:
+            return named[0]
+        elements = self._all(kind)
+        count = getattr(self._raw, _COUNTS[kind])
+        if kind == "pair" or not self.is_listed or len(elements) != count:
+            label = name if name else f"{kind} {number}"
+            raise NotWrittenError(f"the file has no element of its own for {label}")
+        return elements[number]
+
+    def inertial_of(self, body: XmlElement) -> XmlElement | None:
+        """Return the `<inertial>` of a body; None without one."""
+        inner = self._source.children(body, THROUGH)
+        return next((each for each in inner if each.tag == "inertial"), None)
+
+    def _all(self, kind: str) -> Sequence[XmlElement]:
+        """Return all elements of a kind, in the order of the compiled model."""
+        if kind == "body":
+            return self.bodies
+        if kind in _TAGS:
+            return self._in_tree[kind]
+        if kind == "pair":
+            return [each for each in self._source.elements if each.tag == "pair"]
+        section = _SECTIONS[kind]
+        return [
+            element
+            for element in self._source.elements
+            if element.around and element.around[-1].tag == section
+        ]
+
+    @cached_property
+    def _in_tree(self) -> dict[str, list[XmlElement]]:
+        """The joints, geoms and sites of each body, body by body."""
+        rows: dict[str, list[XmlElement]] = {kind: [] for kind in _TAGS}
+        for number, body in enumerate(self.bodies):
+            inner = [*self._source.children(body, THROUGH)]
+            if number == 0:  # of several sections of the world
+                inner = self._of_the_world()
+            for kind, tags in _TAGS.items():
+                rows[kind] += [each for each in inner if each.tag in tags]
+        return rows
+
+    def _of_the_world(self) -> list[XmlElement]:
+        """Return what is right inside the world, of all its sections."""
+        inner: list[XmlElement] = []
+        for element in self._source.elements:
+            if element.tag == "worldbody":
+                inner += self._source.children(element, THROUGH)
+        return inner
