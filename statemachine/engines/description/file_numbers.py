@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 _DEGREE = math.pi / 180.0
+_DIGITS = 12
+_ROUNDINGS = 32 * 2.0**-52  # relative: as many as may have come together in a figure
 _NEIGHBOURS = 4  # floats on each side of an angle that are tried
 
 
@@ -21,6 +23,17 @@ def number_text(value: float) -> str:
 def numbers_text(values: Iterable[float]) -> str:
     """Return numbers in a row, each as `number_text`."""
     return " ".join(number_text(value) for value in values)
+
+
+def tidied(values: Iterable[float]) -> list[float]:
+    """Return numbers that were computed, without the last digits that rounding has left."""
+    exact = [float(value) for value in values]
+    slack = _ROUNDINGS * max(map(abs, exact), default=0.0)
+    rounded = [float(f"{value:.{_DIGITS}g}") if abs(value) > slack else 0.0 for value in exact]
+    return [
+        short if abs(short - value) <= slack else value
+        for short, value in zip(rounded, exact, strict=True)
+    ]
 
 
 def degrees_of(radians: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from ...interface import Array
 from ...rotations import matrix_from_quat, times
 from ..description.file_form import NotWrittenError
-from ..description.file_numbers import beginning_text, degrees_of, number_text, numbers_text
+from ..description.file_numbers import beginning_text, degrees_of, number_text, numbers_text, tidied
 from ..description.xml_source import AttributeText, XmlElement
 from ..records import ElementReference
 from . import _fields as fields
@@ -225,7 +225,8 @@ class ElementWriter:
             raise NotWrittenError("it is given by its two ends (fromto), and is to be no capsule")
         half = float(size[1]) * matrix_from_quat(turn)[:, 2]
         self._set("size", number_text(float(size[0])))
-        self._set("fromto", numbers_text([*(position + half), *(position - half)]))
+        ends = [*(position + half), *(position - half)]
+        self._set("fromto", numbers_text(tidied(ends)))
 
     def inertial(self, inertial: XmlElement, names: set[str]) -> None:
         """Write what a body weighs into its `<inertial>`."""
@@ -242,7 +243,7 @@ class ElementWriter:
             axes = matrix_from_quat(turn)
             tensor = axes @ np.diag(moments) @ axes.T
             entries = [tensor[j, k] for j, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-            self.texts.append(AttributeText(inertial, "fullinertia", numbers_text(entries)))
+            self.texts.append(AttributeText(inertial, "fullinertia", numbers_text(tidied(entries))))
             return
         self.texts.append(AttributeText(inertial, "diaginertia", numbers_text(moments)))
         if self._target.is_changed("body_iquat", self._number):

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...interface import Array
 from ...rotations import matrix_from_quat
-from ..description.file_numbers import degrees_of, numbers_text
+from ..description.file_numbers import degrees_of, numbers_text, tidied
 from ..description.xml_source import XmlElement
 
 # The attributes that say how an element is turned, of which it has one at most.
@@ -95,4 +95,6 @@ def _euler_angles(quaternion: Array, settings: CompilerSettings) -> list[float]:
     angles = [first, second, third]
     if settings.euler.isupper():
         angles.reverse()
-    return [degrees_of(angle) for angle in angles] if settings.degrees else angles
+    if settings.degrees:
+        return tidied(degrees_of(angle) for angle in angles)
+    return tidied(angles)

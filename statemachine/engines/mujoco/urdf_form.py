@@ -11,7 +11,7 @@ import numpy as np
 from ...interface import Array
 from ...rotations import matrix_from_quat, rotation
 from ..description.file_form import FileForm, NotWrittenError
-from ..description.file_numbers import number_text, numbers_text
+from ..description.file_numbers import number_text, numbers_text, tidied
 from ..description.xml_source import AttributeText, XmlElement, XmlSource
 from ..records import Edit, SpecEdit
 from ._file_target import FileTarget
@@ -136,10 +136,35 @@ class UrdfForm(FileForm):
         """Return the origin of the joint that a link hangs on."""
         joint = self._joint_above(link)
         parent = self._raw.body(int(self._raw.body_parentid[body])).name
-        if joint is None or self._inner(joint, "parent", "link") != parent:
-            raise NotWrittenError("it hangs on a link behind a fixed joint, or on the world")
-        position, turn = target.value("body_pos", body), target.value("body_quat", body)
-        return self._origin(joint, target, ("body_pos", "body_quat"), body, (position, turn))
+        if joint is None:
+            raise NotWrittenError("it hangs on the world, and on no joint of the file")
+        parent_link = self._inner(joint, "parent", "link")
+        base, axes = self._place_in(parent_link, parent)
+        position = axes.T @ (target.value("body_pos", body) - base)
+        matrix = axes.T @ matrix_from_quat(target.value("body_quat", body))
+        return self._origin(joint, target, ("body_pos", "body_quat"), body, (position, matrix))
+
+    def _place_in(self, name: str, container: str) -> tuple[Array, Array]:
+        """Return the place of a link in the one that it is a part of, behind fixed joints.
+
+        Args:
+            name: Of the link.
+            container: Name of the body that it is compiled into; of the world for the first link.
+
+        Returns:
+            Its position (3,) [m] and its axes (3, 3).
+        """
+        position, axes = np.zeros(3), _AXES
+        while name != container:
+            joint = self._joint_above(self._named("link", name))
+            if joint is None:
+                break
+            turn = _matrix(self._inner(joint, "origin", "rpy"))
+            shift = self._inner(joint, "origin", "xyz")
+            offset = np.array([float(word) for word in shift.split()]) if shift else np.zeros(3)
+            position, axes = offset + turn @ position, turn @ axes
+            name = self._inner(joint, "parent", "link")
+        return position, axes
 
     def _origin(
         self,
@@ -156,13 +181,14 @@ class UrdfForm(FileForm):
             target: What the model is to have.
             arrays: Those of the position and of the quaternion.
             number: Of the row in them.
-            place: The position (3,) [m] and the quaternion (4,) to be written.
+            place: The position (3,) [m] and the axes (3, 3) to be written.
         """
         texts: list[AttributeText] = []
         if target.is_changed(arrays[0], number):
-            texts.append(self._inside(element, "origin", "xyz", numbers_text(place[0])))
+            text = numbers_text(tidied(place[0]))
+            texts.append(self._inside(element, "origin", "xyz", text))
         if target.is_changed(arrays[1], number):
-            text = numbers_text(_roll_pitch_yaw(matrix_from_quat(place[1])))
+            text = numbers_text(tidied(_roll_pitch_yaw(place[1])))
             texts.append(self._inside(element, "origin", "rpy", text))
         return texts
 
@@ -194,9 +220,9 @@ class UrdfForm(FileForm):
             tensor = axes @ np.diag(target.value("body_inertia", body)) @ axes.T
             own = _matrix(self._inner(inertial, "origin", "rpy"))
             tensor = own.T @ tensor @ own
-            for attribute, (row, column) in _INERTIA.items():
-                text = number_text(float(tensor[row, column]))
-                texts.append(self._inside(inertial, "inertia", attribute, text))
+            entries = tidied(tensor[place] for place in _INERTIA.values())
+            for attribute, entry in zip(_INERTIA, entries, strict=True):
+                texts.append(self._inside(inertial, "inertia", attribute, number_text(entry)))
         return texts
 
     def _copied(self, links: Sequence[XmlElement]) -> list[AttributeText] | None:
@@ -240,15 +266,15 @@ class UrdfForm(FileForm):
             raise NotWrittenError(f"a URDF has no {min(unknown).partition('_')[2]} of a shape")
         body = int(self._raw.geom_bodyid[geom])
         link = self._named("link", self._raw.body(body).name)
-        if self._fused_into(link):
-            raise NotWrittenError("links behind fixed joints are a part of its link")
+        if any(self._child(each, "collision") for each in self._fused_into(link)):
+            raise NotWrittenError("links behind fixed joints have shapes that are a part of it")
         geoms = [k for k in range(self._raw.ngeom) if self._raw.geom_bodyid[k] == body]
         shapes = [each for each in self._children(link) if each.tag == "collision"]
         if len(shapes) != len(geoms):
             raise NotWrittenError("the link has shapes that are only drawn")
         shape = shapes[geoms.index(geom)]
-        position, turn = target.value("geom_pos", geom), target.value("geom_quat", geom)
-        texts = self._origin(shape, target, ("geom_pos", "geom_quat"), geom, (position, turn))
+        place = target.value("geom_pos", geom), matrix_from_quat(target.value("geom_quat", geom))
+        texts = self._origin(shape, target, ("geom_pos", "geom_quat"), geom, place)
         if target.is_changed("geom_type", geom):
             raise NotWrittenError("another kind of shape is another element in a URDF")
         if target.is_changed("geom_size", geom):

@@ -8,7 +8,7 @@ and told with its reason.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -164,9 +164,9 @@ class _Rewriter:
         rows = self._differences(model)
         first = {row.title for row in rows}
         for _ in range(_ROUNDS):
-            before = len(self._texts())
+            before = changes_of(self._texts())
             self._plan(model, rows)
-            if len(self._texts()) == before:
+            if changes_of(self._texts()) == before:
                 break
             model = self._compiled(part)
             rows = self._differences(model)
@@ -195,6 +195,7 @@ class _Rewriter:
             except NotWrittenError as error:
                 self._reasons[cause.name] = str(error)
                 continue
+            self._accepted.pop(cause.name, None)  # what is written last counts
             titles = frozenset(row.title for row in cause.differences)
             self._accepted[cause.name] = _Accepted(titles, texts)
             self._reasons.pop(cause.name, None)
@@ -284,12 +285,11 @@ def reason_not_written(cause: Cause) -> str:
 
 
 def changes_of(texts: Sequence[AttributeText]) -> tuple[AttributeChange, ...]:
-    """Return what attributes become, without those that are so already."""
-    changes: dict[AttributeChange, None] = {}
+    """Return what attributes become, without those that are so already; what is last counts."""
+    last: dict[Hashable, AttributeChange] = {}
     for text in texts:
-        if text.change.old != text.change.new:
-            changes[text.change] = None
-    return tuple(changes)
+        last[text.element, text.child, text.attribute] = text.change
+    return tuple(change for change in last.values() if change.old != change.new)
 
 
 def geoms_of_left(matched: Matched) -> dict[int, int]:
