@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from statemachine.lab import why as instrument
+from statemachine.lab.questions.requests import causes as instrument
 from statemachine.lab.why import Explanation, explain
 from statemachine.lab.why import page as why
 from statemachine.measures.text import capital, percent

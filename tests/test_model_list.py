@@ -43,7 +43,7 @@ def _row(result: ModelsComparison, quantity: str) -> ListedDifference:
 
 def _page(result: ModelsComparison) -> Sequence[Block]:
     """The blocks of the page of a comparison."""
-    return page(result, ("left", "right")).blocks
+    return page(result).blocks
 
 
 def _settled(text: str) -> float:

@@ -17,6 +17,7 @@ from statemachine.lab.questions.convergence import page as limits
 from statemachine.lab.questions.junit import junit
 from statemachine.lab.questions.requests import causes, converge, gap
 from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult
+from statemachine.lab.questions.requests.versions import VersionsRequest, VersionsResult
 from statemachine.lab.questions.versions import page as versions
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.why import Explanation
@@ -222,8 +223,8 @@ def test_ci_fails_where_nothing_was_compared(rotors: tuple[Path, Path]) -> None:
 
 def test_releases_that_move_nothing_are_not_the_same(rotors: tuple[Path, Path]) -> None:
     comparison = compared("fall", rotors[0]).comparison
-    page = versions([comparison], request("fall", rotors[0]))
-    assert not page.holds
+    asked = VersionsRequest(Request(("fall",), model=str(rotors[0])), "3.3.7")
+    assert not versions(VersionsResult(asked, (comparison,))).holds
 
 
 def test_the_command_ends_with_1_and_json_says_why(rotors: tuple[Path, Path], here: Cli) -> None:

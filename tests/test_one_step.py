@@ -12,8 +12,10 @@ import statemachine as sm
 from statemachine.errors import BadInputError
 from statemachine.lab.compare import rerun_of
 from statemachine.lab.compare.one_step import RELATIVE, OneStep, StageGap, one_step
+from statemachine.lab.compare.sides import Request
 from statemachine.lab.compare.stages import STAGES
 from statemachine.lab.questions.one_step import page
+from statemachine.lab.questions.requests.one_step import OneStepRequest, OneStepResult
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
@@ -58,7 +60,7 @@ def gap_of(found: OneStep, name: str) -> StageGap:
 
 
 def verdict(found: OneStep) -> Verdict:
-    last = page(found, ("one", "two"), "hold").blocks[-1]
+    last = page(OneStepResult(**vars(found), request=OneStepRequest(Request(("hold",))))).blocks[-1]
     assert isinstance(last, Verdict)
     return last
 

@@ -54,7 +54,10 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
         "statemachine/_models/so101/so101.xml",
         "statemachine/_models/so101/look/base_print.stl",
         "statemachine/py.typed",
-        *(f"statemachine/show/html/{name}" for name in ("page.html", "page.css", "gl.js")),
+        *(
+            f"statemachine/show/html/{name}"
+            for name in ("page.html", "page.css", "notebook.css", "gl.js")
+        ),
         *(
             f"statemachine/lab/questions/stage/{name}"
             for name in ("stage.html", "stage.js", "scene.js")

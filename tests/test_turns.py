@@ -144,7 +144,9 @@ INTERRUPTED: dict[str, Use] = {
 @pytest.mark.filterwarnings("ignore:Exception ignored in. <finalize")  # of a Data before
 @pytest.mark.parametrize("verb", INTERRUPTED)
 @pytest.mark.parametrize(
-    "mid_contact", ["mujoco", "pybullet", "pybullet as it comes", "hidden"], indirect=True
+    "mid_contact",
+    ["mujoco", "pybullet", pytest.param("pybullet as it comes", marks=pytest.mark.slow), "hidden"],
+    indirect=True,
 )
 def test_an_interrupted_verb_completes_or_undoes_or_refuses(
     mid_contact: tuple[sm.Model, sm.Data], verb: str

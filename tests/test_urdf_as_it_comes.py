@@ -380,6 +380,7 @@ def test_an_mjcf_is_still_written_for_it() -> None:
     assert all(text.startswith("<?xml") for text in model.raw.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "cause", "own"),
     [

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from statemachine.show import terminal
+from statemachine.show import terminal, text_blocks
 from statemachine.show.blocks import Page, Table, Text, Verdict
 
 from .support.claims import assert_in
@@ -74,7 +74,7 @@ _NOT_PRINTED = (
 
 
 def test_every_letter_that_is_printed_has_a_spelling() -> None:
-    known = set(map(chr, terminal.ASCII))
+    known = set(map(chr, text_blocks.ASCII))
     for path in PACKAGE.rglob("*.py"):
         if path.relative_to(PACKAGE).as_posix().startswith(_NOT_PRINTED):
             continue

@@ -12,6 +12,7 @@ import inspect
 import warnings
 from collections.abc import Callable
 from contextvars import ContextVar
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from ..errors import BadInputError, EngineWarning, MissingEngineError, check_nam
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..interface.checks import as_switch
-from ..interface.records import AS_WRITTEN, Defaults, ReadOptions
+from ..interface.records import AS_WRITTEN, BASES, Base, Defaults, ReadOptions
 from ..model_files import checked_path
 from ..models import AnyPath
 from ..release_names import is_release, version_of
@@ -71,8 +72,8 @@ class Loader(Protocol):
 
     A loader that refuses files for what they have takes `options`, too, a mapping as
     `Model.replace` has them: what is switched off there is nothing to refuse. To the Models of
-    the others `load` applies them. One that reads files as `balance_inertia` and `meshes` say
-    takes `read_options`, too.
+    the others `load` applies them. One that reads files as `base`, `balance_inertia` and `meshes`
+    say takes `read_options`, too.
     """
 
     def __call__(self, path: Path, defaults: Defaults) -> Model: ...
@@ -190,6 +191,7 @@ def load(
     trust_binary: bool = False,
     balance_inertia: bool = False,
     meshes: bool = True,
+    base: Base | None = None,
     **options: Any,
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
@@ -212,11 +214,15 @@ def load(
         meshes: Whether shapes that are meshes are read. Without them a file can be read whose
             meshes are missing, or of a format that MuJoCo does not know; an EngineWarning says
             what touches nothing then.
+        base: "free" for a robot whose base floats: where the file has no free joint for it, as a
+            URDF without a floating joint, it gets one, and starts where it stands in the file (of
+            a URDF at the origin). "fixed" for one whose base stands there: a free joint of it is
+            left out. None for what the file says.
         **options: As `Model.replace` takes them, before anything of the file is refused:
             `contacts=False` loads a robot of whose geoms the engine knows no shape.
 
     Raises:
-        UnknownNameError: No such backend or model.
+        UnknownNameError: No such backend or model, or no such base.
         UnsupportedError: The file has what the backend cannot do, or there is no such option.
         BadInputError: The value of an option has the wrong shape, kind or size.
         MissingEngineError: The backend's engine is not installed here.
@@ -231,6 +237,8 @@ def load(
         )
     place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))
+    if base is not None:
+        check_name("base", base, BASES)
     path = checked_path(model, menagerie)
     if as_switch(trust_binary, "trust_binary") and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
@@ -249,6 +257,7 @@ def load(
     read_options = ReadOptions(
         balance_inertia=as_switch(balance_inertia, "balance_inertia"),
         meshes=as_switch(meshes, "meshes"),
+        base=base,
     )
     takes = inspect.signature(loader).parameters
     takes_options = "options" in takes
@@ -259,9 +268,11 @@ def load(
         check_takes_read_options(backend, takes, read_options)
         early["read_options"] = read_options
     loaded = loader(path, defaults=defaults, **early)
-    vars(loaded)["read_options"] = read_options
+    vars(loaded).update(read_options=read_options, defaults=defaults)
     if options and not takes_options:
         loaded = loaded.replace(**options)
+    elif options:
+        vars(loaded)["options"] = deepcopy(options)
     if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
@@ -299,7 +310,12 @@ def on_default(model: Model) -> Model:
         if model.backend == DEFAULT:
             return model
         read = model.read_options
-        return load(model.path, balance_inertia=read.balance_inertia, meshes=read.meshes)
+        return load(
+            model.path,
+            balance_inertia=read.balance_inertia,
+            meshes=read.meshes,
+            base=read.base,
+        )
 
 
 def _find(name: str) -> str:

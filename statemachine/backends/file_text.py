@@ -17,6 +17,7 @@ named by its absolute path, with `strippath` off, which each release of MuJoCo r
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
@@ -54,11 +55,27 @@ def text_for(path: Path, visuals: bool = False) -> str | None:
     return f"<mujoco model={name}><include file={quoteattr(str(path.absolute()))}/></mujoco>"
 
 
+@dataclass(frozen=True)
+class BaseOfText:
+    """What is written into a URDF so that its base floats, or is fixed to the world.
+
+    Attributes:
+        link: The base.
+        joint: Name of the joint of type floating: of the one that is added, or that is made fixed.
+        is_free: Whether the base floats.
+    """
+
+    link: str
+    joint: str
+    is_free: bool
+
+
 def urdf_text(
     path: Path,
     visuals: bool = False,
     options: ReadOptions = AS_WRITTEN,
     moments: Mapping[str, float] = MappingProxyType({}),
+    base: BaseOfText | None = None,
 ) -> str | None:
     """Return the text of a URDF in which every mesh that is there is named so that it is found.
 
@@ -70,6 +87,7 @@ def urdf_text(
             shapes without those that are meshes.
         moments: Moments of inertia [kg m^2] that are written in place of those of some links, about
             each axis the same, by name of the link.
+        base: How its base is fixed to the world, or floats; None for what the file says.
 
     Returns:
         The text; None where MuJoCo can be given the file as it is, or the file is no URDF.
@@ -95,10 +113,37 @@ def urdf_text(
             inertia.attrib |= dict.fromkeys(("ixy", "ixz", "iyz"), "0")
     if not options.meshes:
         is_changed = _drop_meshes(root) or is_changed
+    if base is not None:
+        _set_base(root, base)
+        is_changed = True
     if visuals and compiler.get("discardvisual") != "false":
         compiler.set("discardvisual", "false")
         is_changed = True
     return ElementTree.tostring(root, encoding="unicode") if is_changed else None
+
+
+def _set_base(root: Element, base: BaseOfText) -> None:
+    """Write a joint of type floating into a URDF, or make a fixed one of it."""
+    by_child = {_end(joint, "child"): joint for joint in root.findall("joint")}
+    if not base.is_free:
+        for joint in root.findall("joint"):
+            if joint.get("name") == base.joint:
+                joint.set("type", "fixed")
+        return
+    joint = by_child.get(base.link)
+    if joint is None:  # the base is the first link of the file
+        root.append(ElementTree.Element("link", name="world"))
+        joint = ElementTree.SubElement(root, "joint")
+        ElementTree.SubElement(joint, "parent", link="world")
+        ElementTree.SubElement(joint, "child", link=base.link)
+    joint.set("name", base.joint)
+    joint.set("type", "floating")
+
+
+def _end(joint: Element, tag: str) -> str:
+    """Return the link that a joint names as its parent or child; "" for none."""
+    element = joint.find(tag)
+    return "" if element is None else element.get("link", "")
 
 
 def _compiler_of(root: Element) -> Element:

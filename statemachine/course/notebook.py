@@ -35,7 +35,8 @@ from ..show.blocks import (
     Verdict,
 )
 from ..show.pictures import Bars, Picture, Pipeline, RobotPicture, Slots, Traces
-from ..show.terminal import judged, together
+from ..show.terminal import judged
+from ..show.text_blocks import together
 from .lessons import LESSONS, Lesson, module
 from .lessons.pictures import with_picture
 from .lessons.session import fitted, page_of_lesson, take

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
 
@@ -19,6 +20,7 @@ from .records import (
     READ_OPTIONS,
     Array,
     Capabilities,
+    Defaults,
     Ints,
     JointType,
     Keyframe,
@@ -66,6 +68,8 @@ class Model(ABC):
         site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
         keyframes: The states that the file names.
         read_options: How the file was read, as `load` was told.
+        defaults: As `load` was told: "engine" for the engine as its own users meet it.
+        options: What `load` and `replace` were told of all that `replace` takes, by name.
     """
 
     backend: str
@@ -121,13 +125,16 @@ class Model(ABC):
     _holds_start = False  # whether the commands before a keyframe were that of the keyframe
     _clamps = False  # whether what acts of ctrl is always within its range
     if TYPE_CHECKING:
+        defaults: Defaults
+        options: Mapping[str, Any]
         _quaternions: list[tuple[int, int]]  # (joint id, address in qpos) of each
 
     def __init__(self, **facts: Any) -> None:
         missing = Model.__annotations__.keys() - facts.keys()
         if missing:
             raise TypeError(f"a backend must give its Model: {', '.join(sorted(missing))}")
-        for name, value in facts.items():
+        told: dict[str, Any] = {"defaults": "model", "options": {}}
+        for name, value in (told | facts).items():
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
         # Once: NumPy swallows a Ctrl-C that falls into a comparison with an enum.
         vars(self)["_quaternions"] = _quaternions(self.jnt_type, self.jnt_qposadr)
@@ -239,7 +246,9 @@ class Model(ABC):
 
             options = without_read_options(self, options)
         checked = checked_options(self, options)
-        return self._replace(checked)._started_as(self, checked)
+        replaced = self._replace(checked)._started_as(self, checked)
+        vars(replaced)["options"] = {**self.options, **deepcopy(options)}
+        return replaced
 
     def with_compiled(self, compiled: Any) -> Model:
         """Another Model of the same engine and file, from another compiled model.
@@ -256,7 +265,8 @@ class Model(ABC):
     def _started_as(self, before: Model, options: Mapping[str, Any]) -> Self:
         """Itself, made of another Model by some options: how it starts and was read is told on."""
         vars(self)["_holds_start"] = before._holds_start or "latency" in options
-        vars(self)["read_options"] = before.read_options
+        for name in ("read_options", "defaults", "options"):
+            vars(self)[name] = getattr(before, name)
         return self
 
     def _check_quaternions(self, qpos: Array) -> None:

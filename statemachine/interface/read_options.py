@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any, Protocol
 
+from ..errors import check_name
 from .checks import HasCapabilities, as_switch, unsupported, unsupported_by
-from .records import AS_WRITTEN, READ_OPTIONS, ReadOptions
+from .records import AS_WRITTEN, BASES, READ_OPTIONS, ReadOptions
 
 
 class WasRead(HasCapabilities, Protocol):
@@ -16,9 +17,9 @@ class WasRead(HasCapabilities, Protocol):
     def read_options(self) -> ReadOptions: ...
 
 
-def told(options: ReadOptions) -> dict[str, bool]:
+def told(options: ReadOptions) -> dict[str, bool | str]:
     """Return the options that `load` must be told, by name: all that are not as by default."""
-    named: dict[str, bool] = {}
+    named: dict[str, bool | str] = {}
     for name in READ_OPTIONS:
         value = getattr(options, name)
         if value is not getattr(AS_WRITTEN, name):
@@ -52,13 +53,27 @@ def without_read_options(of: WasRead, options: Mapping[str, Any]) -> dict[str, A
 
     Raises:
         UnsupportedError: One of those has another value than when the file of the Model was read.
-        BadInputError: One of those is not on or off.
+        BadInputError: One of those is not on or off, or is no base.
     """
     others: dict[str, Any] = {}
     for name, value in options.items():
         if name not in READ_OPTIONS:
             others[name] = value
-        elif as_switch(value, name) is not getattr(of.read_options, name):
-            reason = f"it acts only while a file is read: load(…, {name}={value})"
+        elif checked_read_option(name, value) != getattr(of.read_options, name):
+            reason = f"it acts only while a file is read: load(…, {name}={value!r})"
             raise unsupported(of, name, reason)
     return others
+
+
+def checked_read_option(name: str, value: Any) -> bool | str | None:
+    """Return the value of an option that acts while a file is read.
+
+    Raises:
+        UnknownNameError: It is `base`, and neither "free" nor "fixed" nor None.
+        BadInputError: It is another one, and neither True nor False.
+    """
+    if name != "base":
+        return as_switch(value, name)
+    if value is not None:
+        check_name("base", value, BASES)
+    return value

@@ -19,6 +19,7 @@ Arrays = dict[str, Array]  # by name
 Sizes = tuple[tuple[str, int], ...]  # name and length of each part
 StateLayout = tuple[str, Sizes]  # fingerprint of a Model's States, and what they consist of
 Errors = dict[int, Exception]  # by number of a world
+Base = Literal["free", "fixed"]  # whether the base of a robot floats, or is fixed to the world
 Defaults = Literal["model", "engine"]  # with the model's contract, or as the engine comes
 INPUTS = ("qpos", "qvel", "ctrl")
 MOCAP = ("mocap_pos", "mocap_quat")  # further inputs: where the mocap bodies of a model are
@@ -85,14 +86,18 @@ class ReadOptions:
             one is not positive, all become their mean: MuJoCo refuses such an inertia.
         meshes: Whether shapes that are meshes are read; without them the file needs none of
             their files, and nothing touches, or weighs, what they alone gave shape.
+        base: "free" where the base of the robot gets a free joint, "fixed" where it has none; None
+            for what the file says. A URDF without a floating joint says nothing, and is fixed.
     """
 
     balance_inertia: bool = False
     meshes: bool = True
+    base: Base | None = None
 
 
 AS_WRITTEN = ReadOptions()
-READ_OPTIONS = ("balance_inertia", "meshes")
+READ_OPTIONS = ("base", "balance_inertia", "meshes")
+BASES: tuple[Base, ...] = ("free", "fixed")
 
 # The promises of the contract that a capability record speaks of, all of them.
 BEHAVIOURS = (

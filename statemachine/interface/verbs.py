@@ -201,7 +201,10 @@ def _admit(model: Model, data: Data) -> None:
             f"got {kind_of(model)} and {kind_of(data)}"
         )
     if data._home is not model:
+        from .told_apart import told_apart
+
+        maker, other = told_apart(data._home, model)
         raise ForeignDataError(
-            f"this Data was made by another Model ({data._home!r}): a Data belongs to the "
-            "Model that made it; a State moves between them"
+            f"this Data was made by {maker}, and is used with {other}: a Data belongs to the Model "
+            "that made it; a State moves between them"
         )

@@ -48,7 +48,9 @@ def plain(value: Any) -> Any:
 def _names_in_json(kind: type) -> list[str]:
     """Return the fields and properties of a dataclass, without those that are for pages alone."""
     names = [field.name for field in dataclasses.fields(kind) if field.metadata.get("json", True)]
-    return names + [name for name, member in vars(kind).items() if _is_in_json(member)]
+    for base in reversed(kind.__mro__):
+        names += [name for name, member in vars(base).items() if _is_in_json(member)]
+    return list(dict.fromkeys(names))
 
 
 def _is_in_json(attribute: Any) -> bool:

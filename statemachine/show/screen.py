@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable
-from contextlib import redirect_stdout
 
-from . import terminal
 from .blocks import Page
+from .terminal import text_of
 
 LINES = 24
 
 
 def height(page: Page) -> int:
     """Return how many lines of 80 columns a page takes in a terminal, blank ones included."""
-    with redirect_stdout(io.StringIO()) as output:
-        terminal.show(page)
-    return output.getvalue().count("\n")
+    return len(text_of(page).splitlines()) + 2  # one above, and one below
 
 
 def first_that_fits(pages: Iterable[Page]) -> Page:

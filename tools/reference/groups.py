@@ -24,7 +24,7 @@ from .figures import Figures, curve, differences, of_output
 
 KEPT = HERE / "figures"
 # In `make test`.
-QUICK = ("engines", "pair damping", "pair contact, radius", "worlds")
+QUICK = ("pair damping", "worlds")
 _BACKENDS = ("mujoco", "pybullet")
 
 

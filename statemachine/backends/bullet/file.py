@@ -30,7 +30,8 @@ class UrdfFile:
     Attributes:
         path: Where it is: PyBullet looks for meshes from there.
         content: Its bytes.
-        floats: Whether it has a joint of type floating. Without one it is fixed to the world, as
+        floats: Whether PyBullet floats its base, which is its default: where `load` was told
+            base="free", or the file has a joint of type floating. Else it is fixed to the world, as
             MuJoCo's compiler does, by `useFixedBase`.
         without_inertial: Links to which PyBullet gives 1 kg.
         mimics: Joints that follow another one by the file, and none in PyBullet.
@@ -39,13 +40,10 @@ class UrdfFile:
 
     path: Path
     content: bytes
+    floats: bool
     without_inertial: tuple[str, ...]
     mimics: tuple[str, ...]
     floating: tuple[str, ...]
-
-    @property
-    def floats(self) -> bool:
-        return bool(self.floating)
 
     @classmethod
     def read(cls, path: Path, options: ReadOptions = AS_WRITTEN) -> UrdfFile | None:
@@ -89,11 +87,13 @@ class UrdfFile:
         floating = _names(joint for joint in joints if joint.get("type") == "floating")
         mimics = _names(joint for joint in joints if joint.find("mimic") is not None)
         # One that is fixed to the world weighs nothing; so does one of this name, in PyBullet.
-        still = {"world"} if floating else {"world", *roots}
+        floats = bool(floating) if options.base is None else options.base == "free"
+        still = {"world"} if floats else {"world", *roots}
         light = [name for name, link in links.items() if link.find("inertial") is None]
         return cls(
             path=path.absolute(),
             content=content,
+            floats=floats,
             without_inertial=tuple(name for name in light if name not in still),
             mimics=mimics,
             floating=floating,

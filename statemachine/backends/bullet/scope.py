@@ -316,7 +316,7 @@ def otherwise(plan: Plan) -> list[str]:
     if plan.file and plan.file.mimics:
         names = few(list(plan.file.mimics), 3)
         sentences.append(f"<mimic> has no effect there: {names} moves by itself")
-    if plan.file and plan.file.floating:
+    if plan.file and plan.file.floating and plan.file.floats:
         names = few(list(plan.file.floating), 3)
         sentences.append(f"it makes a fixed joint of the floating {names}")
     return sentences

@@ -88,7 +88,8 @@ def compile_file(path: Path, options: ReadOptions = AS_WRITTEN) -> mujoco.MjMode
         options: How it is read, beside that.
 
     Raises:
-        BadInputError: Options are given for a binary file, which was compiled already.
+        BadInputError: Options are given for a binary file, which was compiled already; or the base
+            cannot be free.
         ModelError: MuJoCo cannot compile the file, with its reason; or it compiles one
             with a number that no step can be taken with; or the file is binary, and nobody
             said that it is to be trusted (see `binary`).
@@ -112,7 +113,7 @@ def _from_binary(path: Path, content: bytes, options: ReadOptions) -> mujoco.MjM
     """
     if options != AS_WRITTEN:
         raise BadInputError(
-            f"{path} is binary, compiled already: balance_inertia and meshes are of XML files"
+            f"{path} is binary, compiled already: base, balance_inertia and meshes are of XML files"
         )
     from .binary_models import from_binary
 
@@ -139,6 +140,8 @@ def _compile_xml(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list
 
         raw, repairs = compile_with(path, options)
         return raw, list(effects(path, options, repairs))
+    except BadInputError:  # an option that this file cannot be read with
+        raise
     except (ValueError, *ENGINE_ERRORS) as error:
         from ..refusals import explained
 

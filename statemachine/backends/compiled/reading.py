@@ -13,9 +13,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...interface.records import ReadOptions
+from ...errors import BadInputError
+from ...interface.records import Base, ReadOptions
 from ...measures.text import few, listed
+from ..file_text import BaseOfText
 from ..repair_record import Repair
+from ..served.release_base import free_joint_name, free_joint_of, root_of, set_base
 from .repairs import balance_all, mend_inertia
 from .spec_assets import assets_of, delete_assets
 from .spec_files import compile_spec, read_spec
@@ -68,14 +71,40 @@ def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> list[Repair]:
         options: As `load` was told.
 
     Returns:
-        What they changed.
+        What they changed of what the file says: of the base it is nothing but its free joint, which
+        is asked for.
+
+    Raises:
+        BadInputError: The base cannot be free, or the file does not say what the robot is.
     """
+    if options.base is not None:
+        try:
+            set_base(spec, options.base)
+        except ValueError as error:
+            raise BadInputError(str(error)) from None
     repairs: list[Repair] = []
     if options.balance_inertia:
         repairs += balance_all(spec, "balance_inertia")
     if not options.meshes:
         repairs += delete_assets(spec, assets_of(spec, ["mesh"]), "meshes=False")
     return repairs
+
+
+def base_of_text(path: Path, base: Base) -> BaseOfText | None:
+    """Return what is written into a URDF so that its base is as asked; None if it is already.
+
+    Args:
+        path: The file, which compiles with this base.
+        base: What is asked.
+    """
+    spec = read_spec(path)
+    root = root_of(spec)
+    joint = free_joint_of(root)
+    is_free = base == "free"
+    if (joint is not None) is is_free:
+        return None
+    name = free_joint_name(spec) if joint is None else joint.name
+    return BaseOfText(root.name, name, is_free)
 
 
 def keep_frames(spec: mujoco.MjSpec) -> None:

@@ -47,7 +47,7 @@ class EngineSource:
     """
 
     text: str = ""
-    read: Mapping[str, bool] = field(default_factory=dict)
+    read: Mapping[str, bool | str | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,12 @@ def source_of(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineS
             from ..compiled.reading import balanced_moments
 
             moments = balanced_moments(path)
-        text = urdf_text(path, options=options, moments=moments)
+        base = None
+        if options.base is not None:
+            from ..compiled.reading import base_of_text
+
+            base = base_of_text(path, options.base)
+        text = urdf_text(path, options=options, moments=moments, base=base)
         return EngineSource() if text is None else EngineSource(text)
     if options == AS_WRITTEN:
         return EngineSource()
@@ -209,7 +214,7 @@ def _reading_of(
     return raw
 
 
-def _read(source: EngineSource) -> dict[str, dict[str, bool]]:
+def _read(source: EngineSource) -> dict[str, dict[str, bool | str | None]]:
     """Return how an engine reads a file, as an argument of its process, if not as it is written."""
     return {"read": dict(source.read)} if source.read else {}
 

@@ -1,18 +1,25 @@
 """Options with which a release of MuJoCo reads an MJCF, in the Python of its environment.
 
-It needs MuJoCo only, on Python 3.9 or later, and imports nothing of this package.
+It needs MuJoCo only, on Python 3.9 or later, and imports nothing of this package: it runs the file
+beside it.
 """
 
 from __future__ import annotations
 
+import os
+import runpy
+
 import mujoco
 
 
-def spec_with_options(file, balance_inertia, meshes):
-    """Return the spec of a file with its inertias balanced, or without its mesh geoms."""
+def spec_with_options(file, balance_inertia, meshes, base):
+    """Return the spec of a file that is read with options."""
     if not hasattr(mujoco, "MjSpec"):
         raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads an MJCF as it is written")
     spec = mujoco.MjSpec.from_file(file)
+    if base is not None:
+        place = os.path.join(os.path.dirname(os.path.abspath(__file__)), "release_base.py")
+        runpy.run_path(place)["set_base"](spec, base)
     if balance_inertia:
         getattr(spec, "compiler", spec).balanceinertia = True
     if not meshes:

@@ -63,24 +63,17 @@ def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     from ...lab.questions.requests.models import answer
 
     result = answer(request, TerminalReporter())
-    page = model_diff.page(result, request.labels, options.all, details=options.details)
+    page = model_diff.page(result, details=options.details or options.all)
     return show(page, result, options.json)
 
 
 def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     """Compare one step of both sides."""
-    from ...lab.compare.labels import numbered
     from ...lab.questions import one_step
     from ...lab.questions.requests.one_step import answer
 
-    run = request.run
     result = answer(request, TerminalReporter())
-    labels = run.backends
-    if run.sides:
-        labels = run.sides[0].label, run.sides[1].label
-    experiment = Path(run.what[0]).name
-    page = one_step.page(result, numbered(labels), experiment, details=options.details)
-    return show(page, result, options.json)
+    return show(one_step.page(result, options.details), result, options.json)
 
 
 def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
@@ -89,9 +82,7 @@ def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     from ...lab.questions.requests.converge import answer
 
     result = answer(request, TerminalReporter())
-    experiment = Path(request.run.what[0]).name
-    page = convergence.page(result, experiment, details=options.details)
-    return show(page, result, options.json)
+    return show(convergence.page(result, options.details), result, options.json)
 
 
 def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
@@ -102,13 +93,13 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     from ...show.charts import write_pictures
 
     _files_of(options).check(TerminalReporter())
-    comparisons = answer(request, TerminalReporter())
+    result = answer(request, TerminalReporter())
     if options.junit is not None:
-        write_tests(options.junit, comparisons)
-    page = versions.page(comparisons, request.run, details=options.details)
+        write_tests(options.junit, result.comparisons)
+    page = versions.page(result, options.details)
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
-    return show(page, comparisons, options.json)
+    return show(page, result.figures(), options.json)
 
 
 def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
@@ -122,7 +113,7 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
     except EndedEarlyError as error:
         until_then = CompareRequest(request.run, uncertainty=request.uncertainty)
         return _run_compare(options, until_then, f"No cause is named: {error}.")
-    return show(why.page(result, details=options.details), result, options.json)
+    return show(why.page(result, options.details), result, options.json)
 
 
 def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause: str = "") -> int:

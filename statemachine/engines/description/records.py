@@ -212,19 +212,23 @@ class VisualShape:
 
     Attributes:
         body: Name of the body that it is on.
+        body_number: The id of that body in the compiled model.
         place_on_body: Its number among the visual shapes of the body.
+        geom: The id of its geom in the compiled model; -1 where its mesh cannot be read.
         kind: box, sphere, cylinder, capsule, ellipsoid, mesh, plane or another word.
         name: As in the file, may be empty.
         mesh: Name of its mesh file, without the folder; "" of another shape.
         scale: (3,) factors that the vertices of the mesh are multiplied by; ones of another shape.
-        corners: (n, 3) points in the frame of the body [m] that span it: vertices of a mesh,
-            corners of the box around another shape; None where its mesh cannot be read.
+        solid: The shape in the frame of its body; of a mesh in the frame in which its file has its
+            vertices, which are multiplied by the scale. None where its mesh cannot be read.
     """
 
     body: str
+    body_number: int
     place_on_body: int
+    geom: int
     kind: str
     name: str
     mesh: str
     scale: tuple[float, float, float]
-    corners: Array | None
+    solid: CollisionShape | None

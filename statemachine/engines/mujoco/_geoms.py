@@ -11,11 +11,13 @@ import numpy as np
 
 from ...interface import Array
 from ...measures.text import few
+from ...rotations import Placement
 from ..description.records import CollisionShape
-from ..description.shapes import angle_between, laid_on, likest
+from ..description.shapes import LaidShape, laid_on, likest
 from ..records import DifferingQuantity, Edit, ModelDifference
 from . import _shapes as shapes
 from ._quantities import quantity_of, same
+from ._rigid_parts import apart
 from ._sides import NEAR, Pairs, Sides, copies, name_of, zeros
 
 NO_TOUCH = -1e3  # [m] a margin at which nothing touches
@@ -25,6 +27,9 @@ _VERTEX = 1e-6  # [m]: vertices are single precision
 _FLUID_SHAPES = ("none", "ellipsoid")
 _FLUID_COEFFICIENTS = slice(1, 6)
 _BOUNDS = ("geom_size", "geom_rbound", "geom_aabb")
+# Arrays of a geom in which there are three numbers for its axes, and where these begin. The middle
+# of the box around a primitive is its own.
+_OF_AXES = {"geom_size": (0,), "geom_aabb": (3,), "geom_fluid": (6, 9)}
 _WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
 
 
@@ -94,19 +99,23 @@ class Geoms:
                 refused="one of them is not a primitive, and cannot become the other",
             )
             return
-        laid = laid_on(ours, theirs)
-        if same(ours.size, laid.size) and not _off(ours, laid):
-            theirs = laid  # one solid, whose axes go by other names
         if kinds[0] == "hfield":
             yield from shapes.heights(sides, a, b)
-        if not same(ours.size, theirs.size):
-            values.append(DifferingQuantity("size", ours.size, theirs.size, "m"))
+        laid = laid_on(ours, theirs)
+        if not same(ours.size, laid.size):
+            values.append(DifferingQuantity("size", ours.size, laid.size, "m"))
         values += _of_fluids(left.geom_fluid[a], right.geom_fluid[b])
         if values:
             edits = copies(("geom_type", *_BOUNDS, "geom_fluid"), left, a, b)
+            if laid.is_reordered:
+                edits = tuple(_in_own_order(laid, edit) for edit in edits)
             yield sides.tell("shape", "geom", a, values, edits)
-        if _off(ours, theirs):
-            yield self._moved(a, b)
+        if max(apart(ours.place, laid.place)) > NEAR:
+            moved = sides.elsewhere("geom", a, b, ours.place, laid.place)
+            if laid.is_reordered:  # which stay in the order of the second's file
+                own = Placement(ours.place.pos, ours.place.mat @ laid.axes.T)
+                moved = replace(moved, edits=sides.placing("geom", a, b, own))
+            yield moved
 
     def _moved(self, a: int, b: int) -> ModelDifference:
         places = self._shapes[0][a].place, self._shapes[1][b].place
@@ -197,9 +206,12 @@ def acting_geoms(raw: Any) -> list[int]:
     return np.flatnonzero(acting).tolist()
 
 
-def _off(left: CollisionShape, right: CollisionShape) -> bool:
-    """Whether a shape is elsewhere; some look alike when they are turned."""
-    far, turn = left.place.distance(right.place), angle_between(left, right)
-    if left.kind == "plane":
-        far = abs(left.place.mat[:, 2] @ (left.place.pos - right.place.pos))
-    return bool(max(far, turn) > NEAR)
+def _in_own_order(laid: LaidShape, edit: Edit) -> Edit:
+    """Return an edit of what a shape has of each axis, as one in the order of its own axes."""
+    name, index, value = edit
+    if name not in _OF_AXES:
+        return edit
+    values = np.array(value)
+    for start in _OF_AXES[name]:
+        values[start : start + 3] = laid.in_own_order(values[start : start + 3])
+    return name, index, values

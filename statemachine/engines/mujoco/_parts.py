@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import chain, combinations, permutations, product
+from itertools import chain, combinations, permutations
 from typing import Any
 
 import numpy as np
 
 from ...installed import require
 from ...interface import Array, JointType
-from ...rotations import HERE, angle_between
-from ..description.records import Inertial, motion
+from ...rotations import HERE, Placement, matrix_from_quat
+from ..description.records import CollisionShape, Inertial, motion
+from ..description.shapes import laid_on
 from ..records import (
     ORDER_OF_JOINTS,
     TURNED,
@@ -35,7 +36,6 @@ _WEIGHS = {
     "inertia": ("body_inertia", "body_iquat"),
 }
 _TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal have of rounding
-_EQUAL = 1e-6  # of the largest moment: two that are nearer to each other are equal
 
 
 def weights(sides: Sides) -> Iterator[ModelDifference]:
@@ -76,72 +76,30 @@ def _of_tensors(left: Array, right: Array) -> list[DifferingQuantity]:
     """What two tensors of inertia (3, 3) [kg m²] differ in: their moments, and their axes.
 
     Moments are in the order of the axes of the body that their own are nearest to, as a file writes
-    them, and each beside that of the nearest axis of the other tensor.
+    them, and each beside that of the axis of the other tensor that it is nearest to. An axis has no
+    direction, and of moments that are equal the axes are any.
     """
-    moments = [np.linalg.eigvalsh(tensor)[::-1] for tensor in (left, right)]
-    angle = _turn_of_axes(left, right)
-    if np.allclose(*moments, rtol=1e-9, atol=0) and angle:
-        return [DifferingQuantity(TURNED, 0.0, angle, "rad")]
-    ours, axes = _along(left, np.eye(3))
-    theirs, other_axes = _along(right, axes)
-    values = [DifferingQuantity("moments", plain(ours), plain(theirs), "kg m²")]
-    angle = min(angle, _least_turn(axes, other_axes))
-    if angle > _TILTED:
+    ours, theirs = _as_ellipsoid(left), _as_ellipsoid(right)
+    equal = np.allclose(ours.size, theirs.size, rtol=1e-9, atol=0)
+    laid = laid_on(ours, theirs, 0.25 if equal else 1.0)
+    cosines = np.abs(ours.place.mat)
+    order = max(permutations(range(3)), key=lambda order: cosines[range(3), order].sum())
+    moments = tuple(ours.size[k] for k in order)
+    other_moments = tuple(laid.size[k] for k in order)
+    values: list[DifferingQuantity] = []
+    if not np.allclose(moments, other_moments, rtol=1e-9, atol=0):
+        values.append(DifferingQuantity("moments", moments, other_moments, "kg m²"))
+    angle = ours.place.angle(laid.place)
+    if angle > _TILTED or not values:
         values.append(DifferingQuantity(TURNED, 0.0, angle, "rad"))
     return values
 
 
-def _along(tensor: Array, axes: Array) -> tuple[Array, Array]:
-    """Return the principal moments (3,) and axes (3, 3) of a tensor, in the order of other axes.
-
-    Args:
-        tensor: A tensor of inertia (3, 3) [kg m²].
-        axes: (3, 3) axes, as columns; each principal one stands where the nearest of these does.
-    """
-    moments, own = np.linalg.eigh(tensor)
-    cosines = np.abs(axes.T @ own)
-    order = max(permutations(range(3)), key=lambda order: cosines[range(3), order].sum())
-    return moments[list(order)], own[:, list(order)]
-
-
-def _turn_of_axes(left: Array, right: Array) -> float:
-    """Return the smallest angle [rad] that turns the principal axes of one tensor to another's.
-
-    An axis has no direction, and where two moments are equal the axes of these two are any that are
-    perpendicular to the third.
-
-    Args:
-        left: A tensor of inertia (3, 3) [kg m²].
-        right: The other.
-    """
-    (ours, a), (theirs, b) = (np.linalg.eigh(tensor) for tensor in (left, right))
-    low, high = (_is_equal(ours, k) or _is_equal(theirs, k) for k in (0, 1))
-    if low and high:
-        return 0.0
-    if low or high:
-        single = 2 if low else 0  # the axis of the moment that is not one of two
-        cosine = abs(a[:, single] @ b[:, single])
-        sine = np.linalg.norm(np.cross(a[:, single], b[:, single]))
-        return float(np.arctan2(sine, cosine))
-    return _least_turn(a, b)
-
-
-def _least_turn(axes: Array, others: Array) -> float:
-    """Return the smallest angle [rad] that turns axes (3, 3), as columns, to others.
-
-    An axis has no direction.
-    """
-    turns: list[float] = []
-    for signs in product((1.0, -1.0), repeat=3):
-        turned = others * signs
-        if np.linalg.det(turned) * np.linalg.det(axes) > 0:
-            turns.append(float(angle_between(axes, turned)))
-    return min(turns)
-
-
-def _is_equal(moments: Array, k: int) -> bool:
-    """Tell whether a moment of three (3,), which ascend, is the next one, but for rounding."""
-    return bool(moments[k + 1] - moments[k] <= _EQUAL * moments[2])
+def _as_ellipsoid(tensor: Array) -> CollisionShape:
+    """Return the principal axes of a tensor (3, 3) as an ellipsoid with its moments for sizes."""
+    moments, quat = principal(tensor)
+    place = Placement(np.zeros(3), matrix_from_quat(quat))
+    return CollisionShape("ellipsoid", place, tuple(moments.tolist()))
 
 
 def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:

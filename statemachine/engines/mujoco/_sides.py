@@ -215,6 +215,17 @@ class Sides:
             values.append(DifferingQuantity("place", plain(wanted.pos), plain(theirs.pos), "m"))
         if turn > NEAR:
             values.append(DifferingQuantity(TURNED, 0.0, wanted.angle(theirs), "rad"))
+        return self.tell("place", kind, a, values, self.placing(kind, a, b, wanted))
+
+    def placing(self, kind: str, a: int, b: int, wanted: Placement) -> tuple[Edit, ...]:
+        """Return the edits that put an element of the second model elsewhere on its part.
+
+        Args:
+            kind: Of the element.
+            a: The id of its counterpart.
+            b: Its id.
+            wanted: Where it is to be, on its rigid part.
+        """
         names = f"{kind}_pos", f"{kind}_quat"
         on = self.right.body_parentid if kind == "body" else getattr(self.right, f"{kind}_bodyid")
         inner = self.solids[1].place(int(on[b])).inverse @ wanted
@@ -222,7 +233,7 @@ class Sides:
         # The first model's own numbers, where they say that place: both move by the same bits.
         if max(apart(inner, placed(*(value for _, _, value in edits)))) > _SAME_PLACE:
             edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
-        return self.tell("place", kind, a, values, edits)
+        return edits
 
 
 def _values(raw: Any, names: Sequence[str], k: int) -> list[Any]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,8 +37,6 @@ from .description import describe
 
 if TYPE_CHECKING:
     from ...backends.compiled.repairs import Repair
-
-_EDGES = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
 def read(path: Path) -> ModelReading:
@@ -90,7 +89,7 @@ def read_file(path: Path, comparable: Comparable | None = None) -> ModelReading:
     raw = mended.compiled
     visuals = (
         *_visuals(raw, _mesh_files(mended.spec)),
-        *_unread_visuals(mended.spec, mended.repairs),
+        *_unread_visuals(raw, mended.spec, mended.repairs),
     )
     run_model: Model | None = None
     if any(repair.kind == "body" for repair in mended.repairs):
@@ -224,8 +223,14 @@ def _mesh_files(spec: Any) -> dict[str, str]:
     return {mesh.name: Path(mesh.file).name for mesh in spec.meshes}
 
 
-def _unread_visuals(spec: Any, repairs: Sequence[Repair]) -> Iterator[VisualShape]:
-    """Yield what is drawn, and was left out since its mesh cannot be read."""
+def _unread_visuals(raw: Any, spec: Any, repairs: Sequence[Repair]) -> Iterator[VisualShape]:
+    """Yield what is drawn, and was left out since its mesh cannot be read.
+
+    Args:
+        raw: The mjModel that it was left out of.
+        spec: The specification as it was read.
+        repairs: What was left out.
+    """
     deleted = {repair.name for repair in repairs if repair.kind == "mesh"}
     meshes = {mesh.name: mesh for mesh in spec.meshes}
     counts: dict[str, int] = {}
@@ -240,12 +245,14 @@ def _unread_visuals(spec: Any, repairs: Sequence[Repair]) -> Iterator[VisualShap
             x, y, z = (float(factor) for factor in mesh.scale)
             yield VisualShape(
                 body=body,
+                body_number=raw.body(body).id if body else -1,
                 place_on_body=place,
+                geom=-1,
                 kind="mesh",
                 name=geom.name,
                 mesh=Path(mesh.file).name,
                 scale=(x, y, z),
-                corners=None,
+                solid=None,
             )
 
 
@@ -292,29 +299,29 @@ def _visuals(raw: Any, files: dict[str, str]) -> Iterator[VisualShape]:
             mesh = files[name] if name in files else str(name)
             x, y, z = (float(factor) for factor in raw.mesh_scale[number])
             scale = (x, y, z)
+            shape = _in_frame_of_file(shape, raw, number)
         yield VisualShape(
             body=raw.body(body).name,
+            body_number=body,
             place_on_body=place,
+            geom=geom,
             kind=shape.kind,
             name=shape.name,
             mesh=mesh,
             scale=scale,
-            corners=_corners(raw, geom, shape),
+            solid=shape,
         )
 
 
-def _corners(raw: Any, geom: int, shape: CollisionShape) -> Array | None:
-    """Return points (n, 3) that span a shape [m], in the frame of its body; None of an endless one.
+def _in_frame_of_file(shape: CollisionShape, raw: Any, mesh: int) -> CollisionShape:
+    """Return a mesh in the frame of its file: the compiler moves its vertices to their middle.
 
     Args:
+        shape: The mesh, in the frame that the compiler gives it.
         raw: An mjModel.
-        geom: The id of the geom.
-        shape: The geom, in the frame of its body.
+        mesh: The id of the mesh.
     """
-    if shape.points is not None:
-        return shape.corners
-    if shape.kind == "plane":
-        return None
-    middle, half = raw.geom_aabb[geom][:3], raw.geom_aabb[geom][3:]
-    corners = middle + _EDGES * half
-    return shape.place.pos + corners @ shape.place.mat.T
+    moved = placed(raw.mesh_pos[mesh], raw.mesh_quat[mesh])
+    assert shape.points is not None
+    points = moved.pos + shape.points @ moved.mat.T
+    return replace(shape, place=shape.place @ moved.inverse, points=points)

@@ -26,7 +26,7 @@ from ...models import resolve
 from ..recordings.files import SUFFIXES
 from ..runs.controllers import function_scenario, is_function
 from ..runs.scenarios import Scenario, scenario
-from .labels import typed_option
+from .labels import numbered, typed_option
 from .matching import match_models
 
 
@@ -198,6 +198,19 @@ class Request:
         if self.model:
             words.append(_typed(self.model))
         return words
+
+    @property
+    def experiment(self) -> str:
+        """What is run, in a word: an experiment, a function, or the file of the first trace."""
+        return Path(self.what[0]).name
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """What both sides are called; where no sides were said, their backends."""
+        if self.sides:
+            left, right = self.sides
+            return numbered((left.label, right.label))
+        return numbered(self.backends)
 
     @property
     def taken(self) -> tuple[str, ...]:

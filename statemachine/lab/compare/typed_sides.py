@@ -14,7 +14,7 @@ from ...errors import BadInputError, StateMachineError, check_name, shown, unkno
 from ...installed import DEFAULT, PAIR
 from ...interface import OPTIONS
 from ...interface.options import OptionValue
-from ...interface.records import READ_OPTIONS
+from ...interface.records import BASES, READ_OPTIONS
 from ...measures.text import command, listed
 from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float
@@ -116,6 +116,9 @@ def _option(text: str) -> tuple[str, OptionValue]:
     if value.lower() in _SWITCHES:
         return name, _SWITCHES[value.lower()]
     if name == "integrator":
+        return name, value
+    if name == "base":
+        check_name("base", value, BASES)
         return name, value
     try:
         numbers = [typed_float(number) for number in value.split(",")]

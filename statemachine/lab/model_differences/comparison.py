@@ -82,7 +82,7 @@ def compare(
     skipped += not_compared(readings)
     enter_declared(listing, readings, matched, locator)
     enter_only_read(listing, matched, locator)
-    enter_visuals(listing, readings, trees)
+    enter_visuals(listing, readings, trees, locator)
     differences, faults = listing.ordered(), tuple(faults_of(readings))
     declared = [reading.declared for reading in readings]
     agreeing = agreements(trees, declared, listing.tolerance)
@@ -103,6 +103,7 @@ def compare(
         has_actuators=has_actuators,
         versions=versions,
         skipped=tuple(skipped),
+        labels=(sides[0].label, sides[1].label),
     )
 
 

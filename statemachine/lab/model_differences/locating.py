@@ -99,6 +99,16 @@ class Locator:
             return ElementPlace(kind, name, left_line=line)
         return ElementPlace(kind, name, right_line=line)
 
+    def line(self, side: int, kind: str, number: int) -> SourceLine | None:
+        """Return where an element of the left (0) or right (1) stands; None where unknown.
+
+        Args:
+            side: 0 or 1.
+            kind: Of the element.
+            number: Its id; -1 of none.
+        """
+        return self._line(side, kind, self.name(side, kind, number), number)
+
     def _line(self, side: int, kind: str, name: str, number: int) -> SourceLine | None:
         """Return where an element of the left (0) or right (1) stands; None where unknown.
 

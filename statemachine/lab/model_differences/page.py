@@ -34,29 +34,22 @@ from .subject_page import APART, MOMENT, Slots, subject_blocks, value_text
 _READ = ("file", "read", "links", "joints", "touching", "drawn", "mass")  # rows of the sides
 
 
-def page(
-    result: ModelsComparison,
-    sides: Sequence[str],
-    everything: bool = False,
-    details: bool = False,
-) -> Page:
+def page(result: ModelsComparison, details: bool = False) -> Page:
     """Say what differs, the weightiest first; then what is equal, and how well.
 
     Args:
         result: The comparison.
-        sides: Both as one types them for a run.
-        everything: Whether every figure has a row of its own.
-        details: Whether all of it is shown, and not the first screen alone.
+        details: Whether every figure has a row of its own.
     """
     by_subject = grouped((row.subject, row) for row in result.differences)
     differences: list[Block] = []
     for subject, rows in by_subject.items():
-        differences += subject_blocks(subject, rows, everything)
+        differences += subject_blocks(subject, rows, details)
     slots = (
         _sides(result)
         | _verdict(result)
         | _engine_itself(result)
-        | _what_can_be_equalized(result, sides)
+        | _what_can_be_equalized(result)
         | _poses(result)
     )
     has_lines = any(row.left_line or row.right_line for row in result.differences)
@@ -213,13 +206,8 @@ def _engine(side: FileSide) -> str:
     return side.reader.split()[0]
 
 
-def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Slots:
-    """Return in what the right can be given the left's values, and how.
-
-    Args:
-        result: The comparison.
-        sides: Both as one types them for a run.
-    """
+def _what_can_be_equalized(result: ModelsComparison) -> Slots:
+    """Return in what the right can be given the left's values, and how."""
     able: dict[str, None] = {}
     refused: dict[str, str] = {}
     for row in result.differences:
@@ -230,7 +218,7 @@ def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Sl
     typed = None
     if able:
         experiment = "waves" if result.has_actuators else "gravity"  # runs on any such robot
-        words = _readable_sides(result, sides)
+        words = _readable_sides(result)
         typed = command(["statemachine", "compare", experiment, *words, "--why"])
     lines = [f"{capital(name)}: {why}." for name, why in refused.items()]
     some = len(able) if able and refused else None
@@ -243,10 +231,10 @@ def _what_can_be_equalized(result: ModelsComparison, sides: Sequence[str]) -> Sl
     }
 
 
-def _readable_sides(result: ModelsComparison, sides: Sequence[str]) -> list[str]:
+def _readable_sides(result: ModelsComparison) -> list[str]:
     """Return both sides as one types them for a run, with the options that read a refused file."""
     words: list[str] = []
-    for side, word in zip(("left", "right"), sides, strict=True):
+    for side, word in zip(("left", "right"), result.labels, strict=True):
         faults = [fault for fault in result.faults if fault.side == side]
         words.append(word)
         if any(fault.unit == "kg m²" for fault in faults):

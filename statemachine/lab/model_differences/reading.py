@@ -40,6 +40,11 @@ class FileAsked:
         return resolve(self.file, self.menagerie)
 
     @property
+    def label(self) -> str:
+        """As one types it for a run: "a.xml", "a.xml@pybullet"."""
+        return f"{self.file}@{self.engine}" if self.engine else str(self.file)
+
+    @property
     def is_urdf(self) -> bool:
         """Whether the file is a URDF."""
         return self.path.suffix.lower() == ".urdf"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ...engines.description.lines import SourceLine
 
@@ -205,6 +205,7 @@ class ModelsComparison:
         has_actuators: Whether the left can be commanded.
         versions: Of what computed it.
         skipped: What was not compared, in sentences.
+        labels: Both sides as one types them for a run.
     """
 
     left: FileSide
@@ -218,6 +219,7 @@ class ModelsComparison:
     has_actuators: bool
     versions: Mapping[str, str]
     skipped: tuple[str, ...]
+    labels: tuple[str, str] = field(metadata={"json": False})
 
     @property
     def mass(self) -> tuple[float, float]:

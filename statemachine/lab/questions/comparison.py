@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ...errors import StateMachineError
@@ -125,11 +126,11 @@ def _models_page(run: Request, traces: Sequence[Trace]) -> Page | None:
     if left == right and names[0] == names[1]:
         return None
     files = [run.model or name for name in names]
-    labels = [f"{Path(names[0]).name}@{left}", f"{Path(names[1]).name}@{right}"]
+    labels = f"{Path(names[0]).name}@{left}", f"{Path(names[1]).name}@{right}"
     try:
         differences = models.compare(
             files[0], files[1], (left, right), rename=run.names, menagerie=run.menagerie
         )
-        return model_diff.page(differences, labels)
+        return model_diff.page(replace(differences, labels=labels))
     except (StateMachineError, OSError):
         return None

@@ -20,6 +20,7 @@ from ...show.report_template import if_true, slots_of
 from ..compare.convergence import FINER, Convergence, GapLimit, LimitVerdict
 from ..compare.stillness import nothing_moved
 from .compared_names import name_of
+from .requests.converge import ConvergeResult
 
 LEADS = {
     "rounding": "There is no gap beyond rounding, whatever the timestep",
@@ -38,19 +39,18 @@ ByVerdict = Mapping[LimitVerdict, Sequence[GapLimit]]
 _FINER = ("at h", *(f"h/{finer}" for finer in FINER[1:]))
 
 
-def page(result: Convergence, experiment: str, details: bool = False) -> Page:
+def page(result: ConvergeResult, details: bool = False) -> Page:
     """Return the page of what vanishes with the timestep, and what does not.
 
     Args:
         result: What was found.
-        experiment: What was run.
         details: Whether all of it is shown, and not the first screen alone.
     """
     by_verdict = grouped((limit.verdict, limit) for limit in result.whole)
     return template.page(
         "lab/questions/convergence",
         _of_the_limit(result, by_verdict),
-        experiment=experiment,
+        experiment=result.request.run.experiment,
         **slots_of(
             _runs_of(result),
             _limit_tables_of(result),

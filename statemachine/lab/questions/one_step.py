@@ -18,21 +18,20 @@ from ...show.report_template import if_true, slots_of
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
 from .compared_names import moment
+from .requests.one_step import OneStepResult
 
 
-def page(result: OneStep, labels: tuple[str, str], experiment: str, details: bool = False) -> Page:
+def page(result: OneStepResult, details: bool = False) -> Page:
     """Return the page of what each stage of a step gives on both sides: what differs first.
 
     Args:
         result: What was found.
-        labels: What the sides are called.
-        experiment: What was run.
         details: Whether all of it is shown, and not the first screen alone.
     """
-    left, right = labels
+    left, right = result.request.run.labels
     return template.page(
         "lab/questions/one_step",
-        experiment=experiment,
+        experiment=result.request.run.experiment,
         left=left,
         right=right,
         **slots_of(

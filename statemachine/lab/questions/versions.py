@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from ...measures.text import NONE, command, listed, quantity, sentence, short_time
 from ...show import report_template as template
@@ -15,6 +14,7 @@ from ..compare import Comparison, Request
 from ..compare.stillness import nothing_moved
 from .compared_names import name_of
 from .finding import leading
+from .requests.versions import VersionsResult
 
 
 @dataclass(frozen=True)
@@ -69,17 +69,17 @@ class _NextRelease:
         )
 
 
-def page(comparisons: Sequence[Comparison], request: Request, details: bool = False) -> Page:
+def page(result: VersionsResult, details: bool = False) -> Page:
     """Return the page of releases, each compared with the next, and commands that ask why.
 
     Args:
-        comparisons: Of each release with the next.
-        request: What was run.
+        result: What was found.
         details: Whether all of it is shown, and not the first screen alone.
     """
-    pairs = [_NextRelease.of(comparison) for comparison in comparisons]
-    slots = slots_of(_releases_of(pairs), _changes_of(pairs, request))
-    return template.page("lab/questions/versions", experiment=Path(request.what[0]).name, **slots)
+    run = result.request.run
+    pairs = [_NextRelease.of(comparison) for comparison in result.comparisons]
+    slots = slots_of(_releases_of(pairs), _changes_of(pairs, run))
+    return template.page("lab/questions/versions", experiment=run.experiment, **slots)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ..blocks import (
     Verdict,
 )
 from ..pictures import Bars, Traces
-from ..terminal import non_breaking
+from ..text_blocks import non_breaking
 from .markup import Html, joined, prose, tag
 
 # Draws an interactive block: what it shows is known where its kind is defined.

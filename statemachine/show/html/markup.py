@@ -14,7 +14,7 @@ from typing import Any
 
 from ..blocks import Markdown
 from ..markdown import inline_html
-from ..terminal import non_breaking
+from ..text_blocks import non_breaking
 
 _ROOT = __name__.partition(".")[0]
 _SPOKEN = ("aria_label", "aria_valuetext", "title")

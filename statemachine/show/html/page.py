@@ -13,7 +13,7 @@ from ... import __version__
 from ...atomic_files import check_place, replace_text
 from ...errors import BadInputError
 from ..blocks import Block, Interactive, Page, Section, Text
-from ..terminal import non_breaking
+from ..text_blocks import non_breaking
 from .blocks import DrawInteractive, drawn, headline_as_html, no_interaction
 from .markup import Html, filled, joined, tag, text_of
 

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal
 
+import numpy as np
+
+from ....engines.records import QuantityValue
 from ....errors import BadInputError, check_name
 from ....processes import checked_jobs
-from ... import why
 from ...compare.alike import for_left
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
 from ...compare.sides import Request, with_options
 from ...compare.typed_command import typed_command
 from ...runs.reporter import QUIET, Reporter
+from ...shown_result import Column, ShownResult, columns_of
+from ...why.explain import explain
+from ...why.explanation import Explanation, Share
+from ...why.request import WhyRequest
+from ...why.share_changes import with_changes
 from ...why.trials import Measure
 
 _PLAYED = "the models were run again, with the recorded starts and commands"
@@ -49,7 +57,52 @@ class ExplainRequest:
         checked_jobs(self.jobs)
 
 
-def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> why.Explanation:
+@dataclass(frozen=True, repr=False)
+class ExplainResult(ShownResult, Explanation):
+    """Which difference explains how much of a gap, and what was asked.
+
+    Attributes:
+        request: What was asked.
+    """
+
+    page_function: ClassVar[str] = "why.page:page"
+
+    request: ExplainRequest = field(kw_only=True, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each cause: the fields of `Share`.
+
+        "left" and "right" are texts: each quantity that differs with its value on that side. "file"
+        and "line" say where the right side's value stands, None where that is not known.
+        """
+        shares, places = self.shares, [share.place for share in self.shares]
+        columns: dict[str, Column] = {"cause": [share.name for share in shares]}
+        columns |= columns_of(shares, ("kind", "share", "error", "alone", "last"))
+        columns["left"] = [_values_of(share, "left") for share in shares]
+        columns["right"] = [_values_of(share, "right") for share in shares]
+        columns["file"] = [None if place is None else place.file for place in places]
+        columns["line"] = [None if place is None else place.line for place in places]
+        columns["note"] = [share.note for share in shares]
+        return columns
+
+
+def _values_of(share: Share, side: Literal["left", "right"]) -> str:
+    """Return the values that a cause has on a side, as "kp=20; ctrlrange=-2 2"."""
+    texts: list[str] = []
+    for row in share.values:
+        value: QuantityValue = row.left if side == "left" else row.right
+        texts.append(f"{row.quantity}={_text_of(value)}")
+    return "; ".join(texts)
+
+
+def _text_of(value: QuantityValue) -> str:
+    """Return a value with all of its digits."""
+    if isinstance(value, str) or value is None:
+        return str(value)
+    return " ".join(f"{number:.15g}" for number in np.atleast_1d(value).tolist())
+
+
+def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult:
     """Explain what two sides differ in.
 
     Raises:
@@ -69,7 +122,7 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> why.Explanati
         recordings = [
             for_left(trace, model, run) for trace, model in zip(traces, models, strict=False)
         ]
-        question = why.WhyRequest(
+        question = WhyRequest(
             models[0],
             models[1],
             replace(asked, options=common),
@@ -85,8 +138,15 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> why.Explanati
             uncertain=request.uncertainty,
             jobs=request.jobs,
         )
-        result = why.explain(question, progress)
+        explanation = explain(question, progress)
+        explanation = with_changes(
+            explanation, question.left, question.right, run.names, request.finer
+        )
     notes = [*run.taken]
     if run.is_traces:
         notes.append(_PLAYED)
-    return replace(result, notes=(*notes, *result.notes), command=typed_command(run))
+    explanation = replace(
+        explanation, notes=(*notes, *explanation.notes), command=typed_command(run)
+    )
+    facts = vars(explanation)
+    return ExplainResult(**facts, request=request)

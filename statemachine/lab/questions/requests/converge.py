@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 from ....errors import BadInputError, shown
 from ....interface.options import OptionValue
-from ...compare.convergence import Convergence, convergence
+from ...compare.convergence import FINER, Convergence, convergence
 from ...compare.sides import Request, Side
 from ...compare.two_sides import run_sides
 from ...recordings import Trace
 from ...runs.reporter import QUIET, Reporter
+from ...shown_result import Column, ShownResult, columns_of
 from .one_step import check_runs
 
 
@@ -39,7 +41,34 @@ class ConvergeRequest:
         return replace(self.run, options=options, sides=tuple(sides))
 
 
-def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> Convergence:
+@dataclass(frozen=True, repr=False)
+class ConvergeResult(ShownResult, Convergence):
+    """What becomes of each gap with finer and finer steps, and what was asked.
+
+    Attributes:
+        request: What was asked.
+    """
+
+    page_function: ClassVar[str] = "questions.convergence:page"
+
+    request: ConvergeRequest = field(kw_only=True, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each quantity over the whole run.
+
+        "gap_1" is the largest gap with the steps as given, "gap_2" with half of them, and so on
+        [unit]; "limit" is what it tends to [unit].
+        """
+        columns: dict[str, Column] = {"quantity": [limit.name for limit in self.whole]}
+        columns |= columns_of(self.whole, ("kind", "unit"))
+        runs = len(self.whole[0].gaps) if self.whole else 0
+        for number, finer in enumerate(FINER[:runs]):
+            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in self.whole]
+        columns |= columns_of(self.whole, ("limit", "verdict"))
+        return columns
+
+
+def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> ConvergeResult:
     """Run both sides with ever finer steps, and compare.
 
     Raises:
@@ -50,7 +79,8 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> Convergence:
         return run_sides(request.with_finer_steps(times)).traces
 
     with reporter.stage("converge") as progress:
-        return convergence(run, progress=progress)
+        limits = convergence(run, progress=progress)
+    return ConvergeResult(**vars(limits), request=request)
 
 
 def _substeps(options: Mapping[str, OptionValue], usual: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from ....errors import BadInputError, check_name
 from ....measures import QUANTITIES
@@ -17,6 +18,7 @@ from ...compare.two_sides import SidesRun, run_sides
 from ...compare.witnessed import WitnessResult, witness
 from ...runs.controllers import is_function
 from ...runs.reporter import QUIET, Reporter
+from ...shown_result import Column, ShownResult, columns_of
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,23 @@ class CompareRequest:
         return bool(self.run.sides) or is_function(self.run.what[0])
 
 
-@dataclass(frozen=True, eq=False)
-class CompareResult:
+# Of `Agreement`, as columns of a table.
+COLUMNS = (
+    "kind",
+    "unit",
+    "max",
+    "at",
+    "rms",
+    "settled",
+    "since",
+    "tolerance",
+    "verdict",
+    "note",
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompareResult(ShownResult):
     """How far apart two runs are.
 
     Attributes:
@@ -64,6 +81,8 @@ class CompareResult:
             recorded run is not here.
     """
 
+    page_function: ClassVar[str] = "questions.comparison:page"
+
     request: CompareRequest
     run: SidesRun
     comparison: Comparison
@@ -71,6 +90,12 @@ class CompareResult:
     witness: WitnessResult | None
     floor: ChaosFloor | None
     instead: Instead | None
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each quantity: the fields of `Agreement`, in `unit` and in s."""
+        agreements = self.comparison.agreements
+        quantities = {"quantity": [gap.name for gap in agreements]}
+        return quantities | columns_of(agreements, COLUMNS)
 
     def figures(self) -> dict[str, object]:
         """Return what JSON shows of it."""

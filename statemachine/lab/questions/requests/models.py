@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
+from ....engines.description.lines import SourceLine
 from ....errors import BadInputError
 from ....models import AnyPath
-from ... import model_differences
+from ...model_differences import ModelsComparison, Value, compare
 from ...runs.reporter import QUIET, Reporter
+from ...shown_result import Column, ShownResult, columns_of
 
 
 @dataclass(frozen=True)
@@ -43,23 +46,57 @@ class ModelsRequest:
                 "name two engines, or two files"
             )
 
-    @property
-    def labels(self) -> list[str]:
-        """Both sides as one types them for a run."""
-        sides = zip(self.models, self.engines, strict=True)
-        return [f"{model}@{engine}" if engine else str(model) for model, engine in sides]
+
+@dataclass(frozen=True, repr=False)
+class ModelsResult(ShownResult, ModelsComparison):
+    """Every difference between two descriptions of a robot, and what was asked.
+
+    Attributes:
+        request: What was asked.
+    """
+
+    page_function: ClassVar[str] = "model_differences.page:page"
+
+    request: ModelsRequest = field(kw_only=True, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each quantity of an element that is not the same in both.
+
+        "left" and "right" are texts, for a value may be a number, several, or a word; lines are
+        those of each file, None where they are not known.
+        """
+        rows = self.differences
+        columns = columns_of(rows, ("subject", "kind", "element", "quantity", "unit"))
+        columns["left"] = [_text_of(row.left) for row in rows]
+        columns["right"] = [_text_of(row.right) for row in rows]
+        columns |= columns_of(rows, ("size", "share", "effect", "matters"))
+        columns["left_line"] = [_number_of(row.left_line) for row in rows]
+        columns["right_line"] = [_number_of(row.right_line) for row in rows]
+        return columns
 
 
-def answer(
-    request: ModelsRequest, reporter: Reporter = QUIET
-) -> model_differences.ModelsComparison:
+def _number_of(line: SourceLine | None) -> int | None:
+    """Return the number of a line of a file; None where it is not known."""
+    return None if line is None else line.line
+
+
+def _text_of(value: Value) -> str | None:
+    """Return a value as a file has it; None where the file does not say."""
+    if value is None:
+        return None
+    if isinstance(value, tuple):
+        return " ".join(f"{number:.15g}" for number in value)
+    return str(value)
+
+
+def answer(request: ModelsRequest, reporter: Reporter = QUIET) -> ModelsResult:
     """Find every difference between two descriptions.
 
     Raises:
         StateMachineError: A file cannot be read, or an engine is missing.
     """
     with reporter.stage("compare"):
-        return model_differences.compare(
+        differences = compare(
             *request.models,
             engines=request.engines,
             frames=request.frames,
@@ -67,3 +104,4 @@ def answer(
             seed=request.seed,
             menagerie=request.menagerie,
         )
+    return ModelsResult(**vars(differences), request=request)

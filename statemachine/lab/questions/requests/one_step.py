@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 from ....errors import BadInputError
-from ...compare import one_step
+from ...compare.one_step import OneStep, one_step
 from ...compare.prepared_sides import prepare_sides
 from ...compare.sides import Request
 from ...runs.reporter import QUIET, Reporter
+from ...shown_result import Column, ShownResult, columns_of
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,29 @@ class OneStepRequest:
         check_runs(self.run, "--one-step")
 
 
+_COLUMNS = (
+    *("stage", "unit", "worst", "at", "where", "tolerance", "beyond", "first", "leads", "scale"),
+    *("null", "told", "reason"),
+)
+
+
+@dataclass(frozen=True, repr=False)
+class OneStepResult(ShownResult, OneStep):
+    """What one step gives on each side, and what was asked.
+
+    Attributes:
+        request: What was asked.
+    """
+
+    page_function: ClassVar[str] = "questions.one_step:page"
+
+    request: OneStepRequest = field(kw_only=True, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each stage of a step: the fields of `StageGap`."""
+        return columns_of(self.stages, _COLUMNS)
+
+
 def check_runs(run: Request, flag: str) -> None:
     """Check that both sides can be run.
 
@@ -37,7 +62,7 @@ def check_runs(run: Request, flag: str) -> None:
         )
 
 
-def answer(request: OneStepRequest, reporter: Reporter = QUIET) -> one_step.OneStep:
+def answer(request: OneStepRequest, reporter: Reporter = QUIET) -> OneStepResult:
     """Compare one step of both sides from each recorded state of the left one.
 
     Raises:
@@ -45,4 +70,5 @@ def answer(request: OneStepRequest, reporter: Reporter = QUIET) -> one_step.OneS
     """
     (left, right), _, _ = prepare_sides(request.run)
     with reporter.stage("one step") as progress:
-        return one_step.one_step(left, right.model, names=request.run.names, progress=progress)
+        steps = one_step(left, right.model, names=request.run.names, progress=progress)
+    return OneStepResult(**vars(steps), request=request)

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import ClassVar
 
 from .... import releases
 from ....errors import BadInputError
-from ...compare.agreement import Comparison, compare
+from ...compare.agreement import Agreement, Comparison, compare
 from ...compare.prepared_sides import read_otherwise
 from ...compare.sides import Request
 from ...compare.two_sides import run_sides
 from ...runs.drive import Progress, part_of, silent
 from ...runs.reporter import QUIET, Reporter
+from ...shown_result import Column, ShownResult, columns_of
+from .gap import COLUMNS
 from .one_step import check_runs
 
 
@@ -43,7 +46,38 @@ class VersionsRequest:
             )
 
 
-def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> list[Comparison]:
+@dataclass(frozen=True, eq=False, repr=False)
+class VersionsResult(ShownResult):
+    """How far apart each release is from the next, and what was asked.
+
+    Attributes:
+        request: What was asked.
+        comparisons: Of each release with the next, the oldest first.
+    """
+
+    page_function: ClassVar[str] = "questions.versions:page"
+
+    request: VersionsRequest
+    comparisons: tuple[Comparison, ...]
+
+    def figures(self) -> object:
+        """Return what JSON shows of it: the comparisons."""
+        return self.comparisons
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each quantity of each release and the next."""
+        columns: dict[str, Column] = {"left": [], "right": [], "quantity": []}
+        gaps: list[Agreement] = []
+        for comparison in self.comparisons:
+            for gap in comparison.agreements:
+                columns["left"].append(comparison.left.run.backend)
+                columns["right"].append(comparison.right.run.backend)
+                columns["quantity"].append(gap.name)
+                gaps.append(gap)
+        return columns | columns_of(gaps, COLUMNS)
+
+
+def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> VersionsResult:
     """Compare each release with the next one.
 
     Raises:
@@ -68,7 +102,8 @@ def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> list[Compari
         backends = releases.backends_of(request.versions)
     pairs = list(pairwise(backends))
     with reporter.stage("versions") as progress:
-        return [
+        comparisons = [
             compared(pair, part_of(progress, number / len(pairs), 1 / len(pairs)))
             for number, pair in enumerate(pairs)
         ]
+    return VersionsResult(request, tuple(comparisons))

@@ -14,7 +14,7 @@ from ....show import html
 from ....show.blocks import Interactive, Items, Page, Section
 from ....show.html.geometry import packed
 from ....show.html.markup import Html, data_of, filled, joined, tag, text_of
-from ....show.terminal import non_breaking
+from ....show.text_blocks import non_breaking
 from ..compared_names import long_labels, short_labels, traces_of
 from .both_runs import BothRuns
 from .lanes import lanes_of

@@ -1,0 +1,205 @@
+"""The blocks of a page as a terminal draws them, with rich."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Container, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from .blocks import Block, Code, Heading, Items, Page, Printed, Table, Text, Verdict
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.text import Text as RichText
+
+
+# Spellings for where there is no Unicode; what is not here becomes a question mark.
+ASCII = str.maketrans(
+    {
+        "−": "-",
+        "–": "-",
+        "×": "x",
+        "≤": "<=",
+        "±": "+-",
+        "“": "'",
+        "”": "'",
+        "·": "*",
+        "°": " deg",
+        "µ": "u",
+        "Δ": "d",
+        "\u0307": "'",
+        "…": "...",
+        "²": "^2",
+        "³": "^3",
+        "⁻": "^-",
+        "″": '"',
+        "÷": "/",
+        "≈": "~",
+        "─": "-",
+        "✓": "yes",
+        "✗": "NO",
+        "†": "+",
+        "→": "->",
+        "█": "#",
+    }
+)
+# What would make a terminal do something instead of showing it (a student's text may hold it).
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+# A blank between a figure and its unit or sign.
+_INSIDE = re.compile(
+    r"(?<=\d) (?=(?:%|deg|[mµu]?s|[cm]?m[²³]?|k?N|J|W|V|kg|rad|Hz|[kMG]?B)(?!\w))"
+    r"|(?<=\d kg) (?=m)|(?<=[<>±]) (?=\d)"
+)
+NO_BREAK = "\ue000"  # of no language, and as wide as a blank
+
+
+def non_breaking(text: str) -> str:
+    """A text whose figures stay on one line with their units and signs."""
+    return _INSIDE.sub("\u00a0", text)
+
+
+def _shown(text: str, plain: bool) -> str:
+    """A text without what a terminal would take for a command, or has no letters for."""
+    text = _CONTROL.sub("?", text)
+    # Rich breaks lines at a no-break space, too.
+    return non_breaking(text.translate(ASCII) if plain else text).replace("\u00a0", NO_BREAK)
+
+
+def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[RenderableType]:
+    """What a block looks like, from top to bottom; nothing of a picture. Of a page the heading."""
+    from rich.text import Text as RichText
+
+    def coded(text: str, style: str = "") -> RichText:
+        return _coded(text, plain, piped, style)
+
+    match block:
+        case Page(title, origin):
+            heading = RichText(_shown(title, plain), "bold")
+            return ["", heading, coded(origin, "dim")] if origin else ["", heading]
+        case Heading(text):
+            return ["", coded(text, "bold")]
+        case Text(text, (_, linked)):
+            return ["", coded(f"{text} {linked}." if linked else text)]
+        case Items(texts, ordered):
+            marks = (f"{k}." if ordered else "-" for k in itertools.count(1))
+            return ["", *map(_hanging, marks, map(coded, texts))]
+        case Code(lines):
+            return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in lines)]
+        case Printed(by_engine):
+            printed: list[RenderableType] = []
+            for names, text in together(by_engine):
+                printed += ["", RichText(f"Printed by {', '.join(names)}:", "dim")]
+                for line in text.splitlines() or ["(nothing)"]:
+                    printed.append(f"    {_shown(line, plain)}")
+            return printed
+        case Table():
+            title = [RichText(_shown(block.title, plain), "italic")] if block.title else []
+            return ["", *title, _grid(block.narrow(), plain, width)]
+        case Verdict(text, holds):
+            mark = RichText(_shown("✓" if holds else "✗", plain), "green" if holds else "red")
+            return ["", _hanging(mark, coded(text))]
+    return []
+
+
+# How a terminal shows what is no plain text.
+_LOOKS = {"text": "", "code": "cyan", "emphasis": "italic", "strong": "bold", "link": "underline"}
+
+
+def _coded(text: str, plain: bool, piped: bool, style: str) -> RichText:
+    """Return a text with its code in a colour; where there is none, between backticks."""
+    from rich.text import Text as RichText
+
+    from .markdown import spans
+
+    line = RichText(style=style)
+    for span in spans(text):
+        shown = _shown(span.text, plain)
+        if piped and span.kind == "code":
+            shown = f"`{shown}`"
+        line.append(shown, _LOOKS[span.kind])
+    return line
+
+
+def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
+    """Engines that printed the same, once: their names and the text."""
+    from ..measures.text import grouped  # its room loads NumPy
+
+    engines = grouped((text, name) for name, text in by_engine.items())
+    return [(names, text) for text, names in engines.items()]
+
+
+def _grid(block: Table, plain: bool, width: int) -> RenderableType:
+    from rich import box
+    from rich.table import Table as Grid
+
+    grid = Grid(
+        box=box.ASCII if plain else box.SIMPLE_HEAD,
+        pad_edge=False,
+        show_edge=False,
+    )
+    rows: list[list[str]] = []
+    for row in (block.headers, *block.rows):
+        rows.append([_shown(_loud(cell), plain) for cell in row])
+    widths = _widths(rows, block.words, width)
+    headers, *rows = [list(map(_broken, row, widths)) for row in rows]
+    for k, cells in enumerate(widths):
+        grid.add_column(
+            headers[k],
+            justify="left" if k in block.words else "right",
+            overflow="fold",
+            width=cells,
+        )
+    for k, row in enumerate(rows):
+        grid.add_row(*row, style="bold" if k in block.emphasis else None)
+    return grid
+
+
+def _loud(cell: str) -> str:
+    """A cell; that something differs is seen without a colour."""
+    return cell.upper() if getattr(cell, "verdict", "") == "differs" else cell
+
+
+def _broken(cell: str, width: int) -> str:
+    """A cell in whose names that are too long there are blanks, if possible behind a sign.
+
+    The suffix of a file stays with its name.
+    """
+    much = rf"(?=\S{{{width + 1}}})"
+    sign = r"(?:[_/@-]|\.(?!\w{1,5}(?:\s|$)))"
+    return re.sub(rf"{much}(?:\S{{0,{width - 1}}}{sign}|\S{{{width}}})", r"\g<0> ", cell)
+
+
+def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> Sequence[int]:
+    """Widths of columns, which break no number, and of names the longest, as far as they can."""
+    from rich.cells import cell_len
+
+    columns = list(zip(*rows, strict=True))
+    # Words of a column may wrap; numbers must not.
+    parts = [" ".join(cells).split() if k in words else cells for k, cells in enumerate(columns)]
+    least = [max(1, *map(cell_len, cells)) for cells in parts]
+    free = width - sum(least) - 3 * (len(least) - 1)
+
+    for _ in range(min(-free, sum(least) - len(least))):  # names give way first, to a width
+        name = [k in words and size > _NARROWEST for k, size in enumerate(least)]
+        least[max(range(len(least)), key=lambda k: (name[k], least[k]))] -= 1
+    free = max(free, 0)
+    wants = [max(map(cell_len, cells)) - size for cells, size in zip(columns, least, strict=True)]
+    ranked = sorted(range(len(least)), key=wants.__getitem__)  # figures before sentences
+    for taken, k in enumerate(ranked):
+        more = min(wants[k], free // (len(ranked) - taken))
+        least[k], free = least[k] + more, free - more
+    return least
+
+
+def _hanging(mark: str | RichText, text: RichText) -> RenderableType:
+    from rich.table import Table as Grid
+
+    grid = Grid.grid(padding=(0, 1))
+    grid.add_column(no_wrap=True)
+    grid.add_column()
+    grid.add_row(mark, text)
+    return grid
+
+
+_NARROWEST = 8  # characters of a column whose names are broken before numbers are

@@ -1,0 +1,456 @@
+"""Robots with hidden edits: does `compare` find them, with the shares of a raw recomputation?
+
+A legged robot is drawn by a seed, and a copy of it in which some parameters are changed. What
+`compare` and `compare --why` print of the two is held against plain MuJoCo: which parameters
+changed, the Shapley share of each in the gap (every set of edits is compiled and run), and that no
+verdict is good where the runs differ.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import random
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from statemachine import releases
+
+from ._tally import Tally, command, run_bounded
+
+TRIES = 40
+RELEASE = "mujoco==3.3.7"
+_PATIENCE = 300.0  # s, of one command on a busy machine
+_SHARE = 0.02  # how far a share may be from the raw one
+_SAME = 1e-6  # of a gap: two computations of one run
+_SECONDS = 0.4
+_TIMESTEP = 0.002
+_HEIGHT = 0.42  # m, of the base: the feet are above the floor, and fall onto it
+
+Parameters = Mapping[str, float]
+
+# What an edit changes, and by which name `--why` calls that. {} is the place of a leg.
+_EDITS = {
+    "mass.base": "mass of base",
+    "mass.thigh{}": "mass of thigh{}",
+    "mass.shank{}": "mass of shank{}",
+    "damping.hip{}": "damping of hip{}",
+    "damping.knee{}": "damping of knee{}",
+    "armature.knee{}": "armature of knee{}",
+    "kp.hip{}": "gains of hip{}",
+    "kp.knee{}": "gains of knee{}",
+}
+_CONTACT_EDITS = {"friction.foot{}": "friction of foot{}"}
+_CONTROLLER = '''
+import math
+
+def trot(model, data):
+    """Return the command of each servo: opposite legs move together."""
+    swing = math.sin({rate} * data.time)
+    return [{offset} + {size} * swing * (-1) ** (i // 2) for i in range(model.nu)]
+'''
+
+
+def run(seed: int, tries: int) -> Tally:
+    """Draw pairs of each kind in turn, and compare what is printed with plain MuJoCo."""
+    draw, tally = random.Random(seed), Tally()
+    for index in range(tries):
+        kind = list(KINDS)[index % len(KINDS)]
+        one = draw.randrange(2**32)
+        tally.tried += 1
+        with tempfile.TemporaryDirectory() as name:
+            problems = KINDS[kind](random.Random(one), Path(name))
+        tally.failures += [f"{kind}, seed {one}: {problem}" for problem in problems]
+    return tally
+
+
+# The robots.
+
+
+def drawn_parameters(draw: random.Random, legs: int) -> dict[str, float]:
+    """Return the parameters of a robot with this many legs, of two joints each."""
+    parameters = {"mass.base": draw.uniform(3, 8)}
+    for leg in range(legs):
+        parameters |= {
+            f"mass.thigh{leg}": draw.uniform(0.4, 1.0),
+            f"mass.shank{leg}": draw.uniform(0.2, 0.5),
+            f"damping.hip{leg}": draw.uniform(0.2, 0.6),
+            f"damping.knee{leg}": draw.uniform(0.1, 0.4),
+            f"armature.knee{leg}": draw.uniform(0.01, 0.03),
+            f"kp.hip{leg}": draw.uniform(30, 60),
+            f"kp.knee{leg}": draw.uniform(20, 40),
+            f"friction.foot{leg}": draw.uniform(0.5, 1.0),
+        }
+    return parameters
+
+
+def edited(
+    draw: random.Random, parameters: Parameters, names: Mapping[str, str], count: int
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Return changed parameters, and the cause that each edit is: parameter to its name."""
+    legs = sum(name.startswith("mass.thigh") for name in parameters)
+    causes: dict[str, str] = {}
+    while len(causes) < count:
+        parameter, cause = draw.choice(list(names.items()))
+        leg = draw.randrange(legs)
+        causes[parameter.format(leg)] = cause.format(leg)
+    changed = dict(parameters)
+    for name in causes:
+        changed[name] = float(f"{parameters[name] * draw.choice([0.5, 0.7, 1.4, 2.0]):.6g}")
+    return changed, causes
+
+
+def mjcf_of(parameters: Parameters, floats: bool = True) -> str:
+    """Return the robot as MJCF."""
+    legs = sum(name.startswith("mass.thigh") for name in parameters)
+    bodies, servos = [], []
+    for leg in range(legs):
+        x, y = 0.15 - 0.3 * (leg // 2), 0.1 - 0.2 * (leg % 2)
+        bodies.append(
+            f"""<body name="thigh{leg}" pos="{x:g} {y:g} 0">
+            <joint name="hip{leg}" axis="0 1 0" damping="{parameters[f"damping.hip{leg}"]!r}"/>
+            <inertial pos="0.04 0 -0.1" mass="{parameters[f"mass.thigh{leg}"]!r}"
+              diaginertia="0.004 0.004 0.001"/>
+            <body name="shank{leg}" pos="0 0 -0.2">
+              <joint name="knee{leg}" axis="0 1 0"
+                damping="{parameters[f"damping.knee{leg}"]!r}"
+                armature="{parameters[f"armature.knee{leg}"]!r}"/>
+              <inertial pos="0 0 -0.1" mass="{parameters[f"mass.shank{leg}"]!r}"
+                diaginertia="0.002 0.002 0.0005"/>
+              <geom name="foot{leg}" size="0.02" pos="0 0 -0.19"
+                friction="{parameters[f"friction.foot{leg}"]!r} 0.005 0.0001"/>
+            </body></body>"""
+        )
+        servos += [
+            f'<position name="{joint}{leg}" joint="{joint}{leg}" kv="1"\n'
+            f'  kp="{parameters[f"kp.{joint}{leg}"]!r}"/>'
+            for joint in ("hip", "knee")
+        ]
+    free = "<freejoint/>" if floats else ""
+    return f"""<mujoco>
+    <compiler angle="radian"/><option timestep="{_TIMESTEP}" integrator="implicitfast"/>
+    <worldbody><geom name="floor" type="plane" size="5 5 1" friction="0.1 0.005 0.0001"/>
+    <body name="base" pos="0 0 {_HEIGHT}">{free}
+      <inertial pos="0 0 0" mass="{parameters["mass.base"]!r}" diaginertia="0.05 0.08 0.1"/>
+      {"".join(bodies)}</body></worldbody>
+    <actuator>{"".join(servos)}</actuator></mujoco>"""
+
+
+def urdf_of(parameters: Parameters) -> str:
+    """Return the robot as URDF, which knows no armature, no servos and no friction of shapes."""
+    legs = sum(name.startswith("mass.thigh") for name in parameters)
+    parts = [_link("base", parameters["mass.base"], "0.05 0.08 0.1", "0 0 0", "")]
+    for leg in range(legs):
+        x, y = 0.15 - 0.3 * (leg // 2), 0.1 - 0.2 * (leg % 2)
+        foot = (
+            '<collision><origin xyz="0 0 -0.19"/><geometry><sphere radius="0.02"/></geometry>'
+            "</collision>"
+        )
+        thigh, shank = parameters[f"mass.thigh{leg}"], parameters[f"mass.shank{leg}"]
+        parts += [
+            _link(f"thigh{leg}", thigh, "0.004 0.004 0.001", "0.04 0 -0.1", ""),
+            _link(f"shank{leg}", shank, "0.002 0.002 0.0005", "0 0 -0.1", foot),
+            _joint(f"hip{leg}", "base", f"thigh{leg}", f"{x:g} {y:g} 0", parameters),
+            _joint(f"knee{leg}", f"thigh{leg}", f"shank{leg}", "0 0 -0.2", parameters),
+        ]
+    return f'<robot name="legged">{"".join(parts)}</robot>'
+
+
+def _link(name: str, mass: float, inertia: str, centre: str, shape: str) -> str:
+    ixx, iyy, izz = inertia.split()
+    return (
+        f'<link name="{name}">\n<inertial><origin xyz="{centre}"/>\n<mass value="{mass!r}"/>\n'
+        f'<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial>'
+        f"{shape}</link>\n"
+    )
+
+
+def _joint(name: str, parent: str, child: str, place: str, parameters: Parameters) -> str:
+    return (
+        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{place}"/><axis xyz="0 1 0"/>\n'
+        f'<dynamics damping="{parameters[f"damping.{name}"]!r}"/>\n'
+        '<limit lower="-3" upper="3" effort="100" velocity="100"/></joint>\n'
+    )
+
+
+# Plain MuJoCo.
+
+
+def raw_joints(
+    text: str,
+    command_of: Callable[[float, int], float] | None,
+    timestep: float = _TIMESTEP,
+) -> np.ndarray:
+    """Return the angles of all hinges at each step, shape (nstep + 1, number of hinges) [rad].
+
+    Args:
+        text: MJCF or URDF.
+        command_of: The command of an actuator at a time [s]; None for actuators that are off.
+        timestep: Of each step [s].
+    """
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(text)
+    if command_of is None:
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    model.opt.timestep = timestep
+    data = mujoco.MjData(model)
+    hinges = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
+    rows = [data.qpos[hinges].copy()]
+    for _ in range(round(_SECONDS / timestep)):
+        if command_of is not None:
+            data.ctrl[:] = [command_of(data.time, index) for index in range(model.nu)]
+        mujoco.mj_step(model, data)
+        rows.append(data.qpos[hinges].copy())
+    return np.array(rows)
+
+
+def raw_shares(
+    left: Parameters,
+    right: Parameters,
+    joints_of: Callable[[Parameters], np.ndarray],
+) -> tuple[float, dict[str, float]]:
+    """Return the worst gap of any joint [rad], and the Shapley share of each edit in it.
+
+    All sets of edits are run. A share is the mean, over all orders of the edits, of the part of the
+    gap that goes when this one is taken back.
+    """
+    names = [name for name in left if left[name] != right[name]]
+    truth = joints_of(left)
+    gaps: dict[frozenset[str], float] = {}
+    for length in range(len(names) + 1):
+        for equalized in itertools.combinations(names, length):
+            parameters = dict(right) | {name: left[name] for name in equalized}
+            gaps[frozenset(equalized)] = float(np.abs(joints_of(parameters) - truth).max())
+    whole = gaps[frozenset()]
+    shares = dict.fromkeys(names, 0.0)
+    orders = list(itertools.permutations(names))
+    for order in orders:
+        for place, name in enumerate(order):
+            before = gaps[frozenset(order[:place])]
+            shares[name] += (before - gaps[frozenset(order[: place + 1])]) / whole / len(orders)
+    return whole, shares
+
+
+# What the command says.
+
+
+def _asked(folder: Path, *words: str) -> tuple[int | None, dict[str, Any], str]:
+    code, out, error = run_bounded(command(*words, "--json"), folder, _PATIENCE)
+    try:
+        return code, json.loads(out), error
+    except json.JSONDecodeError:
+        return code, {}, error
+
+
+def _wrong_causes(
+    answer: Mapping[str, Any], causes: Mapping[str, str], shares: Mapping[str, float]
+) -> list[str]:
+    """Return which causes are missing, too many, or have another share than the raw one."""
+    rows = answer.get("shares", [])
+    assert isinstance(rows, list)
+    told = {row["name"]: row for row in rows}
+    wrong = [f"no cause {cause!r}" for cause in causes.values() if cause not in told]
+    wrong += [f"{name!r} is no edit" for name in told if name not in causes.values()]
+    for parameter, cause in causes.items():
+        share = told.get(cause, {}).get("share")
+        if cause in told and (share is None or abs(share - shares[parameter]) > _SHARE):
+            wrong.append(f"{cause!r} has the share {share}, raw {shares[parameter]:.4f}")
+    return wrong
+
+
+def _wrong_answer(
+    found: tuple[int | None, dict[str, Any], str],
+    causes: Mapping[str, str],
+    raw: tuple[float, Mapping[str, float]],
+) -> list[str]:
+    code, answer, error = found
+    if code != 0:
+        return [f"exit code {code}: {error.strip()[-300:]}"]
+    gap, shares = raw
+    told = answer["gap"]
+    assert isinstance(told, float)
+    if not math.isclose(told, gap, rel_tol=_SAME, abs_tol=1e-9):
+        return [f"the gap is told as {told}, raw {gap}"]
+    return _wrong_causes(answer, causes, shares)
+
+
+# The kinds of pairs.
+
+
+def _contact(draw: random.Random, folder: Path) -> list[str]:
+    """Legs that fall on the floor with their actuators off."""
+    left = drawn_parameters(draw, 4)
+    right, causes = edited(draw, left, {**_EDITS_WITHOUT_SERVOS, **_CONTACT_EDITS}, 3)
+    _write(folder, mjcf_of(left), mjcf_of(right))
+    found = _why(folder, "gravity", "left.xml", "right.xml")
+    raw = raw_shares(left, right, lambda parameters: raw_joints(mjcf_of(parameters), None))
+    return _wrong_answer(found, causes, raw)
+
+
+def _function(draw: random.Random, folder: Path) -> list[str]:
+    """Legs that a function commands."""
+    left = drawn_parameters(draw, draw.choice([2, 4]))
+    right, causes = edited(draw, left, _EDITS, 3)
+    _write(folder, mjcf_of(left), mjcf_of(right))
+    swing = {"rate": draw.uniform(5, 15), "size": draw.uniform(0.1, 0.4)}
+    swing["offset"] = draw.uniform(-0.2, 0.2)
+    (folder / "walk.py").write_text(_CONTROLLER.format(**swing), encoding="utf-8")
+    found = _why(folder, "walk.py:trot", "left.xml", "right.xml")
+
+    def command_of(seconds: float, index: int) -> float:
+        sign = (-1) ** (index // 2)
+        return swing["offset"] + swing["size"] * math.sin(swing["rate"] * seconds) * sign
+
+    raw = raw_shares(left, right, lambda parameters: raw_joints(mjcf_of(parameters), command_of))
+    return _wrong_answer(found, causes, raw)
+
+
+def _releases(draw: random.Random, folder: Path) -> list[str]:
+    """One robot in two releases, with edits: each release's own motion gives the gap."""
+    left = drawn_parameters(draw, 2)
+    right, causes = edited(draw, left, _FIXED_EDITS, 2)
+    _write(folder, mjcf_of(left, floats=False), mjcf_of(right, floats=False))
+    code, answer, error = _why(folder, "gravity", f"left.xml@{RELEASE}", "right.xml")
+    older = _raw_in_release(folder, "left.xml")
+    gaps = {}
+    for name, parameters in (("right", right), ("left", left)):
+        joints = raw_joints(mjcf_of(parameters, floats=False), None)
+        gaps[name] = float(np.abs(joints - older).max())
+    if gaps["left"] > 0.01 * gaps["right"]:
+        return [f"the releases themselves differ by {gaps['left']:.3g}"]
+    _, shares = raw_shares(
+        left, right, lambda parameters: raw_joints(mjcf_of(parameters, floats=False), None)
+    )
+    return _wrong_answer((code, answer, error), causes, (gaps["right"], shares))
+
+
+def _base(draw: random.Random, folder: Path) -> list[str]:
+    """A URDF whose base is free on the left: told so, and not told of the right."""
+    left = drawn_parameters(draw, 4)
+    names = {name: cause for name, cause in _EDITS.items() if name.startswith(("mass", "damping"))}
+    right, causes = edited(draw, left, names, 2)
+    _write(folder, urdf_of(left), urdf_of(right), ".urdf")
+    sides = ("left.urdf", "base=free", "right.urdf")
+    code, _, error = _asked(
+        folder, "compare", "gravity", *sides, "base=fixed", "--seconds", str(_SECONDS)
+    )
+    problems = []
+    if code != 1:
+        problems.append(f"free against fixed: exit code {code}: {error.strip()[-300:]}")
+    found = _why(folder, "gravity", *sides)
+    raw = raw_shares(left, right, lambda parameters: raw_joints(_floating(parameters), None))
+    return problems + _wrong_answer(found, causes, raw)
+
+
+def _floating(parameters: Parameters) -> str:
+    """Return the URDF's robot with a base that floats, as MuJoCo itself would save it."""
+    import mujoco
+
+    spec = mujoco.MjSpec.from_string(urdf_of(parameters))
+    spec.compiler.fusestatic = False
+    for body in spec.worldbody.bodies:
+        body.add_freejoint()
+    spec.compile()
+    return spec.to_xml()
+
+
+def _pybullet(draw: random.Random, folder: Path) -> list[str]:
+    """A URDF as PyBullet's own users load it, against MuJoCo: no good verdict where they differ."""
+    left = drawn_parameters(draw, draw.choice([2, 4]))
+    (folder / "left.urdf").write_text(urdf_of(left), encoding="utf-8")
+    sides = ("left.urdf", f"timestep={1 / 240!r}", "left.urdf@pybullet:engine")
+    words = ("gravity", *sides, "--seconds", str(_SECONDS))
+    problems = []
+    for more in ((), ("--why",)):
+        code, _, error = run_bounded(command("compare", *words, *more), folder, _PATIENCE)
+        if code not in (0, 1) or "Traceback" in error:
+            problems.append(f"{' '.join(more)} exit code {code}: {error.strip()[-300:]}")
+    code, answer, _ = _asked(folder, "compare", *words)
+    gap = _gap_to_raw_bullet(folder, left)
+    agrees = answer["comparison"]["agrees"]
+    if agrees and gap > math.radians(0.1):
+        problems.append(f"a good verdict where joints are {gap:.3g} rad apart")
+    if agrees is (code == 1):
+        problems.append(f"exit code {code} where agrees is {agrees}")
+    return problems
+
+
+_EDITS_WITHOUT_SERVOS = {name: cause for name, cause in _EDITS.items() if name[:2] != "kp"}
+_FIXED_EDITS = {name: cause for name, cause in _EDITS_WITHOUT_SERVOS.items() if name != "mass.base"}
+KINDS: dict[str, Callable[[random.Random, Path], list[str]]] = {
+    "in contact": _contact,
+    "a function": _function,
+    "two releases": _releases,
+    "a free base": _base,
+    "PyBullet's own": _pybullet,
+}
+
+
+def _write(folder: Path, left: str, right: str, ending: str = ".xml") -> None:
+    (folder / f"left{ending}").write_text(left, encoding="utf-8")
+    (folder / f"right{ending}").write_text(right, encoding="utf-8")
+
+
+def _why(folder: Path, what: str, *sides: str) -> tuple[int | None, dict[str, Any], str]:
+    return _asked(
+        folder, "compare", what, *sides, "--why", "--quantity", "joints",
+        "--seconds", str(_SECONDS),
+    )  # fmt: skip
+
+
+_IN_RELEASE = """
+import mujoco, numpy, sys
+model = mujoco.MjModel.from_xml_path(sys.argv[1])
+model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+data, rows = mujoco.MjData(model), []
+for _ in range(int(sys.argv[2]) + 1):
+    rows.append(data.qpos.copy())
+    mujoco.mj_step(model, data)
+numpy.save(sys.argv[3], rows)
+"""
+
+
+_IN_BULLET = """
+import numpy, pybullet, sys
+pybullet.connect(pybullet.DIRECT)
+pybullet.setGravity(0, 0, -9.81)
+robot = pybullet.loadURDF(sys.argv[1])
+joints = list(range(pybullet.getNumJoints(robot)))
+for joint in joints:  # its motors, which hold each joint where nobody commands them
+    pybullet.setJointMotorControl2(robot, joint, pybullet.VELOCITY_CONTROL, force=0)
+rows = []
+for _ in range(int(sys.argv[2]) + 1):
+    rows.append([state[0] for state in pybullet.getJointStates(robot, joints)])
+    pybullet.stepSimulation()
+numpy.save(sys.argv[3], rows)
+"""
+
+
+def _gap_to_raw_bullet(folder: Path, parameters: Parameters) -> float:
+    """Return how far apart joints of plain MuJoCo and plain PyBullet get [rad], by name."""
+    rows = folder / "rows.npy"
+    steps = round(_SECONDS * 240)
+    words = [sys.executable, "-c", _IN_BULLET, str(folder / "left.urdf"), str(steps), str(rows)]
+    subprocess.run(words, check=True, capture_output=True)
+    ours = raw_joints(_floating(parameters), None, 1 / 240)
+    return float(np.abs(np.load(rows) - ours[: steps + 1]).max())
+
+
+def _raw_in_release(folder: Path, file: str) -> np.ndarray:
+    """Return the hinges of a robot without a free joint, by the release's own Python."""
+    python = sys.executable
+    if releases.is_here(RELEASE):
+        python = str(releases.python_of(RELEASE))
+    rows = folder / "rows.npy"
+    words = [python, "-c", _IN_RELEASE, str(folder / file)]
+    subprocess.run([*words, str(round(_SECONDS / _TIMESTEP)), str(rows)], check=True)
+    return np.load(rows)
