@@ -59,12 +59,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     """Compare two files."""
-    from ...lab.model_differences import page as model_diff
     from ...lab.questions.requests.models import answer
 
     result = answer(request, TerminalReporter())
-    page = model_diff.page(result, details=options.details or options.all)
-    return show(page, result, options.json)
+    return show(result.page(options.details or options.all), result, options.json)
 
 
 def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:

@@ -162,6 +162,13 @@ def _add_why(group: argparse._ArgumentGroup) -> None:
         metavar="N",
         help="how many sets of causes may be run where they interact (200)",
     )
+    group.add_argument(
+        "--write",
+        type=file_name,
+        metavar="FILE",
+        help="write the right's file with the left's values, run it, and tell what stays; with "
+        "--models, too",
+    )
     add_jobs(group)
 
 
@@ -230,6 +237,8 @@ def check_options(options: argparse.Namespace) -> None:
     """
     _need(options, ("measure", "finer", "budget", "jobs"), ("why",))
     _need(options, ("quantity",), ("why", "html"))
+    _need(options, ("write",), ("why", "models"))
+    _exclude(options, "write", ("html",))
     _need(options, ("no_why",), ("html",))
     _need(options, ("frame", "all"), ("models",))
     _exclude(options, "uncertainty", ("no_chaos",))

@@ -89,6 +89,7 @@ def explain_request_of(options: argparse.Namespace, run: Request) -> ExplainRequ
         budget=200 if options.budget is None else options.budget,
         uncertainty=_uncertainty(options),
         jobs=options.jobs,
+        write=options.write,
     )
 
 
@@ -205,13 +206,15 @@ def _models_request_of(options: argparse.Namespace) -> ModelsRequest:
         raise BadInputError(
             f"--models wants two models, or one and --backend A --backend B; got {len(words)}"
         )
+    frames, names = pairs_of(options.frame, "--frame"), pairs_of(options.map, "--map")
     return ModelsRequest(
         models=(models[0], models[1]),
         engines=(engines[0], engines[1]),
-        frames=pairs_of(options.frame, "--frame"),
-        names=pairs_of(options.map, "--map"),
+        frames=frames,
+        names=names,
         seed=options.seed,
         menagerie=options.menagerie,
+        write=options.write,
     )
 
 

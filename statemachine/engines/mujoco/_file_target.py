@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...installed import require
+from ..description.file_form import NotWrittenError
 from ..records import Edit, ElementReference, SpecEdit
 from . import _fields as fields
 
@@ -39,7 +40,8 @@ class FileTarget:
             if array.startswith("opt."):
                 self._add_option(array, index, value)
             else:
-                self._edits.setdefault((array, int(index[0])), []).append((index[1:], value))
+                key = array, _number_in(index, array)
+                self._edits.setdefault(key, []).append((index[1:], value))
         for edit in spec_edits:
             self._add_spec_edit(edit)
 
@@ -123,3 +125,14 @@ class FileTarget:
             enabled = raised == (field == "enableflags")
             texts[word] = "enable" if enabled else "disable"
         return texts
+
+
+def _number_in(index: tuple[Any, ...], array: str) -> int:
+    """Return the id of the element that an edit is of.
+
+    Raises:
+        NotWrittenError: It is of several.
+    """
+    if index and isinstance(index[0], int | np.integer):
+        return int(index[0])
+    raise NotWrittenError(f"what differs of {array} is of no single element")

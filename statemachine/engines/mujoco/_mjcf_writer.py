@@ -312,11 +312,20 @@ class ElementWriter:
             text = self._element.attributes.get("dynprm", "")
             self._set("dynprm", beginning_text(values.tolist(), before.tolist(), text))
         elif tag == "position" and kind in ("none", "filterexact"):
-            self._set("timeconst", number_text(float(values[0])) if kind != "none" else "0")
+            self._filter(kind, float(values[0]))
         elif tag == "cylinder" and kind == "filter":
             self._set("timeconst", number_text(float(values[0])))
         else:
             raise NotWrittenError(f"a <{tag}> cannot have these dynamics")
+
+    def _filter(self, kind: str, constant: float) -> None:
+        """Write the filter of a position servo, or take it away."""
+        if kind != "none":
+            self._set("timeconst", number_text(constant))
+        elif "timeconst" in self._element.attributes:
+            self._set("timeconst", None)
+        else:  # its class of defaults has one
+            self._set("timeconst", "0")
 
     def _drives(self, raw: Any) -> None:
         """Write what an actuator drives."""

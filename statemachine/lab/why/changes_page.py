@@ -52,7 +52,7 @@ class WhyChanges(PageContent):
         changes: list[AttributeChange] = []
         for row in self._acting:
             changes += row.changes
-        return tuple(changes)
+        return tuple(dict.fromkeys(changes))
 
     @property
     def settings(self) -> tuple[SettingChange, ...]:

@@ -17,6 +17,7 @@ from ..compare.typed_command import TypedCommand
 from ..runs.provenance import Provenance
 from .gap import FirstTouch, Measure
 from .locate import Localisation
+from .rewriting import RewrittenFile
 from .shapley import Method
 from .verdict import CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
 
@@ -108,6 +109,7 @@ class Explanation:
         provenance: What each side was computed with.
         right_file: Name of the right's file, without its folder.
         command: What asks something of these sides again; None where nothing was typed.
+        rewritten: The right's file with the left's values; None where none was to be written.
     """
 
     experiment: str
@@ -149,6 +151,7 @@ class Explanation:
     provenance: tuple[Provenance, Provenance]
     right_file: str = ""
     command: TypedCommand | None = field(default=None, metadata={"json": False})
+    rewritten: RewrittenFile | None = None
 
     @property
     def verdict(self) -> GapVerdict:

@@ -22,6 +22,7 @@ from .answer_page import amount, answer, missing, parts, proofs, refused
 from .causes_page import causes, nothing_differs, what_is_apart
 from .changes_page import engine_as_it_comes, steps
 from .explanation import Explanation
+from .rewritten_page import rewritten_blocks
 from .table_page import MOST_ROWS, summary_table
 from .verdict import UNEXPLAINED
 
@@ -37,7 +38,7 @@ class WhyPage(PageContent):
 
     Attributes:
         result: The explanation.
-        most_rows: How many causes have a row of their own.
+        most_rows: How many causes have a row of their own, and how much of what was not written.
         further: Everything else, under `--details`.
     """
 
@@ -111,6 +112,13 @@ class WhyPage(PageContent):
     def engine(self) -> str:
         """The engine of which the settings are that come with it; "" of none."""
         return engine_as_it_comes(self.result)
+
+    @property
+    def rewritten(self) -> Sequence[Block]:
+        """What was written of the right's file, if that was asked."""
+        if self.result.rewritten is None:
+            return []
+        return rewritten_blocks(self.result.rewritten, None if self.further else self.most_rows)
 
     @property
     def advice(self) -> Advice:
@@ -221,6 +229,8 @@ def _conclusion(result: Explanation) -> Conclusion:
 def _advice(result: Explanation) -> Advice:
     """Return which sentence leads to the next command."""
     verdict = result.verdict
+    if result.rewritten is not None:
+        return "details"
     if verdict.answer == "nothing moved":
         return ""
     if not verdict.divides:

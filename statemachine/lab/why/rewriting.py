@@ -8,6 +8,7 @@ and told with its reason.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from ...engines.description.file_changes import AttributeChange, UnwrittenChange
 from ...engines.description.file_form import FileForm, NotWrittenError
 from ...engines.description.xml_source import AttributeText, XmlSource
 from ...engines.records import ModelDifference
-from ...errors import BadInputError, StateMachineError, one_line
+from ...errors import BadInputError, EngineWarning, StateMachineError, one_line
 from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.matching import Matched, match_models
@@ -240,7 +241,9 @@ class _Rewriter:
             part.write_bytes(self._source.changed_text())
         else:
             part.write_bytes(self._source.moved_text(request.target.parent))
-        return request.load(part)
+        with warnings.catch_warnings():  # of the right they were given when it was loaded
+            warnings.simplefilter("ignore", EngineWarning)
+            return request.load(part)
 
     def _take_back(self, rows: Sequence[ModelDifference], first: Collection[str]) -> bool:
         """Take back what was written in vain; tell whether anything was.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ...engines.description.file_changes import AttributeChange
@@ -45,7 +45,37 @@ def with_changes(
     except StateMachineError:  # it is a binary file
         return result
     shares = [_with_changes(row, by_name.get(row.name), form) for row in result.shares]
+    shapes = _changes_of_shapes(shares, by_name, right)
+    for number, row in enumerate(shares):
+        cause = by_name.get(row.name)
+        if cause is not None and row.kind == "body" and not (row.changes or row.not_written):
+            changes: list[AttributeChange] = []
+            for body in _elements(cause, "body"):
+                changes += shapes.get(body, ())
+            shares[number] = replace(row, changes=tuple(dict.fromkeys(changes)))
     return replace(result, shares=tuple(shares))
+
+
+def _changes_of_shapes(
+    shares: Sequence[Share], causes_by_name: Mapping[str, Cause], right: Model
+) -> dict[int, list[AttributeChange]]:
+    """Return the changes of geoms by the body that they weigh, by its id."""
+    changes: dict[int, list[AttributeChange]] = {}
+    for row in shares:
+        cause = causes_by_name.get(row.name)
+        if cause is None or row.kind != "geom":
+            continue
+        for geom in _elements(cause, "geom"):
+            body = int(right.compiled.geom_bodyid[geom])
+            changes.setdefault(body, []).extend(row.changes)
+    return changes
+
+
+def _elements(cause: Cause, kind: str) -> list[int]:
+    """Return the ids of the elements of a kind on the right that a cause is of."""
+    edits = [edit for edit in cause.edits(1) if edit[0].startswith(f"{kind}_")]
+    ids = [index[0] for _, index, _ in edits if index]
+    return list(dict.fromkeys(number for number in ids if isinstance(number, int)))
 
 
 def _with_changes(row: Share, cause: Cause | None, form: FileForm) -> Share:

@@ -65,7 +65,11 @@ def summary_table(result: Explanation, most: int) -> Table:
 def _summary_of_cause(result: Explanation, row: Share) -> Row:
     """Return a cause in one row, with the line of the right's file that says it."""
     left, right = sides_of(row)
-    place = f"{row.place.file}:{row.place.line}" if row.place else NONE
+    place = NONE
+    if row.place is not None:
+        place = f"{row.place.file}:{row.place.line}"
+    elif row.changes:
+        place = f"{row.changes[0].file}:{row.changes[0].line}"
     return capital(heading_of(row)), left, right, _parts(result, row)[0], place
 
 

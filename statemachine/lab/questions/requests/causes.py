@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from ....engines.description.file_changes import UnwrittenChange
 from ....engines.records import QuantityValue
 from ....errors import BadInputError, check_name
+from ....interface import Model
+from ....models import AnyPath
 from ....processes import checked_jobs
 from ...compare.alike import for_left
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
-from ...compare.sides import Request, with_options
+from ...compare.sides import Request, Side, with_options
 from ...compare.typed_command import typed_command
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 from ...why.explain import explain
 from ...why.explanation import Explanation, Share
+from ...why.measured_gap import measured_gap
 from ...why.request import WhyRequest
+from ...why.rewriting import RewriteRequest, check_target, rewrite
 from ...why.share_changes import with_changes
 from ...why.trials import Measure
 
@@ -40,6 +46,7 @@ class ExplainRequest:
         budget: Number of sets of causes that may be run where they interact, at least 1.
         uncertainty: How uncertain the start is, for the chaos floor; None for no floor.
         jobs: Number of processes; None for one a processor where that pays.
+        write: Where the right's file is written with the left's values; None for nowhere.
     """
 
     run: Request
@@ -49,9 +56,12 @@ class ExplainRequest:
     budget: int = 200
     uncertainty: Uncertainty | None = EXACT
     jobs: int | None = None
+    write: AnyPath | None = None
 
     def __post_init__(self) -> None:
         check_name("measure", self.measure, MEASURES)
+        if self.write is not None and not (self.run.sides or self.run.is_traces):
+            raise BadInputError("--write brings one file to another one: name two sides")
         if self.budget < 1:
             raise BadInputError(f"--budget wants a number of runs, at least 1; got {self.budget}")
         checked_jobs(self.jobs)
@@ -118,6 +128,9 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
             sides = run.both_sides(asked.model)
         labels = sides[0].label, sides[1].label
         sides, common = with_options(sides, {**asked.options, **run.options})
+        if request.write is not None:
+            inputs = [Path(word) for word in run.what]
+            check_target(Path(request.write), sides[0].path, sides[1].path, inputs)
         models = [side.load() for side in sides]
         recordings = [
             for_left(trace, model, run) for trace, model in zip(traces, models, strict=False)
@@ -142,6 +155,8 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
         explanation = with_changes(
             explanation, question.left, question.right, run.names, request.finer
         )
+        if request.write is not None:
+            explanation = _with_file(explanation, question, sides[1], Path(request.write))
     notes = [*run.taken]
     if run.is_traces:
         notes.append(_PLAYED)
@@ -150,3 +165,41 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     )
     facts = vars(explanation)
     return ExplainResult(**facts, request=request)
+
+
+def _with_file(
+    explanation: Explanation, question: WhyRequest, right: Side, target: Path
+) -> Explanation:
+    """Write the right's file with the left's values, and run it.
+
+    Args:
+        explanation: What both sides differ in.
+        question: What was asked.
+        right: The right side, as it is loaded.
+        target: The file that is written.
+
+    Returns:
+        The explanation, with what was written.
+    """
+
+    def load(path: Path) -> Model:
+        return replace(right, model=str(path)).load()
+
+    names = {} if question.names is None else question.names
+    written, model = rewrite(RewriteRequest(question.left, question.right, target, load, names))
+    quantity = explanation.quantity
+    gap = measured_gap(question, model, quantity, explanation.measure)
+    further = [
+        UnwrittenChange(row.name, row.not_written)
+        for row in explanation.shares
+        if row.kind in ("engine", "run")
+    ]
+    rewritten = replace(
+        written,
+        not_written=(*written.not_written, *further),
+        gap=gap,
+        before=explanation.gap,
+        quantity=quantity,
+        unit=explanation.unit,
+    )
+    return replace(explanation, rewritten=rewritten)

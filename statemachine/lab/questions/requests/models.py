@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import ClassVar
 
+from ....backends import load_to_run
+from ....engines.description.file_changes import UnwrittenChange
 from ....engines.description.lines import SourceLine
 from ....errors import BadInputError
-from ....models import AnyPath
+from ....interface import Model
+from ....models import AnyPath, resolve
+from ....show.blocks import Page
 from ...model_differences import ModelsComparison, Value, compare
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
+from ...why.rewriting import RewriteRequest, RewrittenFile, check_target, rewrite
+from ...why.rewritten_page import rewritten_blocks
+
+_MOST_ROWS = 8  # of what was written, without details
+_ONLY_TEXT = "only the text of the file tells of it, and no compiled model does"
 
 
 @dataclass(frozen=True)
@@ -25,6 +35,7 @@ class ModelsRequest:
         names: Joints, links and frames of the left that go by other names on the right.
         seed: Of the poses at which both are compared, at least 0.
         menagerie: A menagerie folder to look names up in.
+        write: Where the right's file is written with the left's values; None for nowhere.
     """
 
     models: tuple[AnyPath, AnyPath]
@@ -33,12 +44,15 @@ class ModelsRequest:
     names: Mapping[str, str] = field(default_factory=dict[str, str])
     seed: int = 0
     menagerie: AnyPath | None = None
+    write: AnyPath | None = None
 
     def __post_init__(self) -> None:
         if len(self.models) != 2 or len(self.engines) != 2:
             raise BadInputError(f"two files are compared, each of one engine or none; got {self}")
         if self.seed < 0:
             raise BadInputError(f"--seed must not be negative; got {self.seed}")
+        if self.write is not None and self.engines != (None, None):
+            raise BadInputError("--write brings one file to another one: name no engine")
         left, right = zip(self.models, self.engines, strict=True)
         if left == right and left[1] is not None:
             raise BadInputError(
@@ -53,11 +67,21 @@ class ModelsResult(ShownResult, ModelsComparison):
 
     Attributes:
         request: What was asked.
+        rewritten: The right's file with the left's values; None where none was to be written.
     """
 
     page_function: ClassVar[str] = "model_differences.page:page"
 
     request: ModelsRequest = field(kw_only=True, metadata={"json": False})
+    rewritten: RewrittenFile | None = field(kw_only=True, default=None)
+
+    def page(self, details: bool = False) -> Page:
+        """Return the page, with what was written at its end."""
+        page = super().page(details)
+        if self.rewritten is None:
+            return page
+        blocks = rewritten_blocks(self.rewritten, None if details else _MOST_ROWS)
+        return replace(page, blocks=[*page.blocks, *blocks])
 
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each quantity of an element that is not the same in both.
@@ -95,6 +119,9 @@ def answer(request: ModelsRequest, reporter: Reporter = QUIET) -> ModelsResult:
     Raises:
         StateMachineError: A file cannot be read, or an engine is missing.
     """
+    paths = [resolve(model, request.menagerie) for model in request.models]
+    if request.write is not None:
+        check_target(Path(request.write), paths[0], paths[1])
     with reporter.stage("compare"):
         differences = compare(
             *request.models,
@@ -104,4 +131,31 @@ def answer(request: ModelsRequest, reporter: Reporter = QUIET) -> ModelsResult:
             seed=request.seed,
             menagerie=request.menagerie,
         )
-    return ModelsResult(**vars(differences), request=request)
+        rewritten = None
+        if request.write is not None:
+            rewritten = _rewritten(request, differences, Path(request.write))
+    return ModelsResult(**vars(differences), request=request, rewritten=rewritten)
+
+
+def _rewritten(
+    request: ModelsRequest, differences: ModelsComparison, target: Path
+) -> RewrittenFile:
+    """Write the right's file with the left's values.
+
+    Args:
+        request: What was asked.
+        differences: What both files differ in.
+        target: The file that is written.
+    """
+
+    def load(model: AnyPath) -> Model:
+        return load_to_run(model, menagerie=request.menagerie)
+
+    left, right = (load(model) for model in request.models)
+    written, _ = rewrite(RewriteRequest(left, right, target, load, request.names))
+    only_text = [
+        UnwrittenChange(f"{row.quantity} of {row.element}", _ONLY_TEXT)
+        for row in differences.differences
+        if row.matters and not row.cause
+    ]
+    return replace(written, not_written=(*written.not_written, *only_text))

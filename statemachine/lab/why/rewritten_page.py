@@ -1,0 +1,66 @@
+"""What was written of the right's file, and what was not, as blocks of a page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...engines.description.file_changes import AttributeChange, UnwrittenChange
+from ...show.blocks import Block
+from ...show.templates import PageContent, render_blocks
+from .rewriting import RewrittenFile
+
+
+@dataclass(frozen=True)
+class RewrittenPart(PageContent):
+    """What was written of the right's file.
+
+    Attributes:
+        rewritten: The file.
+        most: How many rows there are of what was written, and of what was not.
+    """
+
+    template = "why_rewritten.md.j2"
+    rewritten: RewrittenFile
+    most: int
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the file was run."""
+        return bool(self.rewritten.quantity)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether its run reached the end."""
+        return self.rewritten.gap is not None
+
+    @property
+    def changes(self) -> tuple[AttributeChange, ...]:
+        """The attributes that have a row."""
+        return self.rewritten.written[: self.most]
+
+    @property
+    def more_changes(self) -> int:
+        """How many attributes have none."""
+        return len(self.rewritten.written) - len(self.changes)
+
+    @property
+    def refusals(self) -> tuple[UnwrittenChange, ...]:
+        """What was not written, as far as it has a row."""
+        return self.rewritten.not_written[: self.most]
+
+    @property
+    def more_refusals(self) -> int:
+        """How much of what was not written has no row."""
+        return len(self.rewritten.not_written) - len(self.refusals)
+
+
+def rewritten_blocks(rewritten: RewrittenFile, most: int | None = None) -> list[Block]:
+    """Return what was written, and what was not.
+
+    Args:
+        rewritten: The file.
+        most: How many rows there are of each; None for all.
+    """
+    if most is None:
+        most = len(rewritten.written) + len(rewritten.not_written)
+    return render_blocks(RewrittenPart(rewritten, most))
