@@ -135,7 +135,7 @@ class CausesPart(PageContent):
 
 
 @dataclass(frozen=True)
-class LocatedPart(PageContent):
+class LocationNote(PageContent):
     """What is said of one part of the gap that was localised.
 
     Attributes:
@@ -173,7 +173,7 @@ def _located(result: Explanation) -> list[Block]:
     for number, place in enumerate(result.found_in):
         before = tuple(row.name for row in result.found_in[:number])
         blocks += render_blocks(
-            LocatedPart(_kind_of(place, before), place, result.quantity, before)
+            LocationNote(_kind_of(place, before), place, result.quantity, before)
         )
     return blocks
 
