@@ -166,7 +166,7 @@ def test_one_cause_explains_all(folder: Path, capsys: Any, name: str) -> None:
     (cause,) = found["shares"]
     assert_has(cause, name=known, share=pytest.approx(1.0))
     assert [tuple(each.values()) for each in cause["values"]] == [value]
-    assert (code, main(["compare", "--models", *sides])) == (0, models)
+    assert (code, main(["compare", "--models", *sides, "--details"])) == (0, models)
     assert "Keyframe k: time" in capsys.readouterr().out or known != "time of the start"
 
 
@@ -180,7 +180,7 @@ def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys
     # By themselves sensors move nothing.
     code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-chaos")
     assert (code, found["shares"]) == (0, [])
-    assert main(["compare", "l.xml", "v.xml", "--models"]) == 0
+    assert main(["compare", "l.xml", "v.xml", "--models", "--details"]) == 0
     assert "Sensor of p: type" in capsys.readouterr().out
 
 

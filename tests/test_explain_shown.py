@@ -16,7 +16,7 @@ from statemachine.lab.why import page as why
 from statemachine.measures.text import capital, percent
 from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Table
-from statemachine.show.screen import LINES
+from statemachine.show.first_screen import LINES
 
 from .support import known_causes as known
 from .support.claims import assert_in

@@ -254,16 +254,17 @@ def test_a_coupling_that_only_one_file_has_is_told_in_words(tmp_path: Path) -> N
     assert (row.left, row.right) == ("k is -2 j +0.5", "nothing")
 
 
-FLEX = """<mujoco><worldbody><flexcomp name="cloth" type="grid" count="3 3 1" radius="0.01"
-  spacing="0.1 0.1 0.1" dim="2"><edge damping="{damping}"/></flexcomp></worldbody></mujoco>"""
-
-
 def test_the_verdict_tells_why_not_all_was_compared(tmp_path: Path) -> None:
-    result = _listed(tmp_path, FLEX.format(damping=1), FLEX.format(damping=5))
-    (why,) = result.skipped
+    shape = '<collision><geometry><mesh filename="gone.stl"/></geometry></collision>'
+    text = _urdf(more=f'<link name="c">{shape}</link>{FIXED}')
+    result = _listed(tmp_path, text, text, suffix="urdf")
+    why = result.skipped[0]
     (verdict,) = [block for block in _page(result) if isinstance(block, Verdict)]
     assert not verdict.holds
     assert why in verdict.text
+
+
+FIXED = '<joint name="f" type="fixed"><parent link="base"/><child link="c"/></joint>'
 
 
 EVERY_JOINT = """<mujoco><worldbody>
@@ -321,7 +322,8 @@ def test_every_joint_that_is_compared_is_counted(tmp_path: Path) -> None:
 
 def test_one_joint_is_one_joint(tmp_path: Path) -> None:
     result = _listed(tmp_path, _urdf(), _urdf(), "urdf")
-    texts = [block.text for block in _page(result) if isinstance(block, Text)]
+    assert result.posed.joints == 1
+    texts = [block.text for block in page(result, details=True).blocks if isinstance(block, Text)]
     assert any("of 1 joint put" in text for text in texts)
 
 
@@ -329,5 +331,6 @@ def test_a_long_name_of_a_file_is_not_broken_before_its_suffix(tmp_path: Path, h
     folder = "a_folder_with_a_long_name_x"
     (tmp_path / folder).mkdir()
     written_all(tmp_path / folder, {"left.urdf": _urdf(), "right.urdf": _urdf(mass=2)})
-    printed = here("compare", "--models", f"{folder}/left.urdf", f"{folder}/right.urdf").stdout
+    sides = f"{folder}/left.urdf", f"{folder}/right.urdf"
+    printed = here("compare", "--models", *sides, "--details").stdout
     assert {"left.urdf", "right.urdf"} <= set(printed.split())

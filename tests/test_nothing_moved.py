@@ -17,7 +17,11 @@ from statemachine.lab.questions.convergence import page as limits
 from statemachine.lab.questions.junit import junit
 from statemachine.lab.questions.requests import causes, converge, gap
 from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult
-from statemachine.lab.questions.requests.versions import VersionsRequest, VersionsResult
+from statemachine.lab.questions.requests.versions import (
+    ReleasePair,
+    VersionsRequest,
+    VersionsResult,
+)
 from statemachine.lab.questions.versions import page as versions
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.why import Explanation
@@ -168,8 +172,8 @@ def test_a_gap_that_is_there_is_one_whatever_moves(state: str) -> None:
 
 def test_converge_says_nothing_of_a_rest(rotors: tuple[Path, Path]) -> None:
     found = converge.answer(converge.ConvergeRequest(request("fall", *rotors)))
-    assert found.is_still
-    assert not limits(found, "fall").holds
+    assert found.limits.is_still
+    assert not limits(found).holds
 
 
 def test_a_body_that_stands_is_compared_by_what_it_presses_with(tmp_path: Path) -> None:
@@ -224,7 +228,8 @@ def test_ci_fails_where_nothing_was_compared(rotors: tuple[Path, Path]) -> None:
 def test_releases_that_move_nothing_are_not_the_same(rotors: tuple[Path, Path]) -> None:
     comparison = compared("fall", rotors[0]).comparison
     asked = VersionsRequest(Request(("fall",), model=str(rotors[0])), "3.3.7")
-    assert not versions(VersionsResult(asked, (comparison,))).holds
+    pair = ReleasePair("3.3.7", "4.0.0", ("mujoco==3.3.7", "mujoco"), comparison, ())
+    assert not versions(VersionsResult(asked, (pair,))).holds
 
 
 def test_the_command_ends_with_1_and_json_says_why(rotors: tuple[Path, Path], here: Cli) -> None:

@@ -19,9 +19,10 @@ from statemachine.lab.questions.requests.one_step import OneStepRequest, OneStep
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
-from statemachine.show.blocks import Verdict
+from statemachine.show.blocks import Code, Page, Table, Verdict
 
-from .support.claims import assert_has, assert_in, refused
+from .support.claims import assert_has, refused
+from .support.pages import blocks, shown
 from .support.small_models import LINKS_AND_BALL, TWO_LINKS, model_of
 
 CHANGES = {
@@ -59,10 +60,9 @@ def gap_of(found: OneStep, name: str) -> StageGap:
     return gap
 
 
-def verdict(found: OneStep) -> Verdict:
-    last = page(OneStepResult(**vars(found), request=OneStepRequest(Request(("hold",))))).blocks[-1]
-    assert isinstance(last, Verdict)
-    return last
+def page_of(found: OneStep, details: bool = False) -> Page:
+    request = OneStepRequest(Request(("hold",), model="so101"))
+    return page(OneStepResult(request, ("one", "two"), found), details)
 
 
 def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> None:
@@ -70,8 +70,27 @@ def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> Non
     assert [gap.stage for gap in found.stages] == list(STAGES)
     for gap in found.stages:
         assert_has(gap, worst=0.0, null=0.0, told=True)
-    assert_in(verdict(found).text, "the same step", "last bit")
+    assert found.is_exact
     assert not found.spikes
+    assert page_of(found).holds
+
+
+def test_the_verdict_comes_first_and_the_next_command_last(tmp_path: Path) -> None:
+    old, new, _ = CHANGES["passive"]
+    written = page_of(stepped(tmp_path, LINKS_AND_BALL.replace(old, new, 1)))
+    assert isinstance(written.blocks[0], Verdict)
+    assert not written.holds
+    (code,) = blocks(written, Code)
+    assert written.blocks[-1] is code
+    assert code.lines == ["statemachine compare hold so101 --why"]
+
+
+def test_details_have_a_row_for_every_stage(tmp_path: Path) -> None:
+    old, new, _ = CHANGES["passive"]
+    found = stepped(tmp_path, LINKS_AND_BALL.replace(old, new, 1))
+    first_screen, everything = (blocks(page_of(found, all_), Table) for all_ in (False, True))
+    assert [row[0] for row in first_screen[0].rows] == [gap.stage for gap in found.differing]
+    assert [row[0] for row in everything[0].rows] == list(STAGES)
 
 
 @pytest.mark.parametrize("stage", CHANGES)
@@ -110,7 +129,7 @@ def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> Non
     assert first(found) == "contact force"
     assert leads["contact force"] == gap_of(found, "contact force").beyond
     assert leads == {"contact force": found.moments - apart, "other constraints": apart}
-    assert f"At other moments it is other constraints ({apart}): earlier" in verdict(found).text
+    assert f"other constraints ({apart})" in " ".join(shown(page_of(found, True)).split())
 
 
 def test_the_verdict_names_no_cause_that_why_contradicts() -> None:
@@ -120,7 +139,10 @@ def test_the_verdict_names_no_cause_that_why_contradicts() -> None:
     assert explain(WhyRequest(one, two, hold, jobs=1)).shares[0].name.startswith("damping")
     found = one_step(rerun_of(hold, one), two, moments=50)
     assert first(found) == "mass matrix"
-    assert_in(verdict(found).text, "force: passive, ", "--why")
+    largest = max(found.differing, key=lambda gap: gap.worst if gap.unit == "N·m" else 0.0)
+    assert largest.stage == "passive"
+    (code,) = blocks(page_of(found), Code)
+    assert code.lines[0].endswith("--why")
 
 
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:

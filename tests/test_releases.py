@@ -334,7 +334,7 @@ class TestReleases:
                 *(("hold", *sides, "--why"), 0),
                 *("Integrator implicitfast implicitfast", "both sides run with euler"),
             ),
-            (("--models", *sides), 0, "loaded into mujoco 3.3.7"),
+            (("--models", *sides, "--details"), 0, "loaded into mujoco 3.3.7"),
         ):
             assert main(["compare", *words]) == code
             assert_in(" ".join(capsys.readouterr().out.split()), *says)
@@ -344,8 +344,8 @@ class TestReleases:
     ) -> None:
         versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "so101")
         assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
-        (found,) = json.loads(capsys.readouterr().out)
-        assert [found[side]["run"]["backend"] for side in ("left", "right")] == [OLD, "mujoco"]
+        (pair,) = json.loads(capsys.readouterr().out)["pairs"]
+        assert pair["backends"] == [OLD, "mujoco"]
         picture = tmp_path / "releases.svg"
         assert main(["compare", "hold", *versions, "--plot", str(picture)]) == SAYS_NO
         assert f"3.3.7 to {engine_version('mujoco')}" in picture.read_text("utf-8")
@@ -370,8 +370,8 @@ class TestReleases:
         asked = ("--versions", "3.3.7", "--bisect", "so101", "--json")
         assert main(["compare", "hold", *asked]) == SAYS_NO
         pairs = [
-            (pair["left"]["run"]["backend"], pair["right"]["run"]["backend"], pair["agrees"])
-            for pair in json.loads(capsys.readouterr().out)
+            (*pair["backends"], pair["comparison"]["agrees"])
+            for pair in json.loads(capsys.readouterr().out)["pairs"]
         ]
         assert pairs == [(OLD, OLD, True), (OLD, SAME, False), (SAME, "mujoco", True)]
 

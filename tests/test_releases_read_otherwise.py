@@ -104,7 +104,8 @@ def test_an_edit_reaches_it(gripper: Path) -> None:
 def test_versions_run_both_and_say_what_was_read_otherwise(gripper: Path) -> None:
     request = VersionsRequest(Request(("fall",), model=str(gripper)), "3.3.7")
     with warnings.catch_warnings(action="ignore", category=EngineWarning):
-        (comparison,) = answer(request).comparisons
+        (pair,) = answer(request).pairs
+    comparison = pair.comparison
     assert not comparison.agrees
     assert [note for note in comparison.notes if "b_j follows a_j" in note]
 
@@ -117,8 +118,8 @@ def test_nothing_is_said_of_two_releases_that_read_alike(
     model, told = loaded_in_old(file)
     assert (model.unshared, told) == ((), "")
     request = VersionsRequest(Request(("fall",), model=str(file)), "3.3.7")
-    (comparison,) = answer(request).comparisons
-    assert comparison.notes == ()
+    (pair,) = answer(request).pairs
+    assert pair.comparison.notes == ()
 
 
 def test_models_list_it(gripper: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,6 +19,8 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from PIL import Image
+from statemachine.lab.questions.compare_page import PageParts
+from statemachine.lab.questions.compare_page import page as compared
 
 import statemachine as sm
 from statemachine.course.notebook import markdown
@@ -26,8 +28,6 @@ from statemachine.engines.records import DifferingQuantity
 from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.lab.compare import Comparison, compare, touches
 from statemachine.lab.compare.series import total_forces
-from statemachine.lab.questions.compare_page import PageParts
-from statemachine.lab.questions.compare_page import page as compared
 from statemachine.lab.questions.events import events_of
 from statemachine.lab.questions.finding import headline, leading, subject
 from statemachine.lab.questions.sides_page import commanded

@@ -28,7 +28,8 @@ from statemachine.lab.recordings.request import RecordRequest, answer_record
 from statemachine.lab.robots.request import RobotsRequest
 from statemachine.lab.runs.reporter import QUIET
 from statemachine.lab.sweep import Sweep
-from statemachine.lab.sweep.questions import SweepReportRequest, SweepRequest
+from statemachine.lab.sweep.questions import SweepEffectsRequest, SweepReportRequest, SweepRequest
+from statemachine.lab.sweep.questions import answer as answer_sweep
 from statemachine.lab.validate.fingertip_request import FingertipRequest
 from statemachine.view.request import RecordingRequest, ServerSettings, SimulationRequest
 
@@ -97,6 +98,8 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: Sweep("hold", seeds=0), "--seeds must be at least 1"),
     (lambda: Sweep("hold", every=2), "--every is of a FUNCTION"),
     (lambda: SweepRequest(Sweep("hold"), ""), "the folder of a sweep has no name"),
+    (lambda: SweepEffectsRequest(SweepRequest(Sweep("hold"), None), "x"), "no quantity named 'x'"),
+    (lambda: answer_sweep(SweepRequest(Sweep("hold"), None)), "say where with --out DIR"),
     (lambda: SweepReportRequest("d", backends=("a", "b", "c")), "a report is of one engine"),
     (lambda: SimulationRequest(backends=("mujoco",) * 3), "view shows one engine or two"),
     (lambda: RecordingRequest(()), "view shows one trace or two"),

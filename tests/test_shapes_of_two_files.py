@@ -17,6 +17,7 @@ from statemachine.lab.compare.matching import match_models
 from statemachine.lab.model_differences import ListedDifference, compare
 from statemachine.lab.why.causes import built, causes, differences_of
 
+from .support.claims import numbers
 from .support.files import written_all
 
 ARM = """<mujoco><worldbody><geom type="plane" size="1 1 0.1"/><body pos="0 0 1">
@@ -129,7 +130,7 @@ def test_a_box_of_other_axes_differs_by_what_it_is_larger(number, off, tmp_path)
     (row,) = result.rows
     (value,) = row.values
     assert (row.subject, value.quantity) == ("shape", "size")
-    assert np.allclose([value.left, value.right], [SIZES, larger], rtol=0, atol=1e-12)
+    assert np.allclose(numbers(value.left, value.right), [SIZES, larger], rtol=0, atol=1e-12)
     (listed,) = result.listed
     assert listed.size == pytest.approx(off, rel=1e-9)
 
@@ -235,7 +236,7 @@ def test_a_moment_is_set_against_that_of_the_nearest_axis(number, tmp_path):
     inertia = _inertia(near, UPRIGHT), _inertia(np.abs(turn).T @ other, turn)
     (row,) = _compared(tmp_path, box, box, inertia=inertia).listed
     assert row.quantity == "moments"
-    assert np.allclose([row.left, row.right], [near, other], rtol=1e-9, atol=0)
+    assert np.allclose(numbers(row.left, row.right), [near, other], rtol=1e-9, atol=0)
 
 
 @pytest.mark.parametrize("angle", [5, 90])

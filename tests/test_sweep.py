@@ -592,7 +592,7 @@ def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> No
         (tmp_path / "sweep.json").write_text(text)
         refused(*((BadInputError, r"sweep\.json is damaged", use) for use in (run, read)))
     (tmp_path / "sweep.json").write_text(json.dumps({**sweep.manifest(), "schema": 2}))
-    refused((BadInputError, r"has schema 2; this version reads 4", read))
+    refused((BadInputError, r"has schema 2; this version reads 5", read))
 
 
 def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> None:

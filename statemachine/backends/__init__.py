@@ -22,7 +22,7 @@ from ..errors import BadInputError, EngineWarning, MissingEngineError, check_nam
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..interface.checks import as_switch
-from ..interface.records import AS_WRITTEN, BASES, Base, Defaults, ReadOptions
+from ..interface.records import AS_WRITTEN, Base, Defaults, FreeBase, ReadOptions
 from ..model_files import checked_path
 from ..models import AnyPath
 from ..release_names import is_release, version_of
@@ -182,6 +182,29 @@ def register(name: str, loader: str) -> None:
         raise BadInputError(f"there is a backend named {name!r} already; choose another name")
 
 
+def _loader_at(place: str, backend: str) -> Callable[..., Model]:
+    """Return the function of a backend that loads a file.
+
+    Args:
+        place: Where it stands, as "module:function".
+        backend: As of `load`.
+
+    Raises:
+        MissingEngineError: It cannot be imported.
+    """
+    module, _, function = place.partition(":")
+    try:
+        loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
+    except (ImportError, AttributeError) as error:
+        raise_if_interrupted(error)
+        raise MissingEngineError(
+            f"backend {backend!r} cannot be loaded from {place!r}: {error}", engine=backend
+        ) from error
+    if is_release(backend):
+        return partial(loader, release=backend)
+    return loader
+
+
 def load(
     model: AnyPath,
     backend: str = DEFAULT,
@@ -191,7 +214,7 @@ def load(
     trust_binary: bool = False,
     balance_inertia: bool = False,
     meshes: bool = True,
-    base: Base | None = None,
+    base: Base | FreeBase | None = None,
     **options: Any,
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
@@ -216,8 +239,8 @@ def load(
             what touches nothing then.
         base: "free" for a robot whose base floats: where the file has no free joint for it, as a
             URDF without a floating joint, it gets one, and starts where it stands in the file (of
-            a URDF at the origin). "fixed" for one whose base stands there: a free joint of it is
-            left out. None for what the file says.
+            a URDF at the origin); a `FreeBase` says where. "fixed" for one whose base stands: a
+            free joint of it is left out. None for what the file says.
         **options: As `Model.replace` takes them, before anything of the file is refused:
             `contacts=False` loads a robot of whose geoms the engine knows no shape.
 
@@ -237,28 +260,20 @@ def load(
         )
     place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))
-    if base is not None:
-        check_name("base", base, BASES)
     path = checked_path(model, menagerie)
     if as_switch(trust_binary, "trust_binary") and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
     if backend in ENGINES:
         require(backend)
-    module, _, function = place.partition(":")
-    try:
-        loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
-    except (ImportError, AttributeError) as error:
-        raise_if_interrupted(error)
-        raise MissingEngineError(
-            f"backend {backend!r} cannot be loaded from {place!r}: {error}", engine=backend
-        ) from error
-    if is_release(backend):
-        loader = partial(loader, release=backend)
+    loader = _loader_at(place, backend)
     read_options = ReadOptions(
         balance_inertia=as_switch(balance_inertia, "balance_inertia"),
         meshes=as_switch(meshes, "meshes"),
-        base=base,
     )
+    if base is not None:
+        from ..interface.read_options import with_base
+
+        read_options = with_base(read_options, base)
     takes = inspect.signature(loader).parameters
     takes_options = "options" in takes
     early: dict[str, Any] = {"options": options} if options and takes_options else {}
@@ -314,7 +329,7 @@ def on_default(model: Model) -> Model:
             model.path,
             balance_inertia=read.balance_inertia,
             meshes=read.meshes,
-            base=read.base,
+            base=read.base if read.start is None else read.start,
         )
 
 

@@ -16,7 +16,8 @@ named by its absolute path, with `strippath` off, which each release of MuJoCo r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -24,8 +25,11 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
-from ..interface.records import AS_WRITTEN, ReadOptions
+import numpy as np
+
+from ..interface.records import AS_WRITTEN, FreeBase, ReadOptions
 from ..models import mesh_file, what_is_there
+from ..rotations import matrix_from_quat
 
 # Suffixes by which MuJoCo knows that a file is XML.
 _KNOWN = (".xml", ".urdf")
@@ -63,11 +67,13 @@ class BaseOfText:
         link: The base.
         joint: Name of the joint of type floating: of the one that is added, or that is made fixed.
         is_free: Whether the base floats.
+        start: Where a free base is in the default state; None for where it stands in the file.
     """
 
     link: str
     joint: str
     is_free: bool
+    start: FreeBase | None = None
 
 
 def urdf_text(
@@ -138,6 +144,26 @@ def _set_base(root: Element, base: BaseOfText) -> None:
         ElementTree.SubElement(joint, "child", link=base.link)
     joint.set("name", base.joint)
     joint.set("type", "floating")
+    if base.start is not None:
+        origin = joint.find("origin")
+        if origin is None:
+            origin = ElementTree.SubElement(joint, "origin")
+        origin.set("xyz", _numbers(base.start.pos))
+        origin.set("rpy", _numbers(_roll_pitch_yaw(base.start.quat)))
+
+
+def _numbers(values: Iterable[float]) -> str:
+    """Return numbers as an attribute has them."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _roll_pitch_yaw(quat: Sequence[float]) -> tuple[float, float, float]:
+    """Return the angles [rad] about the fixed x, y and z axes of a quaternion, (w, x, y, z)."""
+    matrix = matrix_from_quat(np.array(quat) / np.linalg.norm(quat))
+    roll = math.atan2(matrix[2, 1], matrix[2, 2])
+    pitch = math.atan2(-matrix[2, 0], math.hypot(matrix[2, 1], matrix[2, 2]))
+    yaw = math.atan2(matrix[1, 0], matrix[0, 0])
+    return roll, pitch, yaw
 
 
 def _end(joint: Element, tag: str) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BadInputError
+from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
 from .common import (
     SAYS_NO,
@@ -17,7 +19,6 @@ from .common import (
     add_menagerie,
     add_model,
     add_seconds,
-    complain,
     experiments,
     flag_of,
     resumable,
@@ -27,7 +28,7 @@ from .common import (
 
 if TYPE_CHECKING:
     from ..lab.sweep import Sweep
-    from ..lab.sweep.questions import SweepReportRequest, SweepRequest
+    from ..lab.sweep.questions import SweepEffectsRequest, SweepReportRequest, SweepRequest
 
 # Options of a run, which the report of a dataset has no use for, and what they are by default.
 _OF_A_RUN: dict[str, object] = {
@@ -83,9 +84,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="what changes; see above",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="the folder of the dataset; a new one, or to go on"
+        "--out",
+        metavar="DIR",
+        help="the folder of the dataset; a new one, or to go on (with --report none: it is not "
+        "kept)",
     )
-    add_backend(parser, "an engine, or all; may be repeated (all)")
+    add_backend(parser, f"an engine, or all; may be repeated (all; with --report {DEFAULT})")
     parser.add_argument(
         "--seeds",
         type=typed_int,
@@ -106,7 +110,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_menagerie(parser)
     add_json(parser, "summary, or the report,")
     first = ("what", "model", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs")
-    shorten_help(parser, first=(*first, "report", "json"))
+    shorten_help(parser, first=(*first, "report", "quantity", "details", "json"))
 
 
 def _add_ranges(group: argparse._ArgumentGroup) -> None:
@@ -185,8 +189,13 @@ def _add_report(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--quantity",
         metavar="NAME",
-        help="a column of the dataset, or one number of it: energy, qpos[0], … (sample_tip of two "
-        "engines, tip[2] of one)",
+        help='a column of the dataset, or one number of it: "base x", distance, fell, energy, '
+        "qpos[0], … (of a robot that floats the base; else the site)",
+    )
+    group.add_argument(
+        "--details",
+        action="store_true",
+        help="the report with all parameters, and the mean at each value",
     )
 
 
@@ -216,7 +225,7 @@ def _sweep_of(options: argparse.Namespace) -> Sweep:
     return Sweep(
         what=options.what,
         vary=options.vary,
-        backends=options.backend or ("all",),
+        backends=_backends_of(options),
         seeds=options.seeds,
         samples=options.samples,
         design_seed=options.design_seed,
@@ -229,6 +238,30 @@ def _sweep_of(options: argparse.Namespace) -> Sweep:
         moments=options.moments,
         timeout=options.timeout,
     )
+
+
+def _backends_of(options: argparse.Namespace) -> tuple[str, ...]:
+    """Return the engines of a run: all of them, or one for a report of what moves a quantity."""
+    if options.backend:
+        return tuple(options.backend)
+    return ("all",) if options.report is None else (DEFAULT,)
+
+
+def effects_request_of(options: argparse.Namespace) -> SweepEffectsRequest:
+    """Return the sweep that is to be run, and what is asked of it.
+
+    Raises:
+        BadInputError: A value is out of range, or three engines are named.
+        UnknownNameError: There is no such experiment or quantity.
+    """
+    from ..lab.sweep.questions import SweepEffectsRequest
+
+    return SweepEffectsRequest(request_of(options), options.quantity, _reported_of(options))
+
+
+def _reported_of(options: argparse.Namespace) -> tuple[str, ...]:
+    """Return the engines that a report names."""
+    return tuple(name for name in options.backend or () if name != "all")
 
 
 def report_request_of(options: argparse.Namespace, folder: str) -> SweepReportRequest:
@@ -244,22 +277,21 @@ def report_request_of(options: argparse.Namespace, folder: str) -> SweepReportRe
     """
     from ..lab.sweep.questions import SweepReportRequest
 
-    backends = tuple(name for name in options.backend or () if name != "all")
-    return SweepReportRequest(folder, options.quantity, backends)
+    return SweepReportRequest(folder, options.quantity, _reported_of(options))
 
 
 def run(options: argparse.Namespace) -> int:
     """Run what is missing, and say what there is, or what moves a quantity of it."""
     _check_options(options)
     if options.report is None:
-        return _run_sweep(options, None)
+        return _run_sweep(options)
     if options.report is True:
-        return _run_sweep(options, report_request_of(options, options.out))
+        return _run_and_report(options)
     from ..lab.sweep.page import page
     from ..lab.sweep.questions import answer_report
 
     effects = answer_report(report_request_of(options, options.report))
-    return show(page(effects), effects, options.json)
+    return show(page(effects, options.details), effects, options.json)
 
 
 def _check_options(options: argparse.Namespace) -> None:
@@ -268,17 +300,22 @@ def _check_options(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: It does not.
     """
-    runs = options.what is not None and options.out is not None
     if options.quantity is not None and options.report is None:
         raise BadInputError("--quantity goes with --report")
+    if options.details and options.report is None:
+        raise BadInputError("--details goes with --report")
     if "" in (options.out, options.report):
         raise BadInputError("the folder of a sweep has no name: say --out DIR, or --report DIR")
-    if options.report is None and not runs:
+    if options.report is None and (options.what is None or options.out is None):
         raise BadInputError(
             "a sweep wants WHAT and --out DIR; the report of a dataset --report DIR"
         )
-    if options.report is True and not runs:
-        raise BadInputError("--report wants the folder of a dataset, or WHAT and --out DIR to run")
+    if options.report is True and options.what is None:
+        raise BadInputError("--report wants the folder of a dataset, or WHAT to run")
+    if options.report is True and options.out is None and (options.extend or options.retry_failed):
+        raise BadInputError(
+            "--extend and --retry-failed are of a dataset: say which with --out DIR"
+        )
     if options.report not in (None, True):
         _check_options_of_report(options)
 
@@ -300,25 +337,32 @@ def _check_options_of_report(options: argparse.Namespace) -> None:
             raise BadInputError(f"{flag_of(name)} is of a run, and --report DIR runs nothing")
 
 
-def _run_sweep(options: argparse.Namespace, asked: SweepReportRequest | None) -> int:
-    """Run a sweep, and show its summary and what is asked of it then."""
-    from ..lab.sweep.page import page, summary_page
-    from ..lab.sweep.questions import answer, answer_report
+def _run_sweep(options: argparse.Namespace) -> int:
+    """Run a sweep, and show its summary."""
+    from ..lab.sweep.page import summary_page
+    from ..lab.sweep.questions import answer
 
     request = request_of(options)
-    otherwise = ", without --retry-failed," if request.retry_failed else ""
-    with resumable(Path(request.folder), "done", otherwise):
+    with _resumable(options):
         summary = answer(request, TerminalReporter())
-    failed = SAYS_NO if summary.failed else 0
-    if asked is None or not options.json:
-        show(summary_page(summary), summary, options.json)
-    if asked is None:
-        return failed
-    try:
-        effects = answer_report(asked)
-    except BadInputError as error:
-        if not summary.failed:
-            raise
-        return complain(error, SAYS_NO)  # there is nothing that it could be about
-    show(page(effects), {"summary": summary, "report": effects}, options.json)
-    return failed
+    show(summary_page(summary), summary, options.json)
+    return SAYS_NO if summary.failed else 0
+
+
+def _run_and_report(options: argparse.Namespace) -> int:
+    """Run a sweep, and show what moves a quantity of it."""
+    from ..lab.sweep.page import page
+    from ..lab.sweep.questions import answer_effects
+
+    request = effects_request_of(options)
+    with _resumable(options):
+        result = answer_effects(request, TerminalReporter())
+    show(page(result.report, options.details), result, options.json)
+    return SAYS_NO if result.summary.failed else 0
+
+
+def _resumable(options: argparse.Namespace) -> AbstractContextManager[None]:
+    """Say, where a Ctrl-C ends a sweep, how it goes on; one that is not kept begins anew."""
+    otherwise = ", without --retry-failed," if options.retry_failed else ""
+    written = None if options.out is None else Path(options.out)
+    return resumable(written, "done", otherwise)

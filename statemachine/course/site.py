@@ -11,11 +11,13 @@ from ..atomic_files import replace_bytes
 from ..backends import backend_names, load
 from ..errors import MissingEngineError
 from ..installed import available
-from ..lab.compare import Request, compare, run_sides, witness
+from ..lab.compare import Request
 from ..lab.probes.conventions import page as conventions
 from ..lab.probes.conventions import probe, run_phrases
-from ..lab.questions import compare_page as comparison
+from ..lab.questions import comparison
+from ..lab.questions.comparison import origin_of, title_of
 from ..lab.questions.film import drawn_picture
+from ..lab.questions.requests.gap import CompareRequest, answer
 from ..lab.runs.scenarios import scenario
 from ..lab.why import WhyRequest, explain
 from ..lab.why import page as why
@@ -91,17 +93,17 @@ def make_comparisons(folder: Path) -> list[Path]:
     written = []
     for name in ("hold", "gravity", "box"):
         print(f"comparing: {name} ...")
-        run = run_sides(Request((name,)))
-        left, right = run.traces
-        compared = compare(left, right, robot=run.robot)
-        page = comparison.page(compared, said=run.said, witness=witness(left, right))
+        result = answer(CompareRequest(Request((name,))))
+        (left, right), compared = result.run.traces, result.comparison
+        page = comparison.page(result, details=True)
+        page = replace(page, title=title_of(compared), origin=origin_of(compared))
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
             for curve in compared.curves
             if curve.kind == "joint"
         }
         apart = Traces("How far apart", "time [s]", "difference [°]", curves, log=True)
-        page = replace(page, blocks=[page.blocks[0], apart, *page.blocks[1:]])
+        page = replace(page, blocks=[apart, *page.blocks])
         written.append(_write(folder, name, page, f"statemachine compare {name}"))
         if not (left.header.recorded or right.header.recorded):
             page = _why_as_they_come(name, (left.header.backend, right.header.backend))

@@ -17,7 +17,14 @@ if TYPE_CHECKING:
     from ..show.drawing.scene import Camera, Drawer
     from .call_watch import CallWatch
     from .measured import Phrases
-    from .records import Dials, EngineTerm, UncommandedJoint, WayBack
+    from .records import (
+        Dials,
+        EngineTerm,
+        KnownChange,
+        RunArrays,
+        UncommandedJoint,
+        WayBack,
+    )
 
 
 class RawEngine(CompiledModels):
@@ -52,6 +59,12 @@ class RawEngine(CompiledModels):
 
     def read_otherwise(self, left: Model, right: Model) -> list[str]:
         """Say what only one of two releases of the engine reads in the file of both Models."""
+        return []
+
+    def known_changes(
+        self, left: Model, right: Model, runs: tuple[RunArrays, RunArrays]
+    ) -> list[KnownChange]:
+        """Return the known changes between two releases that concern a run of both."""
         return []
 
     # The engine as it comes. Nothing here goes through an adapter that emulates the contract.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ..interface import Array, Model
+from ..interface import Array, Ints, Model
 from ..rotations import Placement
 
 Setting = Literal["model", "off"]  # of a dial; one that is not named is as it comes
@@ -232,3 +232,52 @@ class ModelDifference:
     def title(self) -> str:
         """What it is, and of what."""
         return f"{self.subject} of {self.where}" if self.where else self.subject
+
+
+@dataclass(frozen=True, eq=False)
+class RunArrays:
+    """What a run was, as arrays: a row for each moment.
+
+    Attributes:
+        qpos: (n, nq) positions.
+        qvel: (n, nv) velocities.
+        ctrl: (n, nu) commands.
+        act: (n, na) activations; (n, 0) where they were not recorded.
+        contact_geom: (k, 2) ids of the geoms of each contact of the run.
+    """
+
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+    act: Array
+    contact_geom: Ints
+
+
+KnownChangeName = Literal[
+    "kv of a limited servo",
+    "boxes in contact",
+    "cylinders in contact",
+    "mimic of a URDF",
+    "turned inertial of a URDF",
+]
+
+
+@dataclass(frozen=True)
+class KnownChange:
+    """A known change between two releases of an engine, as its probe shows it on both.
+
+    Attributes:
+        name: Which change.
+        probe: What was measured, as the engine's probes call it.
+        left, right: What the probe measures on the release of each side: the part of kv that is in
+            the derivative, a number of contact points, a number of equality constraints, or a
+            product of inertia [kg m²].
+        elements: What of the model it concerns in this run: actuators, pairs of bodies, joints or
+            links, by name.
+    """
+
+    name: KnownChangeName
+    probe: str
+    left: float
+    right: float
+    elements: tuple[str, ...]

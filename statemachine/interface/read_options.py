@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
-from ..errors import check_name
-from .checks import HasCapabilities, as_switch, unsupported, unsupported_by
-from .records import AS_WRITTEN, BASES, READ_OPTIONS, ReadOptions
+from ..errors import BadInputError, check_name
+from .checks import HasCapabilities, as_switch, as_vector, unsupported, unsupported_by
+from .records import AS_WRITTEN, BASES, READ_OPTIONS, Base, FreeBase, ReadOptions
 
 
 class WasRead(HasCapabilities, Protocol):
@@ -15,6 +16,23 @@ class WasRead(HasCapabilities, Protocol):
 
     @property
     def read_options(self) -> ReadOptions: ...
+
+
+def with_base(options: ReadOptions, base: Base | FreeBase) -> ReadOptions:
+    """Return options of reading with the base of `load`.
+
+    Raises:
+        UnknownNameError: It is neither "free" nor "fixed" nor a FreeBase.
+        BadInputError: A number of where it starts is not finite, or its quaternion is zero.
+    """
+    if not isinstance(base, FreeBase):
+        check_name("base", base, BASES)
+        return replace(options, base=base)
+    pos = as_vector(base.pos, (3,), "pos of the base").tolist()
+    quat = as_vector(base.quat, (4,), "quat of the base")
+    if not quat.any():
+        raise BadInputError("quat of the base is zero: it is no rotation")
+    return replace(options, base="free", start=FreeBase(tuple(pos), tuple(quat.tolist())))
 
 
 def told(options: ReadOptions) -> dict[str, bool | str]:

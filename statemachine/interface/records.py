@@ -78,6 +78,19 @@ OPTIONS = (
 
 
 @dataclass(frozen=True)
+class FreeBase:
+    """A base that floats, and where it is in the default state: what `load` takes for "free".
+
+    Attributes:
+        pos: (3,) its place in world axes [m].
+        quat: (4,) its rotation, (w, x, y, z).
+    """
+
+    pos: tuple[float, float, float]
+    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class ReadOptions:
     """How the file of a Model is read, beside what it says itself: options of `load` alone.
 
@@ -88,11 +101,13 @@ class ReadOptions:
             their files, and nothing touches, or weighs, what they alone gave shape.
         base: "free" where the base of the robot gets a free joint, "fixed" where it has none; None
             for what the file says. A URDF without a floating joint says nothing, and is fixed.
+        start: Where a free base is in the default state; None for where it stands in the file.
     """
 
     balance_inertia: bool = False
     meshes: bool = True
     base: Base | None = None
+    start: FreeBase | None = None
 
 
 AS_WRITTEN = ReadOptions()

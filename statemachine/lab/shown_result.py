@@ -64,7 +64,7 @@ class ShownResult(ABC):
         """
         from ..show.terminal import text_of
 
-        return text_of(self.page(details))
+        return text_of(self.page(details)).strip("\n")
 
     def to_json(self) -> str:
         """Return what the command prints with --json."""

@@ -12,6 +12,7 @@ from .blocks import (
     Block,
     Code,
     Heading,
+    Headline,
     Page,
     Printed,
     Question,
@@ -64,7 +65,7 @@ def text_of(page: Page) -> str:
     """Return a page as `show` prints it where nobody sits: 80 columns wide, without colours."""
     parts: list[str] = []
     _Printer(_piped, parts.append).page(page, "")
-    return "".join(parts).strip("\n")
+    return "".join(parts)
 
 
 def _print(text: str) -> None:
@@ -126,7 +127,10 @@ class _Printer:
 
     def page(self, page: Page, footer: str) -> None:
         """Print a page, and a last line under it."""
-        self.write([page])
+        if page.headline:  # the answer comes first
+            self.answer(page.headline)
+        if page.title:
+            self.write([page])
         blocks = [block for block in page.blocks if not isinstance(block, RobotPicture)]
         for block, following in zip(blocks, [*blocks[1:], None], strict=True):
             if isinstance(block, Question):
@@ -139,6 +143,11 @@ class _Printer:
     def write(self, blocks: Sequence[Page | Block]) -> None:
         """Print blocks."""
         self._tell(_text(self._console(), blocks))
+
+    def answer(self, headline: Headline) -> None:
+        """Print the answer of the page, as its first line."""
+        text = _text(self._console(), [Verdict(headline.text, headline.holds)])
+        self._tell(text.removeprefix("\n"))
 
     def ask(self, question: Question) -> None:
         """Let the reader predict; without one, answer a question that is for everybody."""
@@ -169,15 +178,13 @@ class _Printer:
                 self._reader.go_on()
 
     def end(self, page: Page, views: Sequence[str], footer: str) -> None:
-        """Print the last lines: the score, how to look at the robot, the headline, the footer."""
+        """Print the last lines: the score, how to look at the robot, the footer."""
         last: list[Block] = []
         if len(self._answered) > 2:  # of so few there is no score
             right = sum(self._answered)
             last.append(Text(f"You had {right} of {len(self._answered)} right."))
         if self._reader and views and find_spec("viser"):  # else nothing here can show it
             last.append(Text(f"To look at it: {views[0]}"))
-        if page.headline:  # last, where it stays in sight
-            last.append(Verdict(page.headline.text, page.headline.holds))
         if footer:
             last.append(Text(footer))
         self.write(last)

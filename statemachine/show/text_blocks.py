@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Container, Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from .blocks import Block, Code, Heading, Items, Page, Printed, Table, Text, Verdict
@@ -185,11 +186,37 @@ def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) ->
         least[max(range(len(least)), key=lambda k: (name[k], least[k]))] -= 1
     free = max(free, 0)
     wants = [max(map(cell_len, cells)) - size for cells, size in zip(columns, least, strict=True)]
+    shared, in_turn = (_widened(least, wants, free, share) for share in (True, False))
+    return min((shared, in_turn), key=lambda widths: _height(rows, widths))
+
+
+def _widened(
+    least: Sequence[int], wants: Sequence[int], free: int, is_shared: bool
+) -> Sequence[int]:
+    """Return widths of columns, with the room that is free given to those that want least first.
+
+    Args:
+        least: The widths that they have at least.
+        wants: How much more each wants.
+        free: How much more there is.
+        is_shared: Whether no column takes more than its share of what is left.
+    """
+    widths = list(least)
     ranked = sorted(range(len(least)), key=wants.__getitem__)  # figures before sentences
     for taken, k in enumerate(ranked):
-        more = min(wants[k], free // (len(ranked) - taken))
-        least[k], free = least[k] + more, free - more
-    return least
+        limit = free // (len(ranked) - taken) if is_shared else free
+        more = min(wants[k], limit)
+        widths[k], free = widths[k] + more, free - more
+    return widths
+
+
+def _height(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> int:
+    """Return how many lines rows take in columns of some widths, about."""
+    total = 0
+    for row in rows:
+        heights = [len(wrap(cell, width)) for cell, width in zip(row, widths, strict=True)]
+        total += max(1, *heights)
+    return total
 
 
 def _hanging(mark: str | RichText, text: RichText) -> RenderableType:

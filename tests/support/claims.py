@@ -7,6 +7,7 @@ from collections.abc import Callable, Container
 from functools import partial
 from typing import Any, TypeVar
 
+import numpy as np
 import pytest
 
 from statemachine.errors import EngineWarning, StateMachineError
@@ -59,3 +60,8 @@ def warnings_of(call: Callable[[], T]) -> tuple[T, str]:
         result = call()
     assert {warning.category for warning in told} <= {EngineWarning}
     return result, " ".join(str(warning.message) for warning in told)
+
+
+def numbers(*values: object) -> np.ndarray:
+    """Return values that must be numbers, or lists of as many, as an array."""
+    return np.array(values, dtype=float)

@@ -33,6 +33,8 @@ class UrdfFile:
         floats: Whether PyBullet floats its base, which is its default: where `load` was told
             base="free", or the file has a joint of type floating. Else it is fixed to the world, as
             MuJoCo's compiler does, by `useFixedBase`.
+        may_float: Whether it would float in PyBullet, unless it is told to fix it: the first link
+            is no "world", which weighs nothing there.
         without_inertial: Links to which PyBullet gives 1 kg.
         mimics: Joints that follow another one by the file, and none in PyBullet.
         floating: Joints of type floating: PyBullet fixes them.
@@ -41,6 +43,7 @@ class UrdfFile:
     path: Path
     content: bytes
     floats: bool
+    may_float: bool
     without_inertial: tuple[str, ...]
     mimics: tuple[str, ...]
     floating: tuple[str, ...]
@@ -94,6 +97,7 @@ class UrdfFile:
             path=path.absolute(),
             content=content,
             floats=floats,
+            may_float=roots != ["world"],
             without_inertial=tuple(name for name in light if name not in still),
             mimics=mimics,
             floating=floating,

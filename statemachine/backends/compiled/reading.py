@@ -10,11 +10,12 @@ the compiled model changes for it, but `stat.extent` and `stat.center`, of which
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import BadInputError
-from ...interface.records import Base, ReadOptions
+from ...interface.records import ReadOptions
 from ...measures.text import few, listed
 from ..file_text import BaseOfText
 from ..repair_record import Repair
@@ -79,7 +80,7 @@ def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> list[Repair]:
     """
     if options.base is not None:
         try:
-            set_base(spec, options.base)
+            set_base(spec, options.base, None if options.start is None else asdict(options.start))
         except ValueError as error:
             raise BadInputError(str(error)) from None
     repairs: list[Repair] = []
@@ -90,21 +91,24 @@ def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> list[Repair]:
     return repairs
 
 
-def base_of_text(path: Path, base: Base) -> BaseOfText | None:
+def base_of_text(path: Path, options: ReadOptions) -> BaseOfText | None:
     """Return what is written into a URDF so that its base is as asked; None if it is already.
 
     Args:
         path: The file, which compiles with this base.
-        base: What is asked.
+        options: What is asked of its base, if anything.
     """
+    if options.base is None:
+        return None
     spec = read_spec(path)
     root = root_of(spec)
     joint = free_joint_of(root)
-    is_free = base == "free"
-    if (joint is not None) is is_free:
+    is_free = options.base == "free"
+    if (joint is not None) is is_free and options.start is None:
         return None
-    name = free_joint_name(spec) if joint is None else joint.name
-    return BaseOfText(root.name, name, is_free)
+    if joint is None:
+        return BaseOfText(root.name, free_joint_name(spec), is_free, options.start)
+    return BaseOfText(joint.parent.name, joint.name, is_free, options.start)
 
 
 def keep_frames(spec: mujoco.MjSpec) -> None:

@@ -70,9 +70,10 @@ class MuscleCurves(NamedTuple):
 
 def muscle_curves(model: MjModel, actuator: int) -> MuscleCurves:
     """Return the curves of an actuator that is a muscle."""
+    output = int(model.actuator_outadr[actuator])
     muscle = {
-        "lengthrange": model.actuator_lengthrange[actuator],
-        "acc0": model.actuator_acc0[actuator],
+        "lengthrange": model.actuator_lengthrange[output],
+        "acc0": model.actuator_acc0[output],
     }
     gain, bias = model.actuator_gainprm[actuator, :9], model.actuator_biasprm[actuator, :9]
     return MuscleCurves(

@@ -36,6 +36,10 @@ _NO_EDITS = MappingProxyType[str, Any]({})
 _INSTALLED = f"MuJoCo {mujoco.__version__}"
 
 
+# Of an option of reading: a switch, whether a base floats, or where it starts, by "pos" and "quat".
+ReadValue = bool | str | None | Mapping[str, tuple[float, ...]]
+
+
 @dataclass(frozen=True)
 class EngineSource:
     """What an engine in a Python of its own reads of a file.
@@ -47,7 +51,7 @@ class EngineSource:
     """
 
     text: str = ""
-    read: Mapping[str, bool | str | None] = field(default_factory=dict)
+    read: Mapping[str, ReadValue] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +89,13 @@ def source_of(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineS
         UnsupportedError: The engine is none, and reads an MJCF as it is written.
     """
     if path.suffix.lower() == ".urdf":
+        from ..compiled.reading import balanced_moments, base_of_text
         from ..file_text import urdf_text
 
         moments: dict[str, float] = {}
         if options.balance_inertia:
-            from ..compiled.reading import balanced_moments
-
             moments = balanced_moments(path)
-        base = None
-        if options.base is not None:
-            from ..compiled.reading import base_of_text
-
-            base = base_of_text(path, options.base)
-        text = urdf_text(path, options=options, moments=moments, base=base)
+        text = urdf_text(path, options=options, moments=moments, base=base_of_text(path, options))
         return EngineSource() if text is None else EngineSource(text)
     if options == AS_WRITTEN:
         return EngineSource()
@@ -214,7 +212,7 @@ def _reading_of(
     return raw
 
 
-def _read(source: EngineSource) -> dict[str, dict[str, bool | str | None]]:
+def _read(source: EngineSource) -> dict[str, dict[str, ReadValue]]:
     """Return how an engine reads a file, as an argument of its process, if not as it is written."""
     return {"read": dict(source.read)} if source.read else {}
 

@@ -21,7 +21,7 @@ _SIZES = {  # of a joint in qpos and in qvel
 _ON_JOINTS = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
-def set_base(spec, base):
+def set_base(spec, base, start=None):
     """Give the base of a robot a free joint, or take it away; keyframes keep their other numbers.
 
     A base that gets a free joint starts where it stands in the file, in keyframes, too. One that
@@ -30,6 +30,8 @@ def set_base(spec, base):
     Args:
         spec: A MjSpec that was not compiled.
         base: "free" or "fixed".
+        start: Where a free base is in the default state, "pos" (3,) [m] and "quat" (4,) by name;
+            None for where it stands in the file.
 
     Raises:
         ValueError: The file does not say which of several trees is the robot; or no free joint
@@ -39,8 +41,11 @@ def set_base(spec, base):
     joint = free_joint_of(root)
     if base == "fixed" and joint is not None:
         _take_away(spec, joint)
-    if base == "free" and joint is None:
-        _add(spec, root)
+    if base == "free":
+        if start is not None:
+            _place(spec, root if joint is None else joint.parent, start)
+        if joint is None:
+            _add(spec, root)
 
 
 def root_of(spec):
@@ -112,6 +117,14 @@ def _add(spec, root):
             key.qpos = np.r_[qpos[:place], start[place : place + 7], qpos[place:]]
         if len(qvel):
             key.qvel = np.r_[qvel[:dof], np.zeros(6), qvel[dof:]]
+
+
+def _place(spec, body, start):
+    """Put a body that stands on the world elsewhere."""
+    if body.frame is not None:
+        body.set_frame(spec.worldbody.add_frame())
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    body.pos, body.quat = start["pos"], start["quat"]
 
 
 def _take_away(spec, joint):

@@ -12,14 +12,14 @@ import runpy
 import mujoco
 
 
-def spec_with_options(file, balance_inertia, meshes, base):
+def spec_with_options(file, balance_inertia, meshes, base, start):
     """Return the spec of a file that is read with options."""
     if not hasattr(mujoco, "MjSpec"):
         raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads an MJCF as it is written")
     spec = mujoco.MjSpec.from_file(file)
     if base is not None:
         place = os.path.join(os.path.dirname(os.path.abspath(__file__)), "release_base.py")
-        runpy.run_path(place)["set_base"](spec, base)
+        runpy.run_path(place)["set_base"](spec, base, start)
     if balance_inertia:
         getattr(spec, "compiler", spec).balanceinertia = True
     if not meshes:

@@ -62,7 +62,7 @@ def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     from ...lab.questions.requests.models import answer
 
     result = answer(request, TerminalReporter())
-    return show(result.page(options.details or options.all), result, options.json)
+    return show(result.page(options.details), result, options.json)
 
 
 def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
@@ -97,7 +97,7 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     page = versions.page(result, options.details)
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
-    return show(page, result.figures(), options.json)
+    return show(page, result, options.json)
 
 
 def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
@@ -108,15 +108,15 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
 
     try:
         result = answer(request, TerminalReporter())
-    except EndedEarlyError as error:
+    except EndedEarlyError:
         until_then = CompareRequest(request.run, uncertainty=request.uncertainty)
-        return _run_compare(options, until_then, f"No cause is named: {error}.")
+        return _run_compare(options, until_then)
     return show(why.page(result, options.details), result, options.json)
 
 
-def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause: str = "") -> int:
+def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     """Compare both runs, write what is asked for, and show."""
-    from ...lab.questions import comparison
+    from ...lab.questions import compare_report, comparison
     from ...lab.questions.requests.gap import answer
     from ...lab.questions.run_files import find_renderer, write_page, write_tests
 
@@ -128,11 +128,10 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest, no_cause:
     if files.html is not None and not options.no_why:
         asked = explain_request_of(options, request.run)
     result = answer(request, reporter)
-    if files.html is None:
-        page = comparison.page(result, no_cause, details=options.details)
-    else:
-        page = comparison.whole_page(result, asked, typed(options, request.run), reporter)
-        line = write_page(files.html, result.run.traces, _shown(request.run), page)
+    page = comparison.page(result, options.details)
+    if files.html is not None:
+        whole = compare_report.whole_page(result, asked, typed(options, request.run), reporter)
+        line = write_page(files.html, result.run.traces, _shown(request.run), whole)
         print(line, file=sys.stderr)
     if files.junit is not None:
         write_tests(files.junit, [result.comparison])

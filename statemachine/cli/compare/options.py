@@ -223,7 +223,6 @@ def _add_models(group: argparse._ArgumentGroup) -> None:
         metavar="LEFT=RIGHT",
         help="a frame of the left and what the right calls it",
     )
-    group.add_argument("--all", action="store_true", help="a row for every figure that differs")
 
 
 # What options need of each other.
@@ -240,7 +239,7 @@ def check_options(options: argparse.Namespace) -> None:
     _need(options, ("write",), ("why", "models"))
     _exclude(options, "write", ("html",))
     _need(options, ("no_why",), ("html",))
-    _need(options, ("frame", "all"), ("models",))
+    _need(options, ("frame",), ("models",))
     _exclude(options, "uncertainty", ("no_chaos",))
     other_answers = ("why", "html", "plot", "film", "models", "uncertainty", "tolerance")
     _exclude(options, "one_step", other_answers)

@@ -20,6 +20,7 @@ _IN_TREE = {
     "geom": "geom",
     "site": "site",
     "camera": "camera",
+    "flexcomp": "flex",
 }
 _OF_A_LINK = {"collision": "geom", "visual": "visual"}  # in a URDF
 # The sections of an MJCF whose elements are all of one kind, and those where the tag tells.
@@ -29,6 +30,7 @@ _SECTIONS = {
     "equality": "equality",
     "sensor": "sensor",
     "keyframe": "keyframe",
+    "deformable": "flex",
 }
 _BY_TAG = ("contact", "custom")
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from ...errors import check_name
 from ...interface import Array
-from ...measures.text import command
 from ...rotations import HERE, Placement
 from .records import SCALAR, Link, Robot, RobotFrame
 from .tree import Group, GroupTree
@@ -55,16 +54,11 @@ class Matching:
         """The pair of a group of the first description."""
         return next((pair for pair in self.pairs if pair.left.number == number), None)
 
-    def notes(self) -> Iterator[str]:
-        """What was taken for one without a common name, or is of two kinds."""
+    def other_kinds(self) -> Iterator[str]:
+        """Yield a sentence for each joint that is of another kind in the other file."""
         for pair in self.pairs:
             a, b = pair.left.joint, pair.right.joint
-            if pair.by == "place" and a and b and a.name != b.name and a.kind in SCALAR:
-                yield (
-                    f"joint {a.name!r} on the left is taken for {b.name!r} on the right: one kind, "
-                    f"one place, one axis ({command(['--map', f'{a.name}=NAME'])} says otherwise)"
-                )
-            elif a and b and a.kind != b.kind:
+            if a and b and a.kind != b.kind:
                 yield f"joint {a.name!r} is a {a.kind} on the left and a {b.kind} on the right"
 
 

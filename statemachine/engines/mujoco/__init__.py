@@ -51,6 +51,7 @@ class MujocoEngine(RawEngine):
     counts = function_of(".mujoco.given_parts:counts")
     with_parts = function_of(".mujoco.given_parts:with_parts")
     read_otherwise = function_of(".mujoco.readings:read_otherwise")
+    known_changes = function_of(".mujoco.known_changes:known_changes")
     drawer = function_of(".mujoco.rendering:MujocoDrawer")
     drawing_environment = function_of(".mujoco.rendering:environment")
     drawing_diagnosis = function_of(".mujoco.rendering:diagnosis")

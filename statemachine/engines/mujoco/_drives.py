@@ -12,6 +12,7 @@ import numpy as np
 from ...backends.controls import ctrl_owners
 from ...installed import require
 from ...interface import JointType
+from ...measures.text import grouped
 from ..records import (
     Counterparts,
     DifferingQuantity,
@@ -139,6 +140,25 @@ def _rows(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
                 yield replace(row, values=values)
         else:
             yield in_units_of(motion_of(left, a), row)
+    yield from _outputs(sides, a, b)
+
+
+def _outputs(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """Rows of the outputs of an actuator, which are together one difference of it."""
+    left, right = sides.raws
+    count = min(int(left.actuator_outnum[a]), int(right.actuator_outnum[b]))
+    here, there = int(left.actuator_outadr[a]), int(right.actuator_outadr[b])
+    outputs = [(here + k, there + k) for k in range(count)]
+    name = name_of(left, "actuator", a)
+    has_range = any(
+        raw.actuator_gaintype[k] or raw.actuator_biastype[k] for raw, k in _both(sides, a, b)
+    )
+    rows = sides.rows("actuator", outputs, "output", name)
+    for subject, parts in grouped((row.subject, row) for row in rows).items():
+        if subject == "length range" and not has_range:
+            continue
+        edits = tuple(edit for part in parts for edit in part.edits)
+        yield in_units_of(motion_of(left, a), replace(parts[0], edits=edits))
 
 
 @dataclass(frozen=True)

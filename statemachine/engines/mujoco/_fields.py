@@ -99,7 +99,7 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
             "gains",
             ("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
         ),
-        FieldRow("gear", ("actuator_gear", "actuator_cranklength"), units={"cranklength": "m"}),
+        FieldRow("crank", ("actuator_cranklength",), "m"),
         FieldRow("force range", ("actuator_forcelimited", "actuator_forcerange"), "N·m"),
         FieldRow("dynamics", ("actuator_dynprm", "actuator_actearly"), when="actuator_dyntype"),
         FieldRow("range of its activation", ("actuator_actlimited", "actuator_actrange")),
@@ -110,12 +110,11 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
             "N·m·s",
             units={"dampingpoly": ""},
         ),
-        FieldRow(
-            "length range",
-            ("actuator_lengthrange",),
-            "rad",
-            when="actuator_gaintype actuator_biastype",
-        ),
+    ),
+    # Of each of its outputs, of which an actuator of a ball joint has three.
+    "output": (
+        FieldRow("gear", ("actuator_gear",)),
+        FieldRow("length range", ("actuator_lengthrange",), "rad"),
     ),
     "delay": (FieldRow("delay", ("actuator_delay",), "s"),),
     "group": (FieldRow("group", ("actuator_group",)),),
@@ -169,6 +168,21 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
         FieldRow("sensor", ("sensor_intprm", "sensor_delay", "sensor_interval", "sensor_history")),
         FieldRow("cutoff", ("sensor_cutoff",)),
     ),
+    "flex": (
+        FieldRow("filter", ("flex_contype", "flex_conaffinity")),
+        FieldRow("friction", ("flex_friction",)),
+        FieldRow("friction dimensions", ("flex_condim",)),
+        FieldRow("softness", ("flex_solref", "flex_solimp", "flex_solmix")),
+        FieldRow("priority", ("flex_priority",)),
+        FieldRow("margin", ("flex_margin", "flex_gap"), "m"),
+        FieldRow("radius", ("flex_radius",), "m"),
+        FieldRow("self-collision", ("flex_selfcollide", "flex_activelayers", "flex_passive")),
+        FieldRow(
+            "damping", ("flex_damping", "flex_edgedamping"), "s", units={"edgedamping": "N·s/m"}
+        ),
+        FieldRow("edge stiffness", ("flex_edgestiffness",), "N/m"),
+        FieldRow("yield", ("flex_yield",)),
+    ),
     "tree": (FieldRow("sleep policy", ("tree_sleep_policy",)),),
     "body": (FieldRow("weight taken off", ("body_gravcomp",)),),
 }
@@ -213,13 +227,14 @@ CHOICES = {
     "actuator_gaintype": "mjtGain",
     "actuator_biastype": "mjtBias",
     "tree_sleep_policy": "mjtSleepPolicy",
+    "flex_selfcollide": "mjtFlexSelf",
 }
 # Arrays whose entries are on or off.
 FLAGS_OF_ELEMENTS = frozenset(
     {
         *("jnt_limited", "jnt_actfrclimited", "jnt_actgravcomp", "tendon_limited"),
         *("tendon_actfrclimited", "actuator_ctrllimited", "actuator_forcelimited"),
-        *("actuator_actlimited", "actuator_actearly", "eq_active0"),
+        *("actuator_actlimited", "actuator_actearly", "eq_active0", "flex_passive"),
     }
 )
 # Arrays of an element of which a file may write the first numbers alone.
@@ -259,11 +274,14 @@ FATES = {
         "actuator_outnum eq_data eq_type eq_obj1id eq_obj2id eq_objtype wrap_objid wrap_prm "
         "wrap_type tendon_adr tendon_num pair_geom1 pair_geom2 exclude_signature mesh_vert "
         "mesh_vertadr mesh_vertnum mesh_face mesh_faceadr mesh_facenum hfield_data hfield_size "
-        "hfield_nrow hfield_ncol hfield_adr"
+        "hfield_nrow hfield_ncol hfield_adr flex_dim flex_interp flex_cellnum flex_edgeequality "
+        "flex_rigid flex_centered flex_plasticmode flex_vert flex_vert0 flex_vertnum flex_node "
+        "flex_node0 flex_nodenum flex_stiffness flex_bending flex_elem flex_elemnum flex_edge "
+        "flex_edgenum flexedge_rigid"
     ),
     # Compared whole: a model that has any can be compared, but is not brought to another.
     "whole": (
-        "flex_* plugin plugin_attr plugin_attradr body_plugin geom_plugin actuator_plugin "
+        "plugin plugin_attr plugin_attradr body_plugin geom_plugin actuator_plugin "
         "sensor_plugin actuator_history"
     ),
     # The state that a run starts in, which the comparison of runs brings over itself.
@@ -273,6 +291,7 @@ FATES = {
         # It shows the scene.
         "cam_* light_* mat_* tex_* skin_* *_rgba *_matid *_castshadow tendon_width "
         "mesh_normal* mesh_texcoord* mesh_facenormal mesh_facetexcoord flex_texcoord* "
+        "flex_elemtexcoord flex_flatskin "
         "light_texid "
         # It groups elements for the viewer.
         "*_group "
@@ -306,7 +325,9 @@ FATES = {
         "jnt_qposadr jnt_plasticadr tendon_plasticadr tendon_actuatorid tendon_invweight0 "
         "tendon_length0 tendon_treeid tendon_treenum tendon_type mesh_bvhadr mesh_bvhnum "
         "mesh_extrema mesh_graph mesh_graphadr mesh_octadr mesh_octnum mesh_poly* "
-        "pair_signature plugin_stateadr plugin_statenum"
+        "pair_signature plugin_stateadr plugin_statenum flex_*adr flex_bvhnum flex_edgeflap "
+        "flex_elemedge flex_elemlayer flex_nodebodyid flex_shell flex_shellnum flex_size "
+        "flex_vertbodyid flex_vertcell"
     ),
 }
 

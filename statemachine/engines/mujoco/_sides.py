@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...installed import require
 from ...rotations import Placement
 from ..description.shapes import one_to_one
 from ..records import TURNED, BodyPair, Counterparts, DifferingQuantity, Edit, ModelDifference
@@ -33,9 +34,18 @@ def zeros(names: Iterable[str], raw: Any, k: int) -> tuple[Edit, ...]:
     return tuple((name, (k,), 0 * getattr(raw, name)[k]) for name in names)
 
 
+def _own_name(raw: Any, kind: str, index: int) -> str:
+    """Return the name of an element as its file has it; "" of one without."""
+    if kind == "flex":  # of which an mjModel has no view
+        mujoco = require("mujoco")
+        name = mujoco.mj_id2name(raw, int(mujoco.mjtObj.mjOBJ_FLEX), index)
+        return name if name else ""
+    return getattr(raw, _COUNTED.get(kind, kind))(index).name
+
+
 def name_of(raw: Any, kind: str, index: int) -> str:
     """The name of an element; without one, its kind, number and owner."""
-    name = getattr(raw, _COUNTED.get(kind, kind))(index).name
+    name = _own_name(raw, kind, index)
     if name:
         return name
     if kind == "joint":  # by the body that it carries, which may have several
@@ -106,11 +116,10 @@ class Sides:
 
     def _names(self, kind: str) -> list[list[str]]:
         """Names of the elements of each model."""
-        word = _COUNTED.get(kind, kind)
         names: list[list[str]] = []
         for raw in self.raws:
-            element, count = getattr(raw, word), getattr(raw, f"n{word}")
-            names.append([element(k).name for k in range(count)])
+            count = getattr(raw, f"n{_COUNTED.get(kind, kind)}")
+            names.append([_own_name(raw, kind, k) for k in range(count)])
         return names
 
     def tell(

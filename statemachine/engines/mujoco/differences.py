@@ -21,6 +21,7 @@ from ..records import Counterparts, DifferingQuantity, Edit, ModelDifference, Qu
 from . import _fields as fields
 from ._drives import drives
 from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
+from ._flexes import flexes
 from ._geoms import Geoms
 from ._parts import places, weights
 from ._quantities import plain, quantity_of, same, word_in
@@ -52,7 +53,7 @@ def differences(
     """
     sides = Sides(left, right, pairs)
     found = list(_options(left, right, world))
-    for rows_of in (weights, places, _geoms, elements, equalities, drives, contact_pairs):
+    for rows_of in _COMPARED:
         found += rows_of(sides)
     found += _whole(left, right)
     return tuple(found)
@@ -60,6 +61,10 @@ def differences(
 
 def _geoms(sides: Sides) -> Iterable[ModelDifference]:
     return Geoms(sides).differences()
+
+
+# What is compared, in this order: geoms are in pairs before what refers to them.
+_COMPARED = (weights, places, _geoms, elements, equalities, drives, contact_pairs, flexes)
 
 
 def edited(raw: Any, edits: Iterable[Edit]) -> Any:
@@ -184,14 +189,13 @@ def _flag_bits() -> Iterator[tuple[str, str, int]]:
 
 
 def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
-    """What is compared as a whole and brought to nothing: deformable bodies, plugins."""
-    for subject, pattern in (("deformable bodies", "flex_"), ("plugins", "plugin")):
-        names = [n for n in dir(left) if n.startswith(pattern) and fields.known(n) == "whole"]
-        if not all(same(getattr(left, n), getattr(right, n)) for n in names):
-            counts = [int(getattr(raw, f"n{pattern.rstrip('_')}", 0)) for raw in (left, right)]
-            why = "they are compared as a whole, and not brought over"
-            value = DifferingQuantity("count", counts[0], counts[1])
-            yield ModelDifference(subject, "model", "", (value,), refused=why)
+    """What is compared as a whole and brought to nothing: plugins."""
+    names = [name for name in dir(left) if name.startswith("plugin")]
+    names = [name for name in names if fields.known(name) == "whole"]
+    if not all(same(getattr(left, name), getattr(right, name)) for name in names):
+        why = "they are compared as a whole, and not brought over"
+        value = DifferingQuantity("count", int(left.nplugin), int(right.nplugin))
+        yield ModelDifference("plugins", "model", "", (value,), refused=why)
 
 
 _GAINS = ("actuator_gainprm", "actuator_biasprm")

@@ -60,8 +60,10 @@ class PybulletEngine(RawEngine):
         from ...backends.bullet.file import UrdfFile
         from ...backends.pybullet_backend import PybulletModel
 
-        if not isinstance(model, PybulletModel) or model.defaults == "engine":
+        if not isinstance(model, PybulletModel):
             return []
+        if model.defaults == "engine":
+            return _of_its_loader(model)
         whole = UrdfFile.is_one(model.path)
         pairs = len(model.plan.surfaces.of_one_robot(whole))
         if not pairs:
@@ -128,3 +130,13 @@ class PybulletEngine(RawEngine):
         from ...backends import pybullet_backend
 
         return pybullet_backend
+
+
+def _of_its_loader(model: backend.PybulletModel) -> list[str]:
+    """Say that a base is fixed which the engine's own loader lets float, where nobody asked it."""
+    file = model.plan.file
+    if file is None or file.floats or model.read_options.base is not None or not file.may_float:
+        return []
+    return [
+        f"the base of {model.path.name} is fixed; PyBullet's own loader lets it float (base=free)"
+    ]

@@ -20,6 +20,7 @@ from ...measures import (
 )
 from ...measures.text import on
 from ..recordings import Trace
+from ..runs.floating import Bases, base_of
 from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
 from .motion import LeastMotion, MotionExtent, least_motions, motion_of, with_efforts
@@ -144,6 +145,8 @@ class Comparison:
         agreements: One for each quantity.
         notes: What makes the comparison less than one of two engines.
         motion: How far both sides move: where neither does, nothing was compared.
+        bases: Whether the base of the robot floats, on each side. Where one floats and the other is
+            fixed, the sides differ, whatever else agrees.
         touches: One for each pair of bodies that touches on either side.
         curves: The quantities over time; first touches have none.
     """
@@ -156,6 +159,7 @@ class Comparison:
     agreements: tuple[Agreement, ...]
     notes: tuple[str, ...]
     motion: MotionExtent
+    bases: Bases
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 
@@ -163,11 +167,14 @@ class Comparison:
     def outcome(self) -> ComparisonOutcome:
         """What came of it.
 
-        "ended" where a side ended before its time; "differs" where a quantity does not agree at
-        every moment; "nothing moved" where all agree, but there was nothing to compare.
+        "ended" where a side ended before its time; "differs" where one base floats and the other is
+        fixed, or a quantity does not agree at every moment; "nothing moved" where all agree, but
+        there was nothing to compare.
         """
         if self.ended:
             return "ended"
+        if self.bases.differ:
+            return "differs"
         if any(agreement.verdict != "agrees" for agreement in self.agreements):
             return "differs"
         return "agrees" if self.motion.is_compared else "nothing moved"
@@ -238,10 +245,11 @@ def compare(
         for agreement in agreements
         if agreement.note.startswith("no number")
     ]
-    notes = notes_on(left, right, common, strange)
-    motion = _motion(left, right, least_motions(tolerances), until)
+    moved = _motion(left, right, least_motions(tolerances), until)
+    motion = with_efforts(moved, curves, robot)
     left_side = SideRun(labels.long[0], labels.short[0], left)
     right_side = SideRun(labels.long[1], labels.short[1], right)
+    bases = Bases(base_of(left.header), base_of(right.header))
     return Comparison(
         left=left_side,
         right=right_side,
@@ -249,8 +257,9 @@ def compare(
         moments=len(common.time),
         until=until,
         agreements=tuple(agreements),
-        notes=tuple(notes),
-        motion=with_efforts(motion, curves, robot),
+        notes=tuple(notes_on(left, right, common, strange)),
+        motion=motion,
+        bases=bases,
         touches=pairs,
         curves=curves,
     )

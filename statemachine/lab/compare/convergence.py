@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ...errors import EndedEarlyError
 from ...interface import Array
-from ...measures import common_moments
+from ...measures import QUANTITIES, common_moments
+from ...show.blocks import only_on_pages
 from ..recordings import Trace
 from ..runs.drive import Progress, silent
 from .labels import labels_of
@@ -33,6 +34,8 @@ _MARGIN = 0.25  # of an extrapolation, that it may be off: a safety factor of 1.
 _LEVEL = 0.85  # of the largest of three gaps: then three quarters are left, at any such order
 _MOST = 0.75  # of the first gap: with so much left, it stays
 
+GapState = Literal["still", "rounding", "vanishes", "unclear", "in part", "stays"]
+TouchState = Literal["no gap", "discretisation", "gap"]
 LimitVerdict = Literal["rounding", "discretisation", "stays", "in part", "unclear"]
 
 
@@ -61,6 +64,30 @@ class GapLimit:
     moved: tuple[float, float]
     limit: float | None
     verdict: LimitVerdict
+
+    @property
+    @only_on_pages
+    def as_given(self) -> float:
+        """The gap with the steps as given [unit]."""
+        return self.gaps[0]
+
+    @property
+    @only_on_pages
+    def finest(self) -> float:
+        """The gap with the finest steps [unit]."""
+        return self.gaps[-1]
+
+    @property
+    @only_on_pages
+    def left_moved(self) -> float:
+        """How far the left is from its own run with the finest steps [unit]."""
+        return self.moved[0]
+
+    @property
+    @only_on_pages
+    def right_moved(self) -> float:
+        """How far the right is from its own run with the finest steps [unit]."""
+        return self.moved[1]
 
 
 @dataclass(frozen=True)
@@ -104,6 +131,61 @@ class Convergence:
     def unclear(self) -> bool:
         """Whether some gap has no steady order."""
         return any(limit.verdict == "unclear" for limit in (*self.whole, *self.before))
+
+    @property
+    @only_on_pages
+    def may_be_contact(self) -> bool:
+        """Whether two engines touch something, each by a contact law that depends on its step."""
+        return self.touch is not None and len(self.engines) > 1
+
+    @property
+    @only_on_pages
+    def state(self) -> GapState:
+        """What becomes of the gap over the whole run: that of the quantity that is told first."""
+        if self.is_still:
+            return "still"
+        if all(limit.verdict == "rounding" for limit in self.whole):
+            return "rounding"
+        if self.vanishes:
+            return "vanishes"
+        match self.lead.verdict:
+            case "unclear":
+                return "unclear"
+            case "in part":
+                return "in part"
+        return "stays"
+
+    @property
+    @only_on_pages
+    def lead(self) -> GapLimit:
+        """The quantity that is told first.
+
+        It is one whose gap stays, or one that is unclear, whichever are more often; of these a
+        coordinate if there is one, and of those with its unit the one with the largest gap.
+        """
+        stays = [limit for limit in self.whole if limit.verdict in ("stays", "in part")]
+        unclear = [limit for limit in self.whole if limit.verdict == "unclear"]
+        candidates: Sequence[GapLimit] = self.whole
+        if len(stays) > len(unclear):
+            candidates = stays
+        elif unclear:
+            candidates = unclear
+        coordinates = [limit for limit in candidates if QUANTITIES[limit.kind].own]
+        if coordinates:
+            candidates = coordinates
+        alike = [limit for limit in candidates if limit.unit == candidates[0].unit]
+        return max(alike, key=lambda limit: limit.finest)
+
+    @property
+    @only_on_pages
+    def until_touch(self) -> TouchState:
+        """Whether the gap that does not vanish begins with the first touch."""
+        verdicts = {limit.verdict for limit in self.before}
+        if self.touch is None or self.vanishes or not verdicts:
+            return "gap"
+        if verdicts == {"rounding"}:
+            return "no gap"
+        return "discretisation" if verdicts <= {"rounding", "discretisation"} else "gap"
 
 
 def convergence(

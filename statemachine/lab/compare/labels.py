@@ -14,6 +14,7 @@ from ...interface.options import OptionValue
 from ...measures import SAME, Common
 from ...measures.text import few, milliseconds, numbers, significant
 from ..recordings import Header, Trace
+from ..runs.floating import base_of
 from .series import joint_columns, tell
 
 Two = tuple[str, str]
@@ -124,7 +125,11 @@ def _apart(left: Header, right: Header) -> Iterator[Two]:
     elif left_digest != right_digest:
         last = left_file.split("/")[-1]
         yield f"{last} ({left_digest[:8]})", f"{last} ({right_digest[:8]})"
-    options = options_apart(_with_known(left, right), _with_known(right, left))
+    left_options, right_options = _with_known(left, right), _with_known(right, left)
+    if base_of(left) == base_of(right):  # one of them took it over, or the file of one says it
+        left_options.pop("base", None)
+        right_options.pop("base", None)
+    options = options_apart(left_options, right_options)
     if options[0] != options[1]:
         yield options
     if left.backend != right.backend or left.label != right.label:

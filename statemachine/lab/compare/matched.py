@@ -11,10 +11,37 @@ import numpy as np
 
 from ...backends.controls import ctrl_owners
 from ...engines.records import Counterparts, Pairs
-from ...interface import Array, Model, State
+from ...interface import Array, JointType, Model, State
 from ..recordings import SideStart
+from ..runs.floating import free_joint_of_robot
 
 Only = Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class RenamedPair:
+    """Two elements that go by other names, and are taken for one by what they share.
+
+    Attributes:
+        kind: "joint", "site" or "actuator".
+        left, right: Their names.
+        shared: What they share, in words.
+        suggestion: What to type where they are two.
+    """
+
+    kind: str
+    left: str
+    right: str
+    shared: str
+    suggestion: str
+
+    @property
+    def note(self) -> str:
+        """Both, in a sentence without its end."""
+        return (
+            f"{self.kind} {self.left!r} on the left is taken for {self.right!r} on the right: "
+            f"{self.shared} ({self.suggestion} says otherwise)"
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,20 +53,36 @@ class Matched(Counterparts):
         right: The right one.
         bodies: Pairs of ids.
         only: For each Model what it alone has: names, by "joint", "site" and "actuator".
-        notes: What a reader should know, in sentences.
+        renamed: What was taken for one although the names differ, and nobody said so.
+        other_notes: What a reader should know beside that, in sentences.
     """
 
     left: Model
     right: Model
     bodies: Pairs
     only: tuple[Only, Only]
-    notes: tuple[str, ...]
+    renamed: tuple[RenamedPair, ...]
+    other_notes: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know, in sentences."""
+        return (*(pair.note for pair in self.renamed), *self.other_notes)
 
     @property
     def reordered(self) -> bool:
         """Whether who writes ctrl by number meets other actuators on the right."""
         places = [right_id for _, right_id in self.actuators]
         return places != sorted(places)
+
+    @property
+    def only_beside_bases(self) -> tuple[Only, Only]:
+        """What each Model alone has, but for the free joint of the base of its robot."""
+        left, right = (
+            _without_base(model, only)
+            for model, only in zip((self.left, self.right), self.only, strict=True)
+        )
+        return left, right
 
     @property
     def joints_elsewhere(self) -> bool:
@@ -123,6 +166,25 @@ class Matched(Counterparts):
             for pair in self.joints:
                 places[side] += range(starts[pair[side]], starts[pair[side] + 1])
         return places
+
+
+def joint_name(model: Model, joint: int) -> str:
+    """Return the name of a joint; a free joint without one is that of its body."""
+    name = model.joint_names[joint]
+    if name or model.jnt_type[joint] != JointType.FREE:
+        return name or f"number {joint}"
+    body = int(model.jnt_bodyid[joint])
+    return f"free joint of {model.body_names[body] or f'body {body}'}"
+
+
+def _without_base(model: Model, only: Only) -> Only:
+    """Return what a Model alone has without the free joint of the base of its robot."""
+    joint = free_joint_of_robot(model)
+    if joint is None:
+        return only
+    base = joint_name(model, joint)
+    others = tuple(name for name in only.get("joint", ()) if name != base)
+    return {**only, "joint": others}
 
 
 def _entries(bodies: Iterable[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:

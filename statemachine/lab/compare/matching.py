@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from ...engines import room
-from ...engines.description.match import Matching, Pair, match, renamed
+from ...engines.description.match import SCALAR, Matching, Pair, match, renamed
 from ...engines.description.records import Robot
 from ...engines.description.shapes import one_to_one
 from ...engines.description.tree import GroupTree
@@ -20,8 +20,9 @@ from ...engines.records import BodyPair, Pairs
 from ...errors import BadInputError, check_name
 from ...installed import DEFAULT
 from ...interface import Model
+from ...measures.text import command
 from ...rotations import HERE, Placement
-from .matched import Matched, Only
+from .matched import Matched, Only, RenamedPair, joint_name
 
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
 
@@ -98,6 +99,7 @@ def match_models(
     actuators = _actuators(left, right, joints, names)
     only_left = _only((left, right), 0, joints, actuators, sites)
     only_right = _only((right, left), 1, joints, actuators, sites)
+    by_place = (*_joints_by_place(matching), *_by_place(left, right, sites, actuators, names))
     return Matched(
         left=left,
         right=right,
@@ -107,7 +109,8 @@ def match_models(
         actuators=actuators,
         solids=solids,
         only=(only_left, only_right),
-        notes=(*matching.notes(), *_by_place(left, right, sites, actuators, names)),
+        renamed=by_place,
+        other_notes=tuple(matching.other_kinds()),
     )
 
 
@@ -150,8 +153,9 @@ def _only(
     """
     model, other = models
     further_sites = _rest(model.site_names, sites, side)
+    joint_names = [joint_name(model, joint) for joint in range(model.njnt)]
     return {
-        "joint": _rest(model.joint_names, joints, side),
+        "joint": _rest(joint_names, joints, side),
         "actuator": _rest(model.actuator_names, actuators, side),
         "site": tuple(name for name in further_sites if name not in other.body_names),
     }
@@ -181,7 +185,8 @@ def match_alike(left: Model, right: Model) -> Matched:
         actuators=pairs["actuator"],
         solids=(),
         only=({}, {}),
-        notes=(),
+        renamed=(),
+        other_notes=(),
     )
 
 
@@ -292,20 +297,30 @@ def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
     return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in taken)
 
 
+def _joints_by_place(matching: Matching) -> Iterator[RenamedPair]:
+    """Yield joints that were matched by their place although they go by two names."""
+    for pair in matching.pairs:
+        left, right = pair.left.joint, pair.right.joint
+        if pair.by != "place" or not left or not right or left.kind not in SCALAR:
+            continue
+        if left.name != right.name:
+            suggestion = command(["--map", f"{left.name}=NAME"])
+            shared = "one kind, one place, one axis"
+            yield RenamedPair("joint", left.name, right.name, shared, suggestion)
+
+
 def _by_place(
     left: Model, right: Model, sites: Pairs, actuators: Pairs, names: Mapping[str, str]
-) -> Iterator[str]:
-    """Sites and actuators that are matched although they go by two names."""
+) -> Iterator[RenamedPair]:
+    """Yield sites and actuators that are matched although they go by two names."""
     for kind, pairs, place in (("site", sites, "place"), ("actuator", actuators, "joint")):
         both = [getattr(model, f"{kind}_names") for model in (left, right)]
         for left_id, right_id in pairs:
             left_name, right_name = both[0][left_id], both[1][right_id]
             is_same = left_name == right_name or names.get(left_name) == right_name
             if left_name and right_name and not is_same:
-                yield (
-                    f"{kind} {left_name!r} on the left is taken for {right_name!r} on the right: "
-                    f"one {place} (--map {left_name}=NAME says otherwise)"
-                )
+                suggestion = f"--map {left_name}=NAME"
+                yield RenamedPair(kind, left_name, right_name, f"one {place}", suggestion)
 
 
 def missing_parts(left: Model, right: Model) -> tuple[tuple[str, str], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -21,12 +22,14 @@ from ..recordings import (
     start_of,
 )
 from ..runs.drive import check_length, steps_in
+from ..runs.floating import Bases
 from ..runs.scenarios import Controller, Scenario
 from .alike import (
     controller_for_right,
     for_left,
     match_sides,
 )
+from .bases import load_sides
 from .matched import Matched
 from .recorded import (
     recorded_scenario,
@@ -41,17 +44,28 @@ def read_otherwise(left: Model, right: Model) -> list[str]:
     return room(engines.pop()).read_otherwise(left, right) if len(engines) == 1 else []
 
 
-def prepare_sides(
-    request: Request,
-) -> tuple[tuple[Rerun, Rerun], Matched | None, tuple[str, ...]]:
+@dataclass(frozen=True, eq=False)
+class PreparedSides:
+    """Both sides of a request, ready to be run.
+
+    Attributes:
+        reruns: How the left and the right are run.
+        matched: What of the left is what of the right; None if both are of one file.
+        bases: Whether the base of each floats.
+        notes: What a reader should know of it.
+    """
+
+    reruns: tuple[Rerun, Rerun]
+    matched: Matched | None
+    bases: Bases
+    notes: tuple[str, ...]
+
+
+def prepare_sides(request: Request) -> PreparedSides:
     """Load both sides of a request, match them, and say how each is run.
 
     What an experiment or a trace tells the left, the right is told too; a function of the user's
     is asked on each side.
-
-    Returns:
-        How the left and the right are run; what of the left is what of the right, None if both
-        are of one file; and what a reader should know of it.
 
     Raises:
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
@@ -60,14 +74,15 @@ def prepare_sides(
     scenario = recorded_scenario(trace) if trace else request.scenario()
     sides = request.both_sides(scenario.model)
     options = {**scenario.options, **request.options}
-    left, right = models = [side.load(**options) for side in sides]
+    loaded = load_sides(sides, options, request.names)
+    left, right = models = loaded.models
     matched = match_sides(sides, left, right, request.names)
     seconds = scenario.seconds if trace or request.seconds is None else request.seconds
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
     notes_on_engines = [room(engine_of(model.backend)).unlike_its_users(model) for model in models]
-    left_start, notes = None, list[str]()
+    left_start, notes = None, list(loaded.bases.notes())
     if trace is not None:
         refuse_of_run(request)
         trace = for_left(trace, left, request)
@@ -121,7 +136,7 @@ def prepare_sides(
     notes += request.taken
     notes += dict.fromkeys(chain(*notes_on_engines))
     notes += read_otherwise(left, right)
-    return reruns, matched, tuple(notes)
+    return PreparedSides(reruns, matched, loaded.bases, tuple(notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +204,7 @@ def _of_scenario(rerun: Rerun, scenario: Scenario, seed: int | None) -> Rerun:
     )
 
 
-def _check_moments(models: list[Model], seconds: float) -> None:
+def _check_moments(models: Sequence[Model], seconds: float) -> None:
     """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
     steps = [model.timestep for model in models]
     left, right = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)

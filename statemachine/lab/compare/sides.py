@@ -20,7 +20,7 @@ from ...installed import DEFAULT, PAIR
 from ...interface import Model
 from ...interface.checks import as_count
 from ...interface.options import OptionValue
-from ...interface.records import READ_OPTIONS
+from ...interface.records import READ_OPTIONS, FreeBase
 from ...measures.text import listed
 from ...models import resolve
 from ..recordings.files import SUFFIXES
@@ -38,7 +38,8 @@ class Side:
         model: A name or a path, as `load` takes it.
         engine: The backend to run it on.
         defaults: "model", or "engine" for the engine as its own users meet it.
-        options: As `load` takes them: those of `Model.replace`, balance_inertia, meshes.
+        options: As `load` takes them: those of `Model.replace`, base,
+            balance_inertia, meshes.
         menagerie: A menagerie folder to look the name up in.
         taken: Parts of another side's file that stand in place of its own.
     """
@@ -65,19 +66,25 @@ class Side:
         options = (typed_option(name, value) for name, value in self.options.items())
         return " ".join([f"{_typed(self.model)}@{self.chosen_backend()}", *options])
 
-    def load(self, **options: OptionValue) -> Model:
-        """The Model; `options` are those of an experiment, over which its own win.
+    def load(self, base: OptionValue | FreeBase | None = None, **options: OptionValue) -> Model:
+        """Return the Model; `options` are those of an experiment, over which its own win.
+
+        Args:
+            base: That of the robot where neither says it, as `load` takes it.
+            **options: As `load` takes them.
 
         Raises:
             StateMachineError: As `load` does.
         """
-        options |= self.options
+        wanted: dict[str, OptionValue | FreeBase] = {**options, **self.options}
+        if base is not None:
+            wanted.setdefault("base", base)
         load_it = partial(self.chosen_backend().load_to_run, self.model, menagerie=self.menagerie)
         if self.taken is None:
-            return load_it(**options)
-        read = {name: options[name] for name in READ_OPTIONS if name in options}
+            return load_it(**wanted)
+        read = {name: wanted.pop(name) for name in READ_OPTIONS if name in wanted}
         model = self.taken.given_to(load_it(**read))
-        return model.replace(**options) if options else model
+        return model.replace(**wanted) if wanted else model
 
     def taking(self, parts: Sequence[str], of: Side, names: Mapping[str, str]) -> Side:
         """Itself with some parts of another side's file; `names` as of `TakenParts`."""
@@ -126,7 +133,7 @@ def _renamed(
 def with_options(
     sides: Sequence[Side], options: Mapping[str, OptionValue]
 ) -> tuple[list[Side], dict[str, OptionValue]]:
-    """Sides with what only they are given, and the options that both have.
+    """Sides with what only they are given, and the options of `Model.replace` that both have.
 
     Args:
         sides: Two.
@@ -136,7 +143,7 @@ def with_options(
     both = {
         name: left[name]
         for name in left
-        if name in right and np.array_equal(left[name], right[name])
+        if name in right and np.array_equal(left[name], right[name]) and name not in READ_OPTIONS
     }
     return [_without(sides[0], left, both), _without(sides[1], right, both)], both
 

@@ -23,6 +23,7 @@ from ..recordings import (
 )
 from ..runs.controllers import is_function
 from ..runs.drive import Progress, part_of, silent
+from ..runs.floating import Bases
 from ..runs.scenarios import SCENARIOS
 from .alike import (
     called,
@@ -61,6 +62,7 @@ class SidesRun:
         matched: What of the left is what of the right; None if both are of one file.
         reruns: How the left and the right were run; None for a recorded run.
         path: The file of both sides; None if they have two, or were not run here.
+        bases: Whether the base of either side floats; None where a run was not made here.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
         said: What a reader should know of how it was run.
     """
@@ -72,6 +74,7 @@ class SidesRun:
     matched: Matched | None = None
     reruns: tuple[Rerun | None, Rerun | None] = (None, None)
     path: Path | None = None
+    bases: Bases | None = None
     missing: tuple[tuple[str, str], ...] = ()
     said: tuple[str, ...] = ()
 
@@ -100,7 +103,10 @@ class SidesRun:
         """What could not be matched, and what was matched by more than its name."""
         if self.matched is None:
             return ()
-        lines = [*lacking(self.matched.only, labels_of(self.left.header, self.right.header).long)]
+        only = self.matched.only
+        if self.bases is not None and self.bases.differ:
+            only = self.matched.only_beside_bases  # the bases have a line of their own
+        lines = [*lacking(only, labels_of(self.left.header, self.right.header).long)]
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
@@ -127,12 +133,13 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
             return _opened(request, progress)
         _check_what(request)
     try:
-        reruns, matched, notes = prepare_sides(request)
+        prepared = prepare_sides(request)
     except MissingEngineError:
         if request != Request(request.what, request.backends):
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
-    return replace(_run_both(request, reruns, matched, progress), said=notes)
+    run = _run_both(request, prepared.reruns, prepared.matched, progress)
+    return replace(run, bases=prepared.bases, said=prepared.notes)
 
 
 def _check_what(request: Request) -> None:

@@ -31,6 +31,7 @@ from .locating import Locator
 from .only_read import enter_only_read
 from .reading import FileAsked, read_both
 from .records import FileSide, ModelsComparison
+from .starts import enter_starts
 from .visuals import enter_visuals
 
 
@@ -80,6 +81,7 @@ def compare(
     listing = Listing(digits)
     skipped = CompiledDifferences(listing, readings, matched, effects, locator).enter()
     skipped += not_compared(readings)
+    enter_starts(listing, readings, matched, locator, effects.reach)
     enter_declared(listing, readings, matched, locator)
     enter_only_read(listing, matched, locator)
     enter_visuals(listing, readings, trees, locator)
@@ -91,6 +93,7 @@ def compare(
     notes = tuple(dict.fromkeys(_notes(readings, matched, trees)))
     gap, versions = posed(trees, seed), _versions(readings)
     has_actuators = models[0].nu > 0
+    labels = sides[0].label, sides[1].label
     return ModelsComparison(
         left=left_side,
         right=right_side,
@@ -103,7 +106,8 @@ def compare(
         has_actuators=has_actuators,
         versions=versions,
         skipped=tuple(skipped),
-        labels=(sides[0].label, sides[1].label),
+        labels=labels,
+        renamed=matched.renamed,
     )
 
 
@@ -219,7 +223,7 @@ def _notes(
     readings: Sequence[ModelReading], matched: Matched, trees: MatchedTrees
 ) -> Iterator[str]:
     """Yield what a reader should know, in sentences."""
-    yield from matched.notes
+    yield from matched.other_notes
     yield from _frames_elsewhere(trees)
     yield from _suggestions(trees.matching)
     formats = [reading.format for reading in readings]

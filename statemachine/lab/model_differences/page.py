@@ -3,274 +3,300 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Literal
 
-from ...measures.text import (
-    after,
-    capital,
-    command,
-    count,
-    few,
-    grouped,
-    reading,
-    rounded,
-    sentence,
-    versions_of,
+from ...measures.text import after, capital, command, grouped, reading, rounded, sentence
+from ...measures.text import versions_of as versions_text
+from ...show.blocks import Page, Table
+from ...show.first_screen import first_screen
+from ...show.templates import PageContent, render
+from ..compare.matched import RenamedPair
+from .faults_page import faults_table, reasons_of
+from .records import FileSide, ListedDifference, ModelsComparison, QuantityAgreement
+from .subject_page import (
+    APART,
+    MOMENT,
+    AlikeDifferences,
+    LackOfArmature,
+    alike,
+    heading,
+    lack_of_armature,
+    record_table,
+    subject_table,
+    worst_table,
 )
-from ...show import report_template as template
-from ...show.blocks import Block, Items, Page, Table, Text
-from ...show.report_template import if_true
-from . import (
-    SUBJECTS,
-    FileFault,
-    FileSide,
-    ModelsComparison,
-    QuantityAgreement,
-    Value,
-    gross_visuals,
-)
-from .subject_page import APART, MOMENT, Slots, subject_blocks, value_text
+from .visuals import gross_visuals
 
 _READ = ("file", "read", "links", "joints", "touching", "drawn", "mass")  # rows of the sides
+_SAME_PLACE = 1e-5  # [m] within which links are at one place
+
+ModelsState = Literal["differs", "not all compared", "equal"]
+
+
+@dataclass(frozen=True)
+class ModelsPage(PageContent):
+    """What the page of two descriptions shows.
+
+    Attributes:
+        result: Every difference.
+        worst: Table of the weightiest differences that act on a motion.
+        more: How many of these it does not show.
+        tables: With details, a table for each subject.
+        next_command: What to type next; "" for nothing.
+        details: Whether everything is shown.
+    """
+
+    template = "models.md.j2"
+    result: ModelsComparison
+    worst: Table
+    more: int
+    tables: Sequence[Table]
+    next_command: str
+    details: bool
+
+    @property
+    def left_name(self) -> str:
+        """The left file, and its engine if that has read it."""
+        return _name(self.result.left)
+
+    @property
+    def right_name(self) -> str:
+        """The right file, and its engine if that has read it."""
+        return _name(self.result.right)
+
+    @property
+    def state(self) -> ModelsState:
+        """Whether anything differs that acts on a motion."""
+        if self.acting:
+            return "differs"
+        return "not all compared" if self.result.skipped else "equal"
+
+    @property
+    def acting(self) -> list[ListedDifference]:
+        """The differences that act on a motion."""
+        return [row for row in self.result.differences if row.matters]
+
+    @property
+    def subjects(self) -> list[str]:
+        """The subjects of these, each with how many there are."""
+        return _counts(self.acting)
+
+    @property
+    def record(self) -> list[str]:
+        """The subjects of what does not act, each with how many there are."""
+        return _counts([row for row in self.result.differences if not row.matters])
+
+    @property
+    def largest(self) -> AlikeDifferences | None:
+        """The weightiest difference; None where there is none."""
+        groups = weightiest(self.result)
+        return groups[0] if groups else None
+
+    @property
+    def gross(self) -> list[str]:
+        """What is drawn far too large or too small, in words."""
+        return [f"{row.element}, {row.effect}" for row in gross_visuals(self.result)]
+
+    @property
+    def paired(self) -> Sequence[RenamedPair]:
+        """What was taken for one although the names differ."""
+        return self.result.renamed
+
+    @property
+    def joints(self) -> int:
+        """How many joints were moved to compare poses."""
+        return self.result.posed.joints
+
+    @property
+    def distance(self) -> str:
+        """How far apart a link is at most where joints have the same positions."""
+        return _tiny(self.result.posed.distance, "m")
+
+    @property
+    def angle(self) -> str:
+        """How far turned a link is at most where joints have the same positions."""
+        return _tiny(self.result.posed.angle, "rad")
+
+    @property
+    def furthest(self) -> str:
+        """The link that is furthest off; "" where none is."""
+        posed = self.result.posed
+        return posed.link if posed.joints and posed.distance > _SAME_PLACE else ""
+
+    @property
+    def sides(self) -> Table:
+        """How both sides were read, and what they have."""
+        rows = zip(_READ, _column(self.result.left), _column(self.result.right), strict=True)
+        return Table(("", "left", "right"), list(rows))
+
+    @property
+    def emulated(self) -> str:
+        """The engine that read a file, and emulates the contract in a run; "" without one."""
+        return self._engine_that_reads().emulated
+
+    @property
+    def written(self) -> str:
+        """The same, where the file reaches it as a URDF that is written; "" else."""
+        side = self._engine_that_reads()
+        return side.emulated if side.is_mjcf else ""
+
+    @property
+    def unlike(self) -> str:
+        """What a run has that the engine's own users do not have; "" for nothing."""
+        left, right = self.result.left.unlike_its_users, self.result.right.unlike_its_users
+        return capital(left if left else right)
+
+    def _engine_that_reads(self) -> FileSide:
+        """Return the side that an emulated engine read; of two, or of none, the left."""
+        left, right = self.result.left, self.result.right
+        return right if right.emulated and not left.emulated else left
+
+    @property
+    def faults(self) -> Table:
+        """What is wrong in a file, and what a run has instead."""
+        return faults_table(self.result.faults)
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why, as MuJoCo says it."""
+        return reasons_of(self.result.faults)
+
+    @property
+    def lack(self) -> LackOfArmature | None:
+        """What the lack of armature on one side does to a joint, if it lacks there."""
+        return lack_of_armature(self.result.differences)
+
+    @property
+    def records(self) -> Table:
+        """What does not act on a motion: how many of each subject."""
+        idle = [row for row in self.result.differences if not row.matters]
+        return record_table(idle, _files(self.result))
+
+    @property
+    def refused(self) -> list[str]:
+        """What cannot be given the left's values, each with the reason."""
+        reasons: dict[str, str] = {}
+        for row in self.result.differences:
+            if row.refused:
+                reasons[row.cause] = row.refused
+        return [f"{capital(cause)}: {reason}." for cause, reason in reasons.items()]
+
+    @property
+    def pairs(self) -> Table:
+        """What was taken for one although the names differ, a row for each pair."""
+        rows: list[tuple[str, ...]] = []
+        for pair in self.result.renamed:
+            rows.append((pair.kind, pair.left, pair.right, pair.shared, pair.suggestion))
+        headers = ("kind", "left", "right", "they share", "says otherwise")
+        return Table(headers, rows, "Taken for one", words=frozenset(range(5)))
+
+    @property
+    def equal(self) -> Table:
+        """How well both sides agree, a row for each subject."""
+        return _equal(self.result.agreements)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader should know, in sentences."""
+        result = self.result
+        notes = [f"left: {note}" for note in result.left.notes]
+        notes += [f"right: {note}" for note in result.right.notes]
+        return [sentence(note) for note in (*notes, *result.notes, *result.skipped)]
+
+    @property
+    def versions(self) -> str:
+        """What computed it."""
+        return versions_text(self.result.versions)
 
 
 def page(result: ModelsComparison, details: bool = False) -> Page:
-    """Say what differs, the weightiest first; then what is equal, and how well.
+    """Return the page of two descriptions: what differs, the weightiest first.
 
     Args:
-        result: The comparison.
-        details: Whether every figure has a row of its own.
+        result: Every difference.
+        details: Whether every difference has a row, and what is equal is shown, too.
     """
-    by_subject = grouped((row.subject, row) for row in result.differences)
-    differences: list[Block] = []
-    for subject, rows in by_subject.items():
-        differences += subject_blocks(subject, rows, details)
-    slots = (
-        _sides(result)
-        | _verdict(result)
-        | _engine_itself(result)
-        | _what_can_be_equalized(result)
-        | _poses(result)
+    if details:
+        return _page(result, (), details=True)
+    groups = weightiest(result)
+    return first_screen(lambda rows: _page(result, groups[:rows]), len(groups))
+
+
+def _page(
+    result: ModelsComparison, worst: Sequence[AlikeDifferences], details: bool = False
+) -> Page:
+    """Return the page with some of the weightiest differences; with details tables have all."""
+    files = _files(result)
+    acting = [row for row in result.differences if row.matters]
+    more = 0 if details else len(acting) - sum(len(group.rows) for group in worst)
+    by_subject = grouped((row.subject, row) for row in acting) if details else {}
+    tables = [subject_table(subject, rows, files) for subject, rows in by_subject.items()]
+    content = ModelsPage(
+        result=result,
+        worst=worst_table(worst, files),
+        more=more,
+        tables=tables,
+        next_command=_next_command(result),
+        details=details,
     )
-    has_lines = any(row.left_line or row.right_line for row in result.differences)
-    notes = [Text(sentence(note)) for note in _notes(result)]
-    return template.page(
-        "lab/model_differences/model_diff",
-        **_faults(result.faults),
-        differences=differences,
-        lines=if_true(has_lines),
-        gross=_gross(result),
-        equal=_equal(result.agreements),
-        notes=notes,
-        **slots,
-    )
+    return render(content)
 
 
-def _sides(result: ModelsComparison) -> Slots:
-    """Return how both sides were read, and what they have."""
-    rows = zip(_READ, _column(result.left), _column(result.right), strict=True)
-    return {
-        "left_name": _name(result.left),
-        "right_name": _name(result.right),
-        "origin": versions_of(result.versions),
-        "sides": Table(("", "left", "right"), list(rows)),
-    }
+def weightiest(result: ModelsComparison) -> list[AlikeDifferences]:
+    """Return the differences that act on a motion, the weightiest first, whatever their subject."""
+    groups = alike([row for row in result.differences if row.matters])
+    return sorted(groups, key=lambda group: -round(group.first.share, 6))
 
 
-def _read(side: FileSide) -> str:
-    """Say how a side was read."""
-    if side.format == "engine":
-        return f"loaded into {side.reader}"
-    return f"{side.format}, by {side.reader}"
+def _next_command(result: ModelsComparison) -> str:
+    """Return the command that tells what each difference explains; "" where none can be equalized.
+
+    Its experiment runs on any robot that has such a file.
+    """
+    if not any(row.cause and not row.refused for row in result.differences):
+        return ""
+    experiment = "waves" if result.has_actuators else "gravity"
+    words = ["statemachine", "compare", experiment]
+    for side, label in zip(("left", "right"), result.labels, strict=True):
+        faults = [fault for fault in result.faults if fault.side == side]
+        words.append(label)
+        if any(fault.unit == "kg m²" for fault in faults):
+            words.append("balance_inertia=on")
+        if any(fault.used is None for fault in faults):
+            words.append("meshes=off")
+    return command([*words, "--why"])
+
+
+def _files(result: ModelsComparison) -> tuple[str, str]:
+    return result.left.file, result.right.file
+
+
+def _counts(differences: Sequence[ListedDifference]) -> list[str]:
+    """Return the subjects of some differences, each with how many there are."""
+    by_subject = grouped((row.subject, row) for row in differences)
+    return [f"{subject} {len(rows)}" for subject, rows in by_subject.items()]
+
+
+def _name(side: FileSide) -> str:
+    """Return a file, and of one that an engine has read the engine."""
+    return f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
 
 
 def _column(side: FileSide) -> list[str]:
     """Return how a side was read, and what it has."""
+    read = f"{side.format}, by {side.reader}"
+    if side.format == "engine":
+        read = f"loaded into {side.reader}"
     return [
         side.file,
-        _read(side),
+        read,
         str(side.links),
         str(side.joints),
         str(side.shapes),
         str(side.visuals),
         rounded(side.mass, "kg", 4),
     ]
-
-
-@dataclass(frozen=True)
-class _AlikeFaults:
-    """Faults of one side that are the same of several elements.
-
-    Attributes:
-        faults: At least one.
-    """
-
-    faults: Sequence[FileFault]
-
-    def label(self) -> str:
-        """Return what it is of: the first element, and how many more there are."""
-        first, more = self.faults[0], len(self.faults) - 1
-        label = f"{first.side}: {first.quantity} of {first.kind} {first.element}"
-        return f"{label} + {more} more" if more else label
-
-    def line(self) -> str:
-        """Return where the first element stands."""
-        line = self.faults[0].line
-        return "" if line is None else str(line.line)
-
-    def stated(self) -> str:
-        """Return what the file states."""
-        return _value_of_fault(self.faults[0], self.faults[0].stated, "nothing")
-
-    def used(self) -> str:
-        """Return what a run has instead."""
-        return _value_of_fault(self.faults[0], self.faults[0].used, "left out")
-
-    def changed(self) -> str:
-        """Return by how much it is changed."""
-        factor = self.faults[0].factor
-        return "" if factor is None else f"up to {factor:.3g} times"
-
-
-def _faults(faults: Sequence[FileFault]) -> Slots:
-    """Return a row for each fault of a file, and MuJoCo's reasons."""
-    by_kind = grouped(
-        ((fault.side, fault.kind, fault.quantity, fault.stated, fault.used, fault.reason), fault)
-        for fault in faults
-    )
-    rows = [_AlikeFaults(alike) for alike in by_kind.values()]
-    columns = {
-        "fault": _AlikeFaults.label,
-        "stated": _AlikeFaults.stated,
-        "used": _AlikeFaults.used,
-        "changed": _AlikeFaults.changed,
-        "line": _AlikeFaults.line,
-    }
-    table = Table.of(rows, columns, "What is wrong in a file, and what a run has instead")
-    reasons = dict.fromkeys(fault.reason for fault in faults)
-    return {
-        "faults": replace(table, words=frozenset(range(len(columns)))),
-        "reasons": Items([capital(reason) for reason in reasons]),
-    }
-
-
-def _value_of_fault(fault: FileFault, value: Value, none: str) -> str:
-    """Return a value of a fault as text."""
-    if value is None:
-        return none
-    if fault.unit == "kg m²":
-        return f"{value_text(value, MOMENT)} kg mm²"
-    return value_text(value, fault.unit)
-
-
-def _gross(result: ModelsComparison) -> str | None:
-    """Return which visuals are far too large or too small, in words; None if none are."""
-    words = [f"{row.element}, {row.effect}" for row in gross_visuals(result)]
-    return few(words, 3, "; ") if words else None
-
-
-def _verdict(result: ModelsComparison) -> Slots:
-    """Return whether anything differs that matters."""
-    matter = [row for row in result.differences if row.matters]
-    # A verdict that is False does not hold; one that is None is left out.
-    slots: Slots = {"none_differ": None, "not_all_compared": None, "differ": None}
-    slots["why_not_all"] = None
-    if matter:
-        slots["differ"] = False
-    elif result.skipped:
-        slots["not_all_compared"] = False
-        further = len(result.skipped) - 1
-        more = f" (and {further} more, below)" if further else ""
-        slots["why_not_all"] = result.skipped[0] + more
-    else:
-        slots["none_differ"] = True
-    subjects = ", ".join(dict.fromkeys(row.subject for row in matter))
-    return slots | {"digits": result.digits, "figures": len(matter), "subjects": subjects}
-
-
-def _engine_itself(result: ModelsComparison) -> Slots:
-    """Return what is said of an engine that read a file itself, and emulates the contract."""
-    slots: Slots = {"emulated": None, "written": None, "unlike": None}
-    for side in (result.right, result.left):  # of two the left is named
-        if side.emulated:
-            slots["emulated"] = side.emulated
-            if side.is_mjcf:
-                slots["written"] = side.emulated
-        if side.unlike_its_users:
-            slots["unlike"] = capital(side.unlike_its_users)
-    return slots
-
-
-def _engine(side: FileSide) -> str:
-    """Return the name of the engine that read a side, without its version."""
-    return side.reader.split()[0]
-
-
-def _what_can_be_equalized(result: ModelsComparison) -> Slots:
-    """Return in what the right can be given the left's values, and how."""
-    able: dict[str, None] = {}
-    refused: dict[str, str] = {}
-    for row in result.differences:
-        if row.refused:
-            refused[row.cause] = row.refused
-        elif row.cause:
-            able[row.cause] = None
-    typed = None
-    if able:
-        experiment = "waves" if result.has_actuators else "gravity"  # runs on any such robot
-        words = _readable_sides(result)
-        typed = command(["statemachine", "compare", experiment, *words, "--why"])
-    lines = [f"{capital(name)}: {why}." for name, why in refused.items()]
-    some = len(able) if able and refused else None
-    return {
-        "all_able": if_true(able and not refused),
-        "able": some,
-        "command": typed,
-        "refused_too": if_true(refused),
-        "refused": Items(lines),
-    }
-
-
-def _readable_sides(result: ModelsComparison) -> list[str]:
-    """Return both sides as one types them for a run, with the options that read a refused file."""
-    words: list[str] = []
-    for side, word in zip(("left", "right"), result.labels, strict=True):
-        faults = [fault for fault in result.faults if fault.side == side]
-        words.append(word)
-        if any(fault.unit == "kg m²" for fault in faults):
-            words.append("balance_inertia=on")
-        if any(fault.used is None for fault in faults):
-            words.append("meshes=off")
-    return words
-
-
-def _poses(result: ModelsComparison) -> Slots:
-    """Return whether the same positions give the same poses."""
-    posed = result.posed
-    is_off = posed.joints and posed.distance > 1e-5
-    return {
-        "joints": count(posed.joints, "joint") if posed.joints else None,
-        "distance": _tiny(posed.distance, "m"),
-        "angle": _tiny(posed.angle, "rad"),
-        "poses": posed.poses,
-        "seed": posed.seed,
-        "furthest": posed.link if is_off else None,
-    }
-
-
-def _notes(result: ModelsComparison) -> list[str]:
-    """Return what a reader should know, in sentences."""
-    notes = [f"left: {note}" for note in result.left.notes]
-    notes += [f"right: {note}" for note in result.right.notes]
-    skipped = result.skipped
-    if not any(row.matters for row in result.differences):
-        skipped = skipped[1:]  # the verdict tells the first
-    return [*notes, *result.notes, *skipped]
-
-
-def _name(side: FileSide) -> str:
-    """Return a file, and of one that an engine has read the engine."""
-    return f"{side.file} on {_engine(side)}" if side.format == "engine" else side.file
 
 
 @dataclass(frozen=True)
@@ -286,7 +312,7 @@ class _SubjectAgreement:
     agreements: Sequence[QuantityAgreement]
 
     def heading(self) -> str:
-        return SUBJECTS[self.subject].partition(":")[0]
+        return heading(self.subject)
 
     def counts(self) -> str:
         """Return how many figures are equal, of how many."""
@@ -295,7 +321,8 @@ class _SubjectAgreement:
 
     def apart(self) -> str:
         """Return how far the figures are apart at the worst, in each unit."""
-        return ", ".join(_worst(agreement) for agreement in self.agreements).strip(", ") or "0"
+        gaps = [_worst(agreement) for agreement in self.agreements if agreement.worst]
+        return ", ".join(gaps) if gaps else "0"
 
     def digits(self) -> str:
         """Return to how many digits the figures agree."""
@@ -317,9 +344,10 @@ def _equal(agreements: Sequence[QuantityAgreement]) -> Table:
 
 
 def _worst(agreement: QuantityAgreement) -> str:
+    """Return the largest difference of those that agree."""
     unit = MOMENT if agreement.subject == "inertia" else agreement.unit
     factor, shown = APART.get(unit, (1.0, after(unit)))
-    return f"{agreement.worst * factor:.1e}{shown}" if agreement.worst else ""
+    return f"{agreement.worst * factor:.1e}{shown}"
 
 
 def _tiny(value: float, unit: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ...engines.description.lines import SourceLine
+from ..compare.matched import RenamedPair
 
 Value = float | str | bool | tuple[float, ...] | None
 
@@ -206,6 +207,7 @@ class ModelsComparison:
         versions: Of what computed it.
         skipped: What was not compared, in sentences.
         labels: Both sides as one types them for a run.
+        renamed: What was taken for one although the names differ, and nobody said so.
     """
 
     left: FileSide
@@ -220,6 +222,7 @@ class ModelsComparison:
     versions: Mapping[str, str]
     skipped: tuple[str, ...]
     labels: tuple[str, str] = field(metadata={"json": False})
+    renamed: tuple[RenamedPair, ...]
 
     @property
     def mass(self) -> tuple[float, float]:

@@ -1,19 +1,16 @@
-"""What differs in one subject, as a table, and what its figures mean."""
+"""What differs in one subject, as a table."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from pathlib import Path
 
 from ...engines.description.lines import SourceLine
 from ...measures.text import after, capital, reading, significant
-from ...show import report_template as template
-from ...show.blocks import Block, Items, Table
-from ...show.report_template import if_true
+from ...show.blocks import Table
 from . import SUBJECTS, ListedDifference, Value
 
-_ROWS = 8  # of a table, unless all are asked for
-_FOR_THE_RECORD = " (for the record)"
 MOMENT = "of a part"  # kg m², which are of another size than those of a joint
 # Units as a reader has them, of differences; a result has SI.
 APART = {
@@ -43,18 +40,9 @@ _LAST = {
     "settings": "",
     "structure": "",
 }
-# Words of a subject's table that want a legend, by its slot.
-_EXPLAINED = {
-    "zero": ("places", "only its zero"),
-    "armature": ("armature", "M_ii"),
-    "sags": ("drive", "sags"),
-    "ratio": ("drive", "damping ratio"),
-    "slows": ("damping", "slows in"),
-    "load": ("centre of mass", "load"),
-    "felt": ("inertia", "M_ii"),
-}
 # Quantities that say no more than the name of their difference.
 _SAID_BY_ITS_NAME = {
+    "actfrcrange",
     "actuator",
     "armature",
     "axis",
@@ -87,132 +75,232 @@ _SAID_BY_ITS_NAME = {
     "visual",
 }
 # Kinds of elements whose names say little without the kind.
+_OF_A_PART = ("mass", "centre of mass", "inertia")
 _NAMED_WITH_KIND = ("keyframe", "transmission", "visual")
 _HEADERS = ("figure", "left", "right", "apart")
 _LINES = "lines"
+# Subjects whose differences are no figure of an element.
+_TOLD_IN_WORDS = ("structure", "shapes", "drawing", "control")
+_SHORT = {"moments": "inertia"}
+_DIGITS, _FEW_DIGITS = 4, 3  # significant ones of a figure; of one on the first screen
+_ALIKE = 3  # places with one figure of the same values have one row
 
-Slots = dict[str, str | float | Items | Table | Sequence[Block] | None]  # of a template, by name
+
+@dataclass(frozen=True)
+class AlikeDifferences:
+    """Differences in one quantity, of elements that have the same two values.
+
+    Attributes:
+        rows: At least one.
+    """
+
+    rows: tuple[ListedDifference, ...]
+
+    @property
+    def first(self) -> ListedDifference:
+        """The weightiest of them."""
+        return self.rows[0]
+
+    @property
+    def label(self) -> str:
+        """What it is called: as its difference is, with the figure that it is of it."""
+        row, more = self.first, len(self.rows) - 1
+        name = _name_of(row)
+        name = f"{capital(name)} + {more} more" if more else capital(name)
+        is_known = row.cause or row.subject in _OF_A_PART
+        if is_known and row.quantity in _SAID_BY_ITS_NAME:
+            return name
+        return f"{name}: {row.quantity}".removesuffix(": ").removeprefix(": ")
+
+    @property
+    def short_label(self) -> str:
+        """The element and its figure, for a table that has little room."""
+        row, more = self.first, len(self.rows) - 1
+        if not row.element or row.subject in _TOLD_IN_WORDS:
+            return self.label
+        element = f"{row.element} + {more} more" if more else row.element
+        quantity = _SHORT.get(row.quantity, row.quantity)
+        return f"{element}: {quantity}".removesuffix(": ")
+
+    @property
+    def left(self) -> str:
+        """The left's value."""
+        return value_text(self.first.left, _unit_of(self.first))
+
+    @property
+    def right(self) -> str:
+        """The right's value."""
+        return value_text(self.first.right, _unit_of(self.first))
+
+    @property
+    def effect(self) -> str:
+        """What it means for a motion; of several the first and the last."""
+        effects = dict.fromkeys((self.first.effect, self.rows[-1].effect))
+        return " … ".join(effects)
+
+    @property
+    def apart(self) -> str:
+        """How far the values are apart; "" where that says nothing."""
+        if self.first.size is None or self.first.subject == "drawing":
+            return ""
+        return _number(self.first.size, _unit_of(self.first), APART)
 
 
-def subject_blocks(
-    subject: str, differences: Sequence[ListedDifference], everything: bool
-) -> list[Block]:
-    """Say what differs in a subject, what the figures mean, and of armature what its lack does.
+@dataclass(frozen=True)
+class LackOfArmature:
+    """What the lack of armature on one side does to a joint.
+
+    Attributes:
+        joint: The joint of which it does most.
+        times: How many times as fast the same torque accelerates it on the side that has none.
+        side: "left" or "right".
+    """
+
+    joint: str
+    times: str
+    side: str
+
+
+def alike(differences: Sequence[ListedDifference]) -> list[AlikeDifferences]:
+    """Group differences: three elements or more that have one figure with the same values.
+
+    Args:
+        differences: Of any subjects; the order of the first of each group stays.
+    """
+    groups: dict[Hashable, list[ListedDifference]] = {}
+    for row in differences:
+        figure = row.subject, row.quantity, row.left, row.right, row.size, row.unit
+        groups.setdefault(figure, []).append(row)
+    found: list[AlikeDifferences] = []
+    for rows in groups.values():
+        if len(rows) >= _ALIKE:
+            found.append(AlikeDifferences(tuple(rows)))
+        else:
+            found += [AlikeDifferences((row,)) for row in rows]
+    return found
+
+
+def worst_table(groups: Sequence[AlikeDifferences], files: tuple[str, str]) -> Table:
+    """Return a row for each of some differences, of any subject: values and lines.
+
+    Args:
+        groups: The weightiest ones.
+        files: The file of each side, with its folder.
+    """
+    rows: list[tuple[str, ...]] = []
+    for group in groups:
+        row, unit = group.first, _unit_of(group.first)
+        values = value_text(row.left, unit, _FEW_DIGITS), value_text(row.right, unit, _FEW_DIGITS)
+        if values[0] == values[1]:
+            values = group.left, group.right
+        rows.append((group.short_label, *values, _lines(row, files)))
+    return Table(("difference", "left", "right", _LINES), rows, words=frozenset(range(4)))
+
+
+def subject_table(
+    subject: str, differences: Sequence[ListedDifference], files: tuple[str, str]
+) -> Table:
+    """Return the table of a subject, a row for each difference.
+
+    Columns that are empty are left out, and how far the values are apart where there are 80
+    characters to a line: an effect has the room.
 
     Args:
         subject: A key of `SUBJECTS`.
         differences: At least one.
-        everything: Whether every figure has a row of its own.
+        files: The file of each side, with its folder.
     """
-    groups = _alike(differences, everything)
-    shown = groups if everything else groups[:_ROWS]
-    table = _table(subject, [_row(subject, group) for group in shown])
-    if not any(row.matters for row in differences):
-        table = replace(table, title=table.title + _FOR_THE_RECORD)
-    return template.blocks(
-        "lab/model_differences/model_diff_subject",
-        table=table,
-        more=len(groups) - len(shown) or None,
-        **_lack_of_armature(subject, differences),
-        **_meanings(subject, table),
-    )
-
-
-def _alike(
-    differences: Sequence[ListedDifference], everything: bool
-) -> list[list[ListedDifference]]:
-    """Group differences: where three places or more have one figure with the same values.
-
-    One row is then for all of them.
-
-    Args:
-        differences: Of one subject.
-        everything: Whether each has a row of its own nevertheless.
-    """
-    alike: dict[Hashable, list[ListedDifference]] = {}
-    for row in differences:
-        figure = row.quantity, row.left, row.right, row.size, row.unit
-        alike.setdefault(figure, []).append(row)
-    groups: list[list[ListedDifference]] = []
-    for rows in alike.values():
-        if len(rows) > 2 and not everything:
-            groups.append(rows)
-        else:
-            groups += [[row] for row in rows]
-    return groups
-
-
-def _table(subject: str, rows: Sequence[Sequence[str]]) -> Table:
-    """Return the table of a subject; the last columns are left out where they are empty."""
     headers = (*_HEADERS, _LAST.get(subject, ""), _LINES)
-    columns = list(range(len(headers)))
-    for column in (3, 4, 5):
-        if not any(row[column] for row in rows):
-            columns.remove(column)
+    rows: list[tuple[str, ...]] = []
+    for row in differences:
+        one = AlikeDifferences((row,))
+        rows.append((one.label, one.left, one.right, one.apart, row.effect, _lines(row, files)))
+    columns = [0, 1, 2]
+    for k in range(3, len(headers)):
+        if any(row[k] for row in rows):
+            columns.append(k)
+    wide = frozenset(columns.index(k) for k in columns if headers[k] == "apart")
     cells: list[list[str]] = []
     for row in rows:
-        cells.append([row[column] for column in columns])
-    shown = [headers[column] for column in columns]
-    return Table(shown, cells, SUBJECTS[subject], words=frozenset(range(len(columns))))
+        cells.append([row[k] for k in columns])
+    shown = [headers[k] for k in columns]
+    return Table(shown, cells, SUBJECTS[subject], frozenset(range(len(columns))), wide=wide)
 
 
-def _lack_of_armature(subject: str, differences: Sequence[ListedDifference]) -> Slots:
-    """Return how much faster a joint is accelerated on the side that has no armature."""
-    worst = max(differences, key=lambda row: row.share)
+def record_table(differences: Sequence[ListedDifference], files: tuple[str, str]) -> Table:
+    """Return what does not act on a motion, a row for each group that has the same values.
+
+    Args:
+        differences: Those that do not act.
+        files: The file of each side, with its folder.
+    """
+    by_subject: dict[str, list[ListedDifference]] = {}
+    for row in differences:
+        by_subject.setdefault(row.subject, []).append(row)
+    rows: list[tuple[str, ...]] = []
+    for subject, members in by_subject.items():
+        groups = alike(members)
+        first = groups[0]
+        example = f"{first.label}: {first.left} | {first.right}"
+        rows.append((heading(subject), str(len(members)), example, _lines(first.first, files)))
+    title = "What does not act on a motion: how many, and the first"
+    headers = ("subject", "differ", "the first, left | right", _LINES)
+    return Table(headers, rows, title, words=frozenset({0, 2, 3}))
+
+
+def heading(subject: str) -> str:
+    """Return what a subject is called in a table."""
+    return SUBJECTS[subject].partition(":")[0]
+
+
+def lack_of_armature(differences: Sequence[ListedDifference]) -> LackOfArmature | None:
+    """Return how much faster a joint is accelerated on the side that has no armature, if any."""
+    armatures = [row for row in differences if row.subject == "armature"]
+    if not armatures:
+        return None
+    worst = max(armatures, key=lambda row: row.share)
     one_has_none = not (worst.left and worst.right)
-    times = None
-    if subject == "armature" and 0 < worst.share < 1 and one_has_none:
-        factor = 1 / (1 - worst.share)
-        times = f"{factor:,.0f}" if factor >= 100 else f"{factor:.3g}"
-    return {"times": times, "joint": worst.element, "side": "left" if worst.right else "right"}
+    if not 0 < worst.share < 1 or not one_has_none:
+        return None
+    factor = 1 / (1 - worst.share)
+    times = f"{factor:,.0f}" if factor >= 100 else f"{factor:.3g}"
+    return LackOfArmature(worst.element, times, "left" if worst.right else "right")
 
 
-def _meanings(subject: str, table: Table) -> Slots:
-    """Return which subject it is, and which words of its table want a legend."""
-    slots: Slots = {name: if_true(name == subject) for name in SUBJECTS}
-    words = str((table.headers, table.rows))
-    for slot, (of, word) in _EXPLAINED.items():
-        slots[slot] = if_true(subject == of and word in words)
-    return slots
+def _name_of(row: ListedDifference) -> str:
+    """Return what a difference is called, by its cause if it has one.
+
+    A mass that takes the centre of mass and the inertia along is one cause, and three figures.
+    """
+    if row.subject in _OF_A_PART:
+        return f"{row.subject} of {row.element}"
+    if row.cause:
+        return row.cause
+    return f"{row.kind} {row.element}" if row.kind in _NAMED_WITH_KIND else row.element
 
 
-def _row(subject: str, group: Sequence[ListedDifference]) -> list[str]:
-    """Return the row of differences that are alike."""
-    first, last = group[0], group[-1]
-    unit = MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
-    effect = " … ".join(dict.fromkeys((first.effect, last.effect)))
-    apart = ""
-    if first.size is not None and subject != "drawing":
-        apart = _number(first.size, unit, APART)
-    label = _label(first, len(group) - 1)
-    values = value_text(first.left, unit), value_text(first.right, unit)
-    return [label, *values, apart, effect, _lines(first)]
+def _unit_of(row: ListedDifference) -> str:
+    """Return the unit that a row is shown in."""
+    return MOMENT if row.subject == "inertia" and row.unit == "kg m²" else row.unit
 
 
-def _lines(row: ListedDifference) -> str:
+def _lines(row: ListedDifference, files: tuple[str, str]) -> str:
     """Return the lines of both files at which an element stands; "" where none is known."""
     if row.left_line is None and row.right_line is None:
         return ""
-    return f"{_line(row.left_line)} | {_line(row.right_line)}".strip()
+    left, right = _line(row.left_line, files[0]), _line(row.right_line, files[1])
+    return f"{left} | {right}"
 
 
-def _line(line: SourceLine | None) -> str:
-    return "–" if line is None else str(line.line)
+def _line(line: SourceLine | None, file: str) -> str:
+    """Return a line; of a file that the side's file includes with the name of that."""
+    if line is None:
+        return "–"
+    return str(line.line) if line.file == Path(file).name else f"{line.file}:{line.line}"
 
 
-def _label(row: ListedDifference, more: int) -> str:
-    """Return what a row is called: as its difference is, with the figure that it is of it."""
-    name = row.cause if row.cause else row.element
-    if not row.cause and row.kind in _NAMED_WITH_KIND:
-        name = f"{row.kind} {row.element}"
-    name = f"{capital(name)} + {more} more" if more else capital(name)
-    if row.cause and row.quantity in _SAID_BY_ITS_NAME:
-        return name
-    return f"{name}: {row.quantity}".removesuffix(": ").removeprefix(": ")
-
-
-def value_text(value: Value, unit: str) -> str:
-    """Return a value of a side, in the units of a reader."""
+def value_text(value: Value, unit: str, digits: int = _DIGITS) -> str:
+    """Return a value of a side, in the units of a reader, to some significant digits."""
     match value:
         case None:
             return "not said"
@@ -222,10 +310,13 @@ def value_text(value: Value, unit: str) -> str:
             # Three in a row are a place or a direction.
             usual = "" if len(value) == 3 else f" {unit}"
             factor, shown = _SHOWN.get(unit, (1.0, usual))
-            return (" ".join(significant(entry * factor) for entry in value) + shown).strip()
-    return _number(value, unit, _SHOWN)
+            numbers = " ".join(significant(entry * factor, digits) for entry in value)
+            return f"{numbers}{shown}".strip()
+    return _number(value, unit, _SHOWN, digits)
 
 
-def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str:
+def _number(
+    value: float, unit: str, units: dict[str, tuple[float, str]], digits: int = _DIGITS
+) -> str:
     factor, shown = units.get(unit, (1.0, after(unit)))
-    return f"{significant(value * factor)}{shown}"
+    return f"{significant(value * factor, digits)}{shown}"

@@ -1,136 +1,183 @@
-"""The page of a comparison, in a terminal and alone, and what to ask next."""
+"""The page of a comparison of two runs: the verdict, the worst quantities, what to type next."""
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...errors import StateMachineError
-from ...measures import QUANTITIES
-from ...show.blocks import Page
-from .. import model_differences as models
-from ..compare.sides import Request
-from ..model_differences import page as model_diff
-from ..recordings import Trace
-from ..runs.reporter import QUIET, Reporter
-from ..why import Explanation
-from . import compare_page as compare
-from .compared_names import name_of
-from .finding import leading
-from .requests import causes
-from .requests.causes import ExplainRequest
+from ...measures.text import milliseconds
+from ...show.blocks import Block, Page, Table
+from ...show.templates import PageContent, render
+from ..compare import Comparison
+from ..compare.matched import Matched
+from .compare_details import details_of
+from .compare_verdict import headline_of, sentence_labels
+from .compared_names import long_labels, shortened, traces_of
+from .finding import VerdictCounts
+from .next_command import NextCommand, next_command
 from .requests.gap import CompareResult
+from .worst import worst_of
 
-NEXT = (
-    "Next: --why --quantity {name} tells which difference causes this gap, --one-step where in a "
-    "step it begins, --converge whether it vanishes with the timestep."
-)
-_OTHER_EXPERIMENT = (
-    "Next: another experiment, such as gravity or waves, may move what this does not."
-)
-_RECORDED = (
-    "What causes it was not looked for: one side is a recorded run, and causes are found by "
-    "running both again."
-)
+_TITLE = 30  # characters of a name in the title of the table
 
 
-def page(result: CompareResult, no_cause: str = "", details: bool = False) -> Page:
+@dataclass(frozen=True)
+class SideCounts:
+    """How many things there are to know of how two sides were run.
+
+    Attributes:
+        by_place: Joints, sites and actuators that were paired by their place in the robot.
+        unmatched: Joints, sites and actuators that one side alone has.
+        emulated: Features that a backend computes for its engine.
+        notes: What else a reader should know, in sentences.
+    """
+
+    by_place: int
+    unmatched: int
+    emulated: int
+    notes: int
+
+
+@dataclass(frozen=True)
+class ComparePage(PageContent):
+    """What the page of a comparison shows below its verdict.
+
+    Attributes:
+        result: How far apart two runs are.
+        worst: A row for each of the quantities that are farthest apart.
+        rest: The verdicts of those that have no row.
+        counts: How many things there are to know of both sides.
+        next: What to type next.
+        details: Everything else, in sections; empty where that is not asked for.
+    """
+
+    template = "compare.md.j2"
+    result: CompareResult
+    worst: Table
+    rest: VerdictCounts
+    counts: SideCounts
+    next: NextCommand
+    details: Sequence[Block]
+
+    @property
+    def experiment(self) -> str:
+        """What was run."""
+        experiment = self.result.comparison.left.trace.header.experiment
+        return _in_title(Path(experiment).name)
+
+    @property
+    def file(self) -> str | None:
+        """The file of both sides; None where they have two."""
+        traces = traces_of(self.result.comparison)
+        left, right = (trace.header.provenance.model_file for trace in traces)
+        return _in_title(left) if left == right else None
+
+    @property
+    def sides(self) -> tuple[str, str] | None:
+        """What the sides are called, where the verdict calls them left and right alone."""
+        comparison = self.result.comparison
+        if sentence_labels(comparison)[0] != "the left":
+            return None
+        left, right = long_labels(comparison)
+        return _in_title(left), _in_title(right)
+
+    @property
+    def until(self) -> float:
+        """How long the comparison is [s]."""
+        return self.result.comparison.until
+
+    @property
+    def total(self) -> int:
+        """How many quantities there are."""
+        return len(self.result.comparison.agreements)
+
+
+def page(result: CompareResult, details: bool = False) -> Page:
     """Return the page of a comparison, for a terminal.
 
     Args:
-        result: What was found.
-        no_cause: Why no cause can be named, where one was asked for.
-        details: Whether all of it is shown, and not the first screen alone.
+        result: How far apart two runs are.
+        details: Whether everything follows that is known: all quantities, contacts, what rounding
+            makes, tolerances and their reasons, what was paired and emulated, a third party.
     """
-    return _page(result, why_not=_what_next(result, no_cause))
+    finding = result.finding
+    worst = worst_of(result.comparison, finding, result.floor)
+    table, rest = worst.narrow_table, worst.rest
+    if finding.outcome == "nothing moved":  # there is nothing that a row could say
+        table, rest = replace(table, rows=[]), VerdictCounts(0, 0, 0)
+    content = ComparePage(
+        result=result,
+        worst=table,
+        rest=rest,
+        counts=side_counts(result),
+        next=next_command(result.request.run, finding, result.instead),
+        details=details_of(result) if details else [],
+    )
+    headline = headline_of(finding, result.comparison, result.instead)
+    return replace(render(content), headline=headline)
 
 
-def whole_page(
-    result: CompareResult, ask_why: ExplainRequest | None, typed: str, reporter: Reporter = QUIET
-) -> Page:
-    """Return the page of a comparison that stands alone: with causes, models and its command.
+def _in_title(name: str) -> str:
+    return shortened([name], _TITLE)[0]
+
+
+def side_counts(result: CompareResult) -> SideCounts:
+    """Count what there is to know of how two sides were run."""
+    run, comparison = result.run, result.comparison
+    by_place, unmatched, remarks = 0, 0, 0
+    if run.matched is not None:
+        by_place = _paired_by_place(run.matched, result.request.run.names)
+        remarks = len(run.matched.notes)
+        for only in run.matched.only:
+            unmatched += sum(len(names) for names in only.values())
+    emulated = 0
+    for side in (comparison.left, comparison.right):
+        if side.trace.header.defaults == "model":
+            emulated += len(side.trace.header.provenance.emulated)
+    # Each pair has a remark of its own.
+    notes = len(run.said) + len(comparison.notes) + max(0, remarks - by_place)
+    return SideCounts(by_place, unmatched, emulated, notes)
+
+
+def _paired_by_place(matched: Matched, names: Mapping[str, str]) -> int:
+    """Return how many joints, sites and actuators are paired that have two names.
 
     Args:
-        result: What was found.
-        ask_why: What is asked of causes; None for nothing.
-        typed: The command that makes it again.
-        reporter: Told how the search for causes gets on.
+        matched: The pairs.
+        names: Two names that were said to be one.
     """
-    traces = result.run.traces
-    explanation, why_not = None, ""
-    if ask_why is not None and result.comparison.outcome not in ("ended", "nothing moved"):
-        if any(trace.header.recorded for trace in traces):
-            why_not = _RECORDED
-        else:
-            explanation, why_not = _explained(ask_why, reporter)
-    return _page(
-        result,
-        explanation=explanation,
-        why_not=why_not,
-        models_page=_models_page(result.request.run, traces),
-        typed=typed,
-    )
+    left, right = matched.left, matched.right
+    count = 0
+    for left_names, right_names, pairs in (
+        (left.joint_names, right.joint_names, matched.joints),
+        (left.site_names, right.site_names, matched.sites),
+        (left.actuator_names, right.actuator_names, matched.actuators),
+    ):
+        for left_id, right_id in pairs:
+            name = left_names[left_id]
+            count += names.get(name, name) != right_names[right_id]
+    return count
 
 
-def _page(
-    result: CompareResult,
-    *,
-    explanation: Explanation | None = None,
-    why_not: str = "",
-    models_page: Page | None = None,
-    typed: str = "",
-) -> Page:
-    """Return the page of a comparison, and what it says besides."""
-    parts = compare.PageParts(explanation, why_not, models_page, typed, result.instead)
-    return compare.page(
-        result.comparison,
-        said=result.run.said,
-        run=result.run if result.request.names_sides else None,
-        played=result.played,
-        witness=result.witness,
-        floor=result.floor,
-        parts=parts,
-    )
+def title_of(comparison: Comparison) -> str:
+    """Return what was run, and on which two sides."""
+    return f"{comparison.left.trace.header.experiment}: {' and '.join(long_labels(comparison))}"
 
 
-def _what_next(result: CompareResult, no_cause: str) -> str:
-    """Return what to ask next, or why no cause is named; "" where the page says all of it."""
-    comparison = result.comparison
-    if comparison.outcome != "differs":
-        return ""
-    moving = [gap for gap in comparison.agreements if QUANTITIES[gap.kind].moves]
-    if all(gap.verdict == "agrees" for gap in moving):
-        return _OTHER_EXPERIMENT
-    if no_cause:
-        return no_cause
-    lead = leading(comparison, result.floor)
-    return NEXT.format(name=shlex.quote(name_of(lead.name)))
-
-
-def _explained(request: ExplainRequest, reporter: Reporter) -> tuple[Explanation | None, str]:
-    """Return what explains a gap, or None and why nothing does."""
-    try:
-        return causes.answer(request, reporter), ""
-    except StateMachineError as error:
-        return None, f"What causes it could not be found: {error}."
-
-
-def _models_page(run: Request, traces: Sequence[Trace]) -> Page | None:
-    """Return the page of what each engine makes of the model; None where that cannot be read."""
-    names = [str(side.path) for side in run.sides]
-    if not names:
-        names = [trace.header.provenance.model_file for trace in traces]
-    left, right = (trace.header.backend for trace in traces)
-    if left == right and names[0] == names[1]:
-        return None
-    files = [run.model or name for name in names]
-    labels = f"{Path(names[0]).name}@{left}", f"{Path(names[1]).name}@{right}"
-    try:
-        differences = models.compare(
-            files[0], files[1], (left, right), rename=run.names, menagerie=run.menagerie
-        )
-        return model_diff.page(replace(differences, labels=labels))
-    except (StateMachineError, OSError):
-        return None
+def origin_of(comparison: Comparison) -> str:
+    """Return the files that were run, on what, and with which steps, in one line."""
+    files: dict[str, None] = {}
+    sides, labels = list[str](), long_labels(comparison)
+    for label, trace in zip(labels, traces_of(comparison), strict=True):
+        source = trace.header.provenance
+        files[f"{source.model_file} ({source.model_sha256[:8]})"] = None
+        side = f"{label}, {milliseconds(trace.header.timestep)}"
+        if source.seed is not None:
+            side += f", seed {source.seed}"
+        sides.append(side)
+    parts = list(files)
+    engine = comparison.left.trace.header.label
+    if engine not in labels[0]:
+        parts.append(f"both on {engine}")
+    return "; ".join([*parts, *sides])

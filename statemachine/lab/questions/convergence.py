@@ -2,135 +2,224 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from ...measures.text import (
-    grouped,
-    listed,
-    milliseconds,
-    quantity,
-    short_time,
-    significant,
-)
-from ...show import report_template as template
-from ...show.blocks import Headline, Page, Table
-from ...show.report_template import if_true, slots_of
-from ..compare.convergence import FINER, Convergence, GapLimit, LimitVerdict
+from ...measures import QUANTITIES
+from ...measures.text import grouped, milliseconds, quantity, short_time
+from ...show.blocks import Page, Table
+from ...show.first_screen import first_screen
+from ...show.templates import PageContent, render
+from ..compare.convergence import FINER, Convergence, GapLimit, GapState, TouchState
+from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
 from .compared_names import name_of
 from .requests.converge import ConvergeResult
+from .typed_command import command_of
 
-LEADS = {
-    "rounding": "There is no gap beyond rounding, whatever the timestep",
-    "vanishes": "The gap vanishes with the timestep: it is discretisation",
-    "unclear": "It is unclear whether the gap vanishes with the timestep: that of {name} is "
-    "{coarse}, and {fine} with the finest steps, in no steady order (so {unclear} of {total} "
-    "quantities)",
-    "stays": "The gap does not vanish with the timestep: that of {name} is {coarse}, and {fine} "
-    "with the finest steps",
-    "in part": "The gap vanishes with the timestep in part only: that of {name} is {coarse}, and "
-    "{fine} with the finest steps",
-}
-NO_GAP = "Before the first touch, at {touch}, there is no gap."
-DISCRETISATION = "Before the first touch, at {touch}, there is nothing but discretisation."
-ByVerdict = Mapping[LimitVerdict, Sequence[GapLimit]]
 _FINER = ("at h", *(f"h/{finer}" for finer in FINER[1:]))
+_WORST_FIRST = ("stays", "in part", "unclear", "discretisation")
+_FINER_BY = 4  # than the steps as given, where those are too coarse
+_OTHER_EXPERIMENT = "waves"  # moves whatever has an actuator
+
+NextStep = Literal["why", "smaller steps", "finer", "another experiment", "nothing"]
+
+
+@dataclass(frozen=True)
+class ConvergencePage(PageContent):
+    """What the page of finer timesteps shows.
+
+    Attributes:
+        experiment: What was run.
+        limits: What becomes of the gap of each quantity.
+        worst: Table of the gaps that vanish least.
+        more: How many gaps beyond rounding it does not show.
+        next_step: What the next command is for.
+        next_command: What to type next; "" for nothing.
+        details: Whether everything is shown.
+    """
+
+    template = "convergence.md.j2"
+    experiment: str
+    limits: Convergence
+    worst: Table
+    more: int
+    next_step: NextStep
+    next_command: str
+    details: bool
+
+    @property
+    def left(self) -> str:
+        """What the left side is called."""
+        return self.limits.labels[0]
+
+    @property
+    def right(self) -> str:
+        """What the right side is called."""
+        return self.limits.labels[1]
+
+    @property
+    def holds(self) -> bool:
+        """Whether something was compared, and every gap vanishes."""
+        return self.limits.vanishes and not self.limits.is_still
+
+    @property
+    def state(self) -> GapState:
+        """What becomes of the gap."""
+        return self.limits.state
+
+    @property
+    def still(self) -> str:
+        """What is said where nothing moved."""
+        return nothing_moved(self.limits.motion)
+
+    @property
+    def until_touch(self) -> TouchState:
+        """Whether the gap begins with the first touch."""
+        return self.limits.until_touch
+
+    @property
+    def lead(self) -> GapLimit:
+        """The quantity that is told first."""
+        return self.limits.lead
+
+    @property
+    def name(self) -> str:
+        """What the quantity that is told first is called."""
+        return name_of(self.limits.lead.name)
+
+    @property
+    def counts(self) -> list[str]:
+        """How many gaps have each verdict."""
+        by_verdict = grouped((limit.verdict, limit) for limit in self.limits.whole)
+        return [f"{verdict} {len(limits)}" for verdict, limits in by_verdict.items()]
+
+    @property
+    def steps(self) -> list[str]:
+        """The engines' steps as given, each once."""
+        return list(dict.fromkeys(milliseconds(step, 3) for step in self.limits.steps))
+
+    @property
+    def periods_differ(self) -> bool:
+        """Whether a command holds for another time on each side."""
+        return self.period_left != self.period_right
+
+    @property
+    def period_left(self) -> str:
+        """For how long a command holds on the left."""
+        return milliseconds(self.limits.periods[0], 3)
+
+    @property
+    def period_right(self) -> str:
+        """For how long a command holds on the right."""
+        return milliseconds(self.limits.periods[1], 3)
+
+    @property
+    def longest_period(self) -> float:
+        """The longer time for which a command holds [s]."""
+        return max(self.limits.periods)
+
+    @property
+    def before(self) -> Table:
+        """The gaps until the first touch; without rows where nothing touches."""
+        touch = self.limits.touch
+        if touch is None:
+            return _limits_table((), "")
+        title = f"The gap with finer steps, before the first touch at {short_time(touch)}"
+        return _limits_table(self.limits.before, title)
+
+    @property
+    def whole(self) -> Table:
+        """The gaps over the whole run."""
+        return _limits_table(self.limits.whole, "The gap with finer steps, over the whole run")
+
+    @property
+    def farthest(self) -> GapLimit:
+        """The quantity that is farthest apart with the steps as given, of the first's unit."""
+        limits = self.limits.whole
+        alike = [limit for limit in limits if limit.unit == limits[0].unit]
+        return max(alike, key=lambda limit: limit.as_given)
+
+    @property
+    def farthest_name(self) -> str:
+        """What that quantity is called."""
+        return name_of(self.farthest.name)
+
+    @property
+    def most_rounding(self) -> list[str]:
+        """The largest gap that is rounding, in each unit."""
+        largest: dict[str, float] = {}
+        for limit in self.limits.whole:
+            if limit.verdict == "rounding":
+                largest[limit.unit] = max(*limit.gaps, largest.get(limit.unit, 0.0))
+        return [quantity(gap, unit) for unit, gap in largest.items()]
 
 
 def page(result: ConvergeResult, details: bool = False) -> Page:
     """Return the page of what vanishes with the timestep, and what does not.
 
     Args:
-        result: What was found.
-        details: Whether all of it is shown, and not the first screen alone.
+        result: What becomes of each gap.
+        details: Whether every gap is shown, and those before the first touch.
     """
-    by_verdict = grouped((limit.verdict, limit) for limit in result.whole)
-    return template.page(
-        "lab/questions/convergence",
-        _of_the_limit(result, by_verdict),
-        experiment=result.request.run.experiment,
-        **slots_of(
-            _runs_of(result),
-            _limit_tables_of(result),
-            _counts_of(result, by_verdict),
-            _rounding_of(result),
-            _advice_of(result),
-        ),
+    gaps = _worst_first(result.limits.whole)
+    if details:
+        return _page(result, (), details=True)
+    return first_screen(lambda rows: _page(result, gaps[:rows]), len(gaps))
+
+
+def _page(result: ConvergeResult, worst: Sequence[GapLimit], details: bool = False) -> Page:
+    """Return the page with some of the gaps; with details two tables have all of them."""
+    run = result.request.run
+    limits = result.limits
+    next_step = _next_step(limits, run)
+    more = 0 if details else len(_worst_first(limits.whole)) - len(worst)
+    content = ConvergencePage(
+        experiment=run.experiment,
+        limits=limits,
+        worst=_limits_table(worst, "", finest=1),
+        more=more,
+        next_step=next_step,
+        next_command=_next_command(next_step, limits, run),
+        details=details,
     )
+    return render(content)
 
 
-@dataclass(frozen=True)
-class _Runs:
-    """What the page says of the runs.
+def _worst_first(limits: Sequence[GapLimit]) -> list[GapLimit]:
+    """Return the gaps beyond rounding: those that vanish least first, coordinates before others.
 
-    Attributes:
-        left: What the left side is called.
-        right: What the right side is called.
-        until: The last moment that is compared [s].
-        steps: The engines' steps as given, each once.
-        here: How long a command holds on the left; None where it holds as long on both sides.
-        there: How long a command holds on the right.
-        late: The longer of these [s].
+    Of one unit the largest gap is the first.
     """
+    units = list(dict.fromkeys(limit.unit for limit in limits))
 
-    left: str
-    right: str
-    until: float
-    steps: str
-    here: str | None
-    there: str
-    late: str
+    def place(limit: GapLimit) -> tuple[int, bool, int, float]:
+        is_other = not QUANTITIES[limit.kind].own
+        return (
+            _WORST_FIRST.index(limit.verdict),
+            is_other,
+            units.index(limit.unit),
+            -limit.finest,
+        )
 
-
-def _runs_of(result: Convergence) -> _Runs:
-    left, right = result.labels
-    here, there = (milliseconds(period, 3) for period in result.periods)
-    steps = dict.fromkeys(milliseconds(step, 3) for step in result.steps)
-    return _Runs(
-        left=left,
-        right=right,
-        until=result.until,
-        steps=" and ".join(steps),
-        here=None if here == there else here,
-        there=there,
-        late=significant(max(result.periods)),
-    )
+    return sorted((limit for limit in limits if limit.verdict != "rounding"), key=place)
 
 
-@dataclass(frozen=True)
-class _LimitTables:
-    """The tables of the gaps.
+def _limits_table(limits: Sequence[GapLimit], title: str, finest: int = 3) -> Table:
+    """Return a row for each gap beyond rounding.
 
-    Attributes:
-        before: Until the first touch; None where there is nothing to be seen in it.
-        whole: Over the whole run.
+    Args:
+        limits: What becomes of each gap.
+        title: Of the table.
+        finest: How many of the finest steps have a column, beside the steps as given.
     """
-
-    before: Table | None
-    whole: Table
-
-
-def _limit_tables_of(result: Convergence) -> _LimitTables:
-    before = None
-    only_rounding = all(limit.verdict == "rounding" for limit in result.before)
-    if result.touch is not None and not only_rounding:  # else one line says so
-        title = f"The gap with finer steps, before the first touch at {short_time(result.touch)}"
-        before = _limits(result.before, title)
-    return _LimitTables(
-        before, _limits(result.whole, "The gap with finer steps, over the whole run")
-    )
-
-
-def _limits(limits: Sequence[GapLimit], title: str) -> Table:
-    """Return a row for each gap beyond rounding: with the first steps and the finest three."""
-    levels = len(limits[0].gaps)
     columns: dict[str, Callable[[GapLimit], str]] = {
         "quantity": lambda limit: name_of(limit.name),
         "the gap is": lambda limit: limit.verdict,
     }
-    for level in sorted({0, *range(levels - 3, levels)}):
+    levels = max((len(limit.gaps) for limit in limits), default=0)
+    for level in sorted({0, *range(max(levels - finest, 0), levels)}):
         columns[_FINER[level]] = _gap_at(level)
     columns["at 0"] = lambda limit: quantity(limit.limit, limit.unit)
     return Table.of(
@@ -147,119 +236,48 @@ def _gap_at(level: int) -> Callable[[GapLimit], str]:
     return lambda limit: quantity(limit.gaps[level], limit.unit)
 
 
-@dataclass(frozen=True)
-class _Counts:
-    """How many gaps do what, and how far the sides move with finer steps.
+def _next_step(limits: Convergence, run: Request) -> NextStep:
+    """Return what to ask next."""
+    match limits.state:
+        case "still":
+            return "nothing" if run.what[0] == _OTHER_EXPERIMENT else "another experiment"
+        case "rounding":
+            return "nothing"
+        case "vanishes":
+            return "finer"
+        case "unclear" if limits.touch is None:
+            return "smaller steps"
+    return "why"
 
-    Attributes:
-        total: How many quantities there are.
-        counts: How many gaps have each verdict.
-        name: The quantity that is farthest apart with the steps as given, of the first's unit.
-        left_moved: How far the left side is in it from its own run with the finest steps.
-        right_moved: How far the right side is.
+
+def _next_command(next_step: NextStep, limits: Convergence, run: Request) -> str:
+    """Return what to type next; "" for nothing."""
+    match next_step:
+        case "why" if QUANTITIES[limits.lead.kind].own:
+            return command_of(run, "--why", "--quantity", name_of(limits.lead.name))
+        case "why":
+            return command_of(run, "--why")
+        case "smaller steps":
+            return command_of(_with_finer_steps(run, limits.steps), "--converge")
+        case "finer":
+            return command_of(_with_finer_steps(run, limits.steps))
+        case "another experiment":
+            return command_of(replace(run, what=(_OTHER_EXPERIMENT,), seconds=None))
+    return ""
+
+
+def _with_finer_steps(run: Request, steps: tuple[float, float]) -> Request:
+    """Return what is run, with a part of the timestep on both sides.
+
+    Args:
+        run: What is run.
+        steps: The engine's step of each side, as given [s].
     """
-
-    total: int
-    counts: str
-    name: str
-    left_moved: str
-    right_moved: str
-
-
-def _counts_of(result: Convergence, by_verdict: ByVerdict) -> _Counts:
-    alike = [limit for limit in result.whole if limit.unit == result.whole[0].unit]
-    farthest = max(alike, key=lambda limit: limit.gaps[0])
-    left_moved, right_moved = (quantity(moved, farthest.unit) for moved in farthest.moved)
-    return _Counts(
-        total=len(result.whole),
-        counts=", ".join(f"{verdict} {len(limits)}" for verdict, limits in by_verdict.items()),
-        name=name_of(farthest.name),
-        left_moved=left_moved,
-        right_moved=right_moved,
-    )
-
-
-@dataclass(frozen=True)
-class _Rounding:
-    """Of the gaps that are rounding.
-
-    Attributes:
-        rounding: How many there are; None for none.
-        most: The largest of each unit.
-    """
-
-    rounding: int | None
-    most: str
-
-
-def _rounding_of(result: Convergence) -> _Rounding:
-    gaps = [(max(limit.gaps), limit.unit) for limit in result.whole if limit.verdict == "rounding"]
-    if not gaps:
-        return _Rounding(None, "")
-    largest = {unit: quantity(gap, unit) for gap, unit in sorted(gaps)}
-    return _Rounding(len(gaps), listed(list(largest.values())))
-
-
-@dataclass(frozen=True)
-class _Advice:
-    """What the page adds under a condition.
-
-    Attributes:
-        touch: "" where two engines touch something.
-        quarter: A timestep that may tell what is unclear [s]; None where nothing is, or where
-            something touches.
-    """
-
-    touch: str | None
-    quarter: str | None
-
-
-def _advice_of(result: Convergence) -> _Advice:
-    touches = result.touch is not None
-    quarter = None
-    if result.unclear and not touches:
-        quarter = significant(min(result.steps) / 4)
-    return _Advice(if_true(touches and len(result.engines) > 1), quarter)
-
-
-def _of_the_limit(result: Convergence, by_verdict: ByVerdict) -> Headline:
-    """Return the headline: whether the gap vanishes with the timestep."""
-    if result.is_still:
-        return Headline(nothing_moved(result.motion), holds=False)
-    if result.vanishes:
-        return Headline(LEADS["vanishes" if by_verdict.keys() - {"rounding"} else "rounding"])
-    gap = _leading(by_verdict)
-    coarse, fine = quantity(gap.gaps[0], gap.unit), quantity(gap.gaps[-1], gap.unit)
-    lead = LEADS[gap.verdict].format(
-        name=name_of(gap.name),
-        coarse=coarse,
-        fine=fine,
-        unclear=len(by_verdict.get("unclear", [])),
-        total=len(result.whole),
-    )
-    return Headline(lead, end=_before_the_touch(result), holds=False)
-
-
-def _leading(by_verdict: ByVerdict) -> GapLimit:
-    """Return the gap that the headline is of.
-
-    It is one that stays, or one that is unclear, whichever are more often; of those with the
-    unit of the first the largest.
-    """
-    unclear = by_verdict.get("unclear", [])
-    stay = [*by_verdict.get("stays", []), *by_verdict.get("in part", [])]
-    if len(stay) > len(unclear):
-        alike = [limit for limit in stay if limit.unit == stay[0].unit]
-        return max(alike, key=lambda limit: limit.gaps[-1])
-    candidates = unclear if unclear else list(chain(*by_verdict.values()))
-    alike = [limit for limit in candidates if limit.unit == candidates[0].unit]
-    return max(alike, key=lambda limit: limit.gaps[0])
-
-
-def _before_the_touch(result: Convergence) -> str:
-    """Say of a gap that stays that there is none until something touches; "" if there is one."""
-    verdicts = {limit.verdict for limit in result.before}
-    if result.touch is None or not verdicts or not verdicts <= {"rounding", "discretisation"}:
-        return ""
-    text = NO_GAP if verdicts == {"rounding"} else DISCRETISATION
-    return text.format(touch=short_time(result.touch))
+    if steps[0] == steps[1] and not any("timestep" in side.options for side in run.sides):
+        return replace(run, options={**run.options, "timestep": steps[0] / _FINER_BY})
+    if not run.sides:  # one model on two engines, with steps of their own
+        return replace(run, options={**run.options, "timestep": min(steps) / _FINER_BY})
+    sides: list[Side] = []
+    for side, step in zip(run.sides, steps, strict=True):
+        sides.append(replace(side, options={**side.options, "timestep": step / _FINER_BY}))
+    return replace(run, sides=tuple(sides))

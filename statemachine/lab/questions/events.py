@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from ...measures.text import capital, grouped, short_time
 from ...show.blocks import Table, TableCell
 from ..compare import Comparison
-
-if TYPE_CHECKING:
-    pass
 from .compared_names import long_labels, name_of, traces_of
 
 
@@ -72,7 +69,6 @@ def events_table(comparison: Comparison) -> Table:
     return Table(
         ("time", "what", "on"),
         rows,
-        "First touches, partings, largest differences; press a time to go there",
         words=frozenset({0, 1, 2}),
     )
 

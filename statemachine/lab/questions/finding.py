@@ -1,214 +1,221 @@
-"""What a comparison found, in words: each from its figures, none a guess."""
+"""What a comparison comes to: what differs most, since when, how far at the end, by chance or not.
+
+Every figure and every choice that the sentences of a page rest on is a field here.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
 from ...measures import QUANTITIES
-from ...measures.text import capital, quantity, short_time
-from ...show import report_template as template
-from ...show.blocks import Block, Headline
-from ...show.report_template import if_true, slots_of
 from ..compare import Agreement, Comparison, Series
+from ..compare.agreement import ComparisonOutcome
 from ..compare.chaos import Chance, ChaosFloor
-from ..compare.instead import Instead
 from ..compare.series import at_the_end
-from ..compare.stillness import extent_of, nothing_moved
-from ..why.answer_page import answer, proofs
-
-if TYPE_CHECKING:
-    from ..why import Explanation
-from .compared_names import name_of, named, short_labels, traces_of, window
-from .events import Event
-from .floor_words import floor_sides
+from .compared_names import traces_of
 
 _STEADY = 0.1  # share by which a difference may change in the end and be called settled
-LEADS = {
-    "same": "The two runs are the same in every figure that was compared",
-    "agree": "The two runs agree for {until:g} s: nothing leaves its tolerance",
-    "ended": "{sides} ended early; until {until:g} s {agrees} of {total} quantities are within "
-    "tolerance",
-    "apart": "{what} is up to {far} apart between {left} and {right}, at {at}{parting}",
-    "contact": "{what}: {far}{parting}",
-}
-PARTING = {
-    "at the start": "; the runs part from the start",
-    "exact": "; the runs part at {time}",
-    "first": "; they are apart at the first common moment already, {time}",
-    "coarse": "; they are apart from the common moment {time} on",
-}
-ENDS = {
-    "inside": "Nothing can be concluded: rounding alone makes up to {floor} of it (the chaos "
-    "floor, from {runs} perturbed runs of {sides}).",
-    "cannot be told": "Whether that is more than chance cannot be told: rounding alone makes up to "
-    "{floor} of it (the chaos floor, from {runs} perturbed runs of {sides}).",
-    "alike": "All of the motion is within its tolerance at all moments.",
-    "within": "On average over {window}, all of the motion is within its tolerance.",
-    "settled": "On average over {window} {what} is still {far} apart.",
-    "changing": "On average over {window} {what} is still {far} apart, and still changing: {last} "
-    "at the last moment.",
-}
+_TOGETHER = 1.001  # of a step: events so far apart are at one time
+
+# How well the time of a divergence is known: it is the start; it is known to a step; the runs
+# differ at the first moment that both have, or at a later one of moments that lie farther apart.
+DivergenceTime = Literal["start", "step", "first moment", "moment"]
+# What rounding alone makes of a gap: see `Rounding`.
+RoundingVerdict = Literal["not computed", "no bound", "less", "cannot be told", "as much"]
+OpenLoop = Literal["none", "agrees", "differs"]
 
 
-def headline(
+@dataclass(frozen=True)
+class Divergence:
+    """When the first quantity leaves its tolerance, and what happens then.
+
+    Attributes:
+        quantity: The name of the first quantity.
+        time: When it leaves its tolerance [s].
+        known_to: How well that time is known.
+        body: A body whose first touch on either side is then; "" for none.
+        ground: What it touches.
+    """
+
+    quantity: str
+    time: float
+    known_to: DivergenceTime
+    body: str = ""
+    ground: str = ""
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """What rounding alone makes of the gap that is farthest beyond its tolerance.
+
+    Attributes:
+        verdict: "less": less than a third of the gap; "as much": all of it; "cannot be told"
+            between the two; "no bound": a perturbed run ended early; "not computed".
+        most: The largest distance of a perturbed run from the run of its side [unit of the gap].
+        ended: How many perturbed runs ended early.
+    """
+
+    verdict: RoundingVerdict
+    most: float = 0.0
+    ended: int = 0
+
+    @property
+    def may_be_all(self) -> bool:
+        """Whether the gap may be chance, as far as is known."""
+        return self.verdict in ("as much", "cannot be told", "no bound")
+
+
+@dataclass(frozen=True)
+class VerdictCounts:
+    """How many quantities have which verdict.
+
+    Attributes:
+        differs: Those that are beyond their tolerance at the end.
+        settles: Those that are beyond it on the way alone.
+        agrees: Those that are within it always.
+    """
+
+    differs: int
+    settles: int
+    agrees: int
+
+    @property
+    def total(self) -> int:
+        """How many quantities there are."""
+        return self.differs + self.settles + self.agrees
+
+    @property
+    def in_turn(self) -> list[str]:
+        """Each verdict that some have, and how many."""
+        counts = {"differs": self.differs, "settles": self.settles, "agrees": self.agrees}
+        return [f"{verdict} {count}" for verdict, count in counts.items() if count]
+
+    @classmethod
+    def of(cls, agreements: Sequence[Agreement]) -> VerdictCounts:
+        """Count verdicts."""
+        verdicts = [agreement.verdict for agreement in agreements]
+        return cls(verdicts.count("differs"), verdicts.count("settles"), verdicts.count("agrees"))
+
+
+@dataclass(frozen=True)
+class EarlyEnd:
+    """A run that ended before its time.
+
+    Attributes:
+        side: 0 for the left, 1 for the right.
+        time: When [s].
+        reason: Why, as the engine says it.
+    """
+
+    side: int
+    time: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class MissingPart:
+    """What one side has nothing of, and the other has.
+
+    Attributes:
+        side: "left" or "right": who has none.
+        part: "floor" or "actuators".
+    """
+
+    side: str
+    part: str
+
+    @property
+    def giver(self) -> str:
+        """The side that has it."""
+        return "right" if self.side == "left" else "left"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a comparison of two runs comes to.
+
+    Attributes:
+        outcome: What came of it.
+        is_same: Whether every figure is the same on both sides.
+        counts: How many quantities have which verdict.
+        lead: The quantity that is farthest beyond its tolerance; see `leading`. Where all agree,
+            the one that comes nearest to its tolerance.
+        is_changing: Whether its difference still changes at the end.
+        noticed: Position of the fingertip, or of a free body: the one that is farthest apart. None
+            where it is the lead, or where there is none.
+        divergence: When the runs diverge; None where every quantity agrees.
+        rounding: What rounding alone makes of the lead.
+        open_loop: Whether the runs agree with the commands of the left on both sides; "none" where
+            both got the same commands.
+        ended: The runs that ended early.
+        missing: What one side has nothing of, and the other has.
+    """
+
+    outcome: ComparisonOutcome
+    is_same: bool
+    counts: VerdictCounts
+    lead: Agreement
+    is_changing: bool
+    noticed: Agreement | None
+    divergence: Divergence | None
+    rounding: Rounding
+    open_loop: OpenLoop
+    ended: tuple[EarlyEnd, ...]
+    missing: tuple[MissingPart, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the runs agree, in open loop too where there is one: the exit code is 0."""
+        return self.outcome == "agrees" and self.open_loop != "differs"
+
+
+def finding_of(
     comparison: Comparison,
-    events: Sequence[Event],
-    explanation: Explanation | None = None,
     floor: ChaosFloor | None = None,
-    instead: Instead | None = None,
-) -> Headline:
-    """Return the largest difference, what explains it, and what is left of it in the end.
+    played: Comparison | None = None,
+    missing: tuple[tuple[str, str], ...] = (),
+) -> Finding:
+    """Return what a comparison comes to.
 
     Args:
-        comparison: The figures.
-        events: What happens when.
-        explanation: What explains the largest difference; None if that was not asked.
-        floor: The chaos floor; None if it was not looked for.
-        instead: What to run where nothing moved; None where that was not looked for.
+        comparison: Of the two runs.
+        floor: What rounding alone makes; None where that was not computed.
+        played: The comparison of the open loop; None where it is that of the closed one.
+        missing: What a side has nothing of, as of `SidesRun`.
     """
-    if comparison.outcome == "nothing moved":
-        return Headline(nothing_moved(comparison.motion, instead), holds=False)
-    if comparison.agrees:
-        same = all(agreement.max == 0 for agreement in comparison.agreements)
-        return Headline(LEADS["same" if same else "agree"].format(until=comparison.until))
-    if comparison.ended:
-        return _of_an_early_end(comparison)
-    what, far, at, agreement = subject(comparison, explanation, floor)
-    parting_words = _parting(comparison, events)
-    if agreement is not None and agreement.kind == "contact":
-        what = name_of(agreement.name)
-        far = agreement.note if agreement.note else far
-        lead = LEADS["contact"].format(what=what, far=far, parting=parting_words)
-    else:
-        left, right = short_labels(comparison)
-        lead = LEADS["apart"].format(
-            what=what,
-            far=far,
-            at=short_time(at),
-            left=left,
-            right=right,
-            parting=parting_words,
-        )
-    causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
-    end = _by_chance(comparison, floor, agreement)
-    if not end:
-        end = _in_the_end(comparison, agreement)
-    return Headline(capital(lead), causes, end, holds=False)
-
-
-def _of_an_early_end(comparison: Comparison) -> Headline:
-    """Return the headline of a comparison of which a run ended before its time."""
-    sides = [side.label for side in (comparison.left, comparison.right) if side.trace.header.ended]
-    verdicts = Counter(agreement.verdict for agreement in comparison.agreements)
-    lead = LEADS["ended"].format(
-        sides=" and ".join(sides),
-        until=comparison.until,
-        agrees=verdicts["agrees"],
-        total=len(comparison.agreements),
+    lead = leading(comparison, floor)
+    open_loop: OpenLoop = "none"
+    if played is not None:
+        open_loop = "agrees" if played.agrees else "differs"
+    is_same = all(agreement.max == 0 for agreement in comparison.agreements)
+    of_lead = [curve for curve in comparison.curves if curve.name == lead.name]
+    is_changing = any(_is_changing(curve, lead) for curve in of_lead)
+    counts = VerdictCounts.of(comparison.agreements)
+    noticed = _noticed(comparison.agreements, lead)
+    divergence, rounding = _divergence(comparison), _rounding(lead, floor)
+    ended = tuple(_early_ends(comparison))
+    lacking = tuple(MissingPart(side, part) for side, part in missing)
+    return Finding(
+        outcome=comparison.outcome,
+        is_same=is_same,
+        counts=counts,
+        lead=lead,
+        is_changing=is_changing,
+        noticed=noticed,
+        divergence=divergence,
+        rounding=rounding,
+        open_loop=open_loop,
+        ended=ended,
+        missing=lacking,
     )
-    return Headline(lead, holds=False)
-
-
-def _by_chance(
-    comparison: Comparison, floor: ChaosFloor | None, agreement: Agreement | None
-) -> str:
-    """Say that rounding alone may make the gap of a quantity; "" where the gap is beyond that."""
-    if floor is None or agreement is None:
-        return ""
-    for band in floor.bands:
-        if band.name == agreement.name and band.chance in ("inside", "cannot be told"):
-            return ENDS[band.chance].format(
-                floor=quantity(band.most, band.unit),
-                runs=floor.runs,
-                sides=floor_sides(comparison, floor),
-            )
-    return ""
-
-
-def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
-    """When the runs part; of moments farther apart than timesteps, which is the first."""
-    at = parting(comparison)
-    if at is None:
-        return ""
-    step = max(trace.timestep for trace in traces_of(comparison))
-    spacing = comparison.until / max(1, comparison.moments - 1)
-    kind = "at the start" if at == 0 else "exact"
-    if at and spacing > 1.5 * step:
-        kind = "first" if at <= 1.001 * spacing else "coarse"
-    # A touch later than a step after the parting has nothing to do with it.
-    slack = 1.001 * step if at and kind != "first" else -1.0
-    touches = (e.what for e in events if e.kind == "touch" and e.time and abs(e.time - at) <= slack)
-    body, _, ground = next(touches, "").partition(" on ")
-    when = f", when {body} touches {ground}" if body else ""
-    return PARTING[kind].format(time=short_time(at)) + when
-
-
-def _in_the_end(comparison: Comparison, lead: Agreement | None) -> str:
-    """What of the motion is still apart, as a mean over the end, and whether it still changes.
-
-    Of several that are as far apart it is `lead`, which the headline names already.
-    """
-    motion = [a for a in comparison.agreements if QUANTITIES[a.kind].moves]
-    differ = [a for a in motion if a.verdict == "differs"]
-    known = [a for a in differ if a.settled >= 0]  # what is not a number is on neither side
-    over = window(comparison)
-    if not known:
-        kind = "alike" if all(a.verdict == "agrees" for a in motion) else "within"
-        return "" if differ or not motion else ENDS[kind].format(window=over)
-    most = max(
-        known, key=lambda a: (float(f"{a.settled / (a.tolerance or 1e-300):.2g}"), a == lead)
-    )
-    last = next(_last(curve, most) for curve in comparison.curves if curve.name == most.name)
-    return ENDS["settled" if last is None else "changing"].format(
-        window=over,
-        what=named(most),
-        far=quantity(most.settled, most.unit),
-        last=quantity(last, most.unit),
-    )
-
-
-def _last(curve: Series, agreement: Agreement) -> float | None:
-    """The last difference, if it moves within the end by more than it may to be settled."""
-    tail = curve.difference[at_the_end(curve.time)]
-    moves = float(np.ptp(tail)) > min(agreement.tolerance, _STEADY * agreement.settled)
-    return float(tail[-1]) if moves else None
-
-
-def subject(
-    comparison: Comparison,
-    explanation: Explanation | None = None,
-    floor: ChaosFloor | None = None,
-) -> tuple[str, str, float, Agreement | None]:
-    """The largest difference: that whose causes were looked for, else the leading one.
-
-    Returns:
-        Its name, the largest value as text, when that is [s], and the figures of the comparison;
-        None where they have no such quantity.
-    """
-    if explanation is None or not explanation.verdict.divides:
-        lead = leading(comparison, floor)
-        return named(lead), quantity(lead.max, lead.unit), lead.at, lead
-    gap, quantities = explanation.first[explanation.quantity], explanation.quantity
-    kind = {"joints": "joint", "slides": "slide"}.get(quantities)
-    same = [
-        agreement
-        for agreement in comparison.agreements
-        if (agreement.kind == kind if kind else agreement.name == f"{quantities}, position")
-        and abs(agreement.max - gap.worst) <= 1e-6 * gap.worst
-    ]
-    who = f"one of the {quantities}" if kind else f"the {quantities}"
-    first = max(same, key=lambda a: a.max, default=None)  # as `leading`
-    far = quantity(gap.worst, explanation.unit)
-    return named(first) if first else who, far, gap.at, first
 
 
 def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreement:
-    """The quantity farthest beyond its tolerance: a coordinate, of which --why speaks, if any is.
+    """Return the quantity farthest beyond its tolerance: a coordinate, of which --why speaks.
 
     Else one of the motion, as the fingertip; else any. What is not a number comes last. Where some
     gaps may be chance, it is one of those that are beyond the chaos floor.
@@ -222,117 +229,86 @@ def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreemen
             break
     own = [a for a in beyond if QUANTITIES[a.kind].own]
     motion = [a for a in beyond if QUANTITIES[a.kind].moves]
-    return max(
-        own or motion or beyond or comparison.agreements,
-        key=lambda a: np.nan_to_num(a.tolerances(), posinf=-1.0),
-    )
+    for candidates in (own, motion, beyond):
+        if candidates:
+            return max(candidates, key=_finite_tolerances)
+    return max(comparison.agreements, key=_finite_tolerances)
+
+
+def _finite_tolerances(agreement: Agreement) -> float:
+    """Return how many tolerances a gap is; what is not a number is less than anything."""
+    return float(np.nan_to_num(agreement.tolerances(), posinf=-1.0))
 
 
 def parting(comparison: Comparison) -> float | None:
-    """When the first quantity leaves its tolerance [s]; None if none does."""
+    """Return when the first quantity leaves its tolerance [s]; None if none does."""
     return min((a.since for a in comparison.agreements if a.since is not None), default=None)
 
 
-def in_words(comparison: Comparison) -> list[Block]:
-    """Return what a reader should know before the figures."""
-    slots = slots_of(_verdicts_of(comparison), _worst_of(comparison), _first_parting_of(comparison))
-    return template.blocks("lab/questions/finding", **slots)
+def _divergence(comparison: Comparison) -> Divergence | None:
+    """Return when the runs diverge, and at what event."""
+    time = parting(comparison)
+    if time is None:
+        return None
+    first = next(agreement for agreement in comparison.agreements if agreement.since == time)
+    step = max(trace.timestep for trace in traces_of(comparison))
+    spacing = comparison.until / max(1, comparison.moments - 1)
+    known_to: DivergenceTime = "step"
+    if time == 0:
+        known_to = "start"
+    elif spacing > 1.5 * step:
+        known_to = "first moment" if time <= _TOGETHER * spacing else "moment"
+    body, ground = "", ""
+    if known_to in ("step", "moment"):
+        body, ground = _touching_at(comparison, time, step)
+    return Divergence(first.name, time, known_to, body, ground)
 
 
-@dataclass(frozen=True)
-class _Verdicts:
-    """How many quantities agree, and which sentences that makes.
-
-    Attributes:
-        total: How many quantities there are.
-        moments: How many moments were compared.
-        agrees: How many quantities agree.
-        settles: How many settle.
-        differs: How many differ.
-        within: "" where all agree.
-        cut: "" where a run ended before its time.
-        unlike: "" where neither is so.
-        unmoved: How far the sides move where they agree in forces and energy alone; else None.
-    """
-
-    total: int
-    moments: int
-    agrees: int
-    settles: int
-    differs: int
-    within: str | None
-    cut: str | None
-    unlike: str | None
-    unmoved: str | None
+def _touching_at(comparison: Comparison, time: float, step: float) -> tuple[str, str]:
+    """Return the bodies that first touch at a time, give or take a step; ("", "") for none."""
+    first_touches: list[tuple[float, str]] = []
+    for touch in comparison.touches:
+        for contacts in (touch.left, touch.right):
+            # What touches from the start on is no event.
+            if contacts.first and abs(contacts.first - time) <= _TOGETHER * step:
+                first_touches.append((contacts.first, touch.pair))
+    if not first_touches:
+        return "", ""
+    _, pair = min(first_touches, key=lambda first_touch: first_touch[0])
+    body, _, ground = pair.partition(" on ")
+    return body, ground
 
 
-def _verdicts_of(comparison: Comparison) -> _Verdicts:
-    counts = Counter(agreement.verdict for agreement in comparison.agreements)
-    outcome = comparison.outcome
-    all_agree = outcome in ("agrees", "nothing moved")
-    unmoved = None
-    if outcome == "agrees" and not comparison.motion.moved:
-        unmoved = extent_of(comparison.motion)
-    total = len(comparison.agreements)
-    return _Verdicts(
-        total=total,
-        moments=comparison.moments,
-        agrees=counts["agrees"],
-        settles=counts["settles"],
-        differs=counts["differs"],
-        within=if_true(all_agree),
-        cut=if_true(outcome == "ended"),
-        unlike=if_true(outcome == "differs"),
-        unmoved=unmoved,
-    )
+def _rounding(lead: Agreement, floor: ChaosFloor | None) -> Rounding:
+    """Return what rounding alone makes of the gap of a quantity."""
+    bands = () if floor is None else floor.bands
+    for band in bands:
+        if band.name == lead.name and floor is not None:
+            verdict: RoundingVerdict = "less"
+            if not np.isfinite(band.most) and band.chance != "beyond":
+                verdict = "no bound"
+            elif band.chance == "inside":
+                verdict = "as much"
+            elif band.chance == "cannot be told":
+                verdict = "cannot be told"
+            return Rounding(verdict, band.most, floor.ended)
+    return Rounding("not computed")
 
 
-@dataclass(frozen=True)
-class _Worst:
-    """The quantity that is farthest beyond its tolerance.
-
-    Attributes:
-        far: Its largest difference.
-        tolerance: Its tolerance.
-        at: When the difference is largest.
-        nearest: What it is called where all agree and something differs at all; else None.
-        farthest: What it is called where not all agree; else None.
-    """
-
-    far: str
-    tolerance: str
-    at: str
-    nearest: str | None
-    farthest: str | None
+def _noticed(agreements: Sequence[Agreement], lead: Agreement) -> Agreement | None:
+    """Return where one would see the gap: the position that is farthest apart [m]."""
+    positions = [a for a in agreements if a.kind in ("tip", "body") and not np.isnan(a.max)]
+    farthest = max(positions, key=lambda agreement: agreement.max, default=None)
+    return None if farthest == lead else farthest
 
 
-def _worst_of(comparison: Comparison) -> _Worst:
-    worst = leading(comparison)
-    nearest = farthest = None
-    if comparison.outcome in ("agrees", "nothing moved") and worst.max:
-        nearest = name_of(worst.name)
-    if comparison.outcome == "differs" and worst.kind != "contact":
-        farthest = named(worst)
-    far, tolerance = (quantity(value, worst.unit) for value in (worst.max, worst.tolerance))
-    return _Worst(far, tolerance, short_time(worst.at), nearest, farthest)
+def _is_changing(curve: Series, agreement: Agreement) -> bool:
+    """Tell whether a difference moves within the end by more than it may to be settled."""
+    tail = curve.difference[at_the_end(curve.time)]
+    return float(np.ptp(tail)) > min(agreement.tolerance, _STEADY * agreement.settled)
 
 
-@dataclass(frozen=True)
-class _FirstParting:
-    """What leaves its tolerance first before a run ends early.
-
-    Attributes:
-        first: What it is called; None for nothing.
-        parted: When.
-    """
-
-    first: str | None = None
-    parted: str | None = None
-
-
-def _first_parting_of(comparison: Comparison) -> _FirstParting:
-    at = parting(comparison)
-    if at is None or not comparison.ended:
-        return _FirstParting()
-    first = next(a for a in comparison.agreements if a.since == at)
-    return _FirstParting(named(first), short_time(at))
+def _early_ends(comparison: Comparison) -> Iterator[EarlyEnd]:
+    for side, trace in enumerate(traces_of(comparison)):
+        if trace.header.ended:
+            yield EarlyEnd(side, (len(trace) - 1) * trace.timestep, trace.header.ended)

@@ -4,99 +4,137 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from ...measures.text import (
-    NONE,
-    figure,
-    listed,
-    quantity,
-    sentence,
-)
-from ...show import report_template as template
-from ...show.blocks import Items, Page, Table
-from ...show.report_template import if_true, slots_of
+from ...measures.text import NONE, percent, quantity, sentence
+from ...show.blocks import Page, Table
+from ...show.first_screen import first_screen
+from ...show.templates import PageContent, render
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
 from .compared_names import moment
 from .requests.one_step import OneStepResult
+from .typed_command import command_of
+
+
+@dataclass(frozen=True)
+class OneStepPage(PageContent):
+    """What the page of one step shows.
+
+    Attributes:
+        experiment: What was run.
+        left, right: What the sides are called.
+        steps: The gap of each stage.
+        worst: Table of the first stages that differ.
+        more: How many stages differ that it does not show.
+        next_command: What to type next.
+        details: Whether everything is shown.
+    """
+
+    template = "one_step.md.j2"
+    experiment: str
+    left: str
+    right: str
+    steps: OneStep
+    worst: Table
+    more: int
+    next_command: str
+    details: bool
+
+    @property
+    def first(self) -> StageGap | None:
+        """The first stage that differs."""
+        return self.steps.first
+
+    @property
+    def of_usual(self) -> float | None:
+        """The part of its usual size by which the first stage differs; None where it has none."""
+        return None if self.steps.first is None else self.steps.first.of_usual
+
+    @property
+    def agreeing(self) -> int:
+        """How many stages are compared and do not differ."""
+        return sum(gap.told and not gap.reason and not gap.beyond for gap in self.steps.stages)
+
+    @property
+    def not_compared(self) -> list[str]:
+        """The stages of which there are no figures, each with the reason."""
+        stages: list[str] = []
+        for gap in self.steps.stages:
+            if not gap.told or gap.reason:
+                stages.append(f"{gap.stage} ({gap.reason})")
+        return stages
+
+    @property
+    def primed(self) -> str:
+        """What of the step before the right side was given."""
+        return self.steps.primed if self.steps.primed else "nothing"
+
+    @property
+    def null(self) -> StageGap | None:
+        """The stage in which the left, put back to its own states, is farthest from its own run."""
+        compared = [gap for gap in self.steps.stages if gap.told and gap.unit]
+        return max(compared, key=_null_tolerances, default=None)
+
+    @property
+    def causes_of_their_own(self) -> list[str]:
+        """The stages that are the first to differ at some moments, each with their number."""
+        stages: list[str] = []
+        for gap in self.steps.differing:
+            if gap.leads and gap != self.steps.first:
+                stages.append(f"{gap.stage} ({gap.leads})")
+        return stages
+
+    @property
+    def stages(self) -> Table:
+        """A row for each stage."""
+        return _stages_table(self.steps)
+
+    @property
+    def forces(self) -> Table:
+        """The largest difference of a force in each unit."""
+        return _forces_table(self.steps.differing)
+
+    @property
+    def spikes(self) -> Table:
+        """A row for each moment that stands out."""
+        return _spikes_table(self.steps.spikes)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader must know, in sentences."""
+        return [sentence(note) for note in self.steps.notes]
 
 
 def page(result: OneStepResult, details: bool = False) -> Page:
     """Return the page of what each stage of a step gives on both sides: what differs first.
 
     Args:
-        result: What was found.
-        details: Whether all of it is shown, and not the first screen alone.
+        result: What one step gives on each side.
+        details: Whether every stage, its tolerance and the moments that stand out are shown.
     """
-    left, right = result.request.run.labels
-    return template.page(
-        "lab/questions/one_step",
-        experiment=result.request.run.experiment,
-        left=left,
-        right=right,
-        **slots_of(
-            _moments_of(result),
-            _null_of(result),
-            _step_tables_of(result),
-            _verdict_of(result),
-            _first_stage_of(result),
-            _others_of(result),
-        ),
+    differing = result.steps.differing
+
+    if details:
+        return _page(result, (), details=True)
+    return first_screen(lambda rows: _page(result, differing[:rows]), len(differing))
+
+
+def _page(result: OneStepResult, worst: Sequence[StageGap], details: bool = False) -> Page:
+    """Return the page with some of the stages that differ; with details a table has all of them."""
+    run = result.request.run
+    question: tuple[str, ...] = () if result.steps.first is None else ("--why",)
+    content = OneStepPage(
+        experiment=Path(run.what[0]).name,
+        left=result.labels[0],
+        right=result.labels[1],
+        steps=result.steps,
+        worst=_worst_table(worst),
+        more=0 if details else len(result.steps.differing) - len(worst),
+        next_command=command_of(run, *question),
+        details=details,
     )
-
-
-@dataclass(frozen=True)
-class _Moments:
-    """From which moments a step was taken.
-
-    Attributes:
-        moments: How many.
-        every: Steps from one to the next.
-        until: The last of them [s].
-        primed: What of the step before the right side was given.
-        relative: The tolerance, relative to the scale of a stage.
-        weight: Of the robot, whose share is no difference either.
-        size: Of the robot.
-    """
-
-    moments: int
-    every: int
-    until: float
-    primed: str
-    relative: str
-    weight: str
-    size: str
-
-
-def _moments_of(result: OneStep) -> _Moments:
-    return _Moments(
-        moments=result.moments,
-        every=result.every,
-        until=result.until,
-        primed=result.primed if result.primed else "nothing",
-        relative=figure(result.relative),
-        weight=quantity(result.robot.weight, "N"),
-        size=quantity(result.robot.size, "m"),
-    )
-
-
-@dataclass(frozen=True)
-class _Null:
-    """How far the left side, put back to its own states, gets from its own run.
-
-    Attributes:
-        null: At most.
-        stage: In which stage.
-    """
-
-    null: str
-    stage: str
-
-
-def _null_of(result: OneStep) -> _Null:
-    compared = [gap for gap in result.stages if gap.told and gap.unit]
-    most = max(compared, key=_null_tolerances)
-    return _Null(quantity(most.null, most.unit), most.stage)
+    return render(content)
 
 
 def _null_tolerances(gap: StageGap) -> float:
@@ -104,45 +142,30 @@ def _null_tolerances(gap: StageGap) -> float:
     return gap.null / (gap.tolerance if gap.tolerance else 1e-300)
 
 
-@dataclass(frozen=True)
-class _StepTables:
-    """What stands alone on the page.
-
-    Attributes:
-        stages: A row for each stage.
-        spikes: A row for each moment that stands out.
-        notes: What a reader must know.
-    """
-
-    stages: Table
-    spikes: Table
-    notes: Items
-
-
-def _step_tables_of(result: OneStep) -> _StepTables:
-    notes = [f"{gap.stage} is not compared: {gap.reason}." for gap in result.stages if not gap.told]
-    notes += [sentence(line) for line in result.notes]
-    return _StepTables(_stages_table(result), _spikes_table(result.spikes), Items(notes))
-
-
-_STAGE_HEADS = (
-    "stage",
-    "differs",
-    "first",
-    "largest",
-    "at, s",
-    "where",
-    "from, s",
-    "null",
-    "tolerance",
-)
-
-
-def _stages_table(result: OneStep) -> Table:
-    rows = [(gap.stage, *_stage_cells(gap)) for gap in result.stages]
-    first = frozenset(k for k, gap in enumerate(result.stages) if gap is result.first)
+def _worst_table(gaps: Sequence[StageGap]) -> Table:
+    """Return a row for each of some stages that differ: at how many moments, how far, and where."""
+    rows: list[tuple[str, ...]] = []
+    for gap in gaps:
+        largest = quantity(gap.worst, gap.unit)
+        of_usual = percent(gap.of_usual)
+        rows.append((gap.stage, str(gap.beyond), largest, of_usual, gap.where, moment(gap.first)))
     return Table(
-        _STAGE_HEADS,
+        ("stage", "moments", "largest", "of usual", "where", "from, s"),
+        rows,
+        words=frozenset({0, 4}),
+    )
+
+
+def _stages_table(steps: OneStep) -> Table:
+    """Return a row for each stage, in the order of a step."""
+    columns = (
+        *("stage", "differs", "first", "largest", "at, s", "where", "from, s"),
+        *("null", "tolerance"),
+    )
+    rows = [(gap.stage, *_stage_cells(gap)) for gap in steps.stages]
+    first = frozenset(k for k, gap in enumerate(steps.stages) if gap is steps.first)
+    return Table(
+        columns,
         rows,
         "The stages of a step, in their order",
         words=frozenset({0, 5}),
@@ -164,21 +187,31 @@ def _stage_cells(gap: StageGap) -> tuple[str, ...]:
     elif gap.worst:
         largest = "≈ 0"
     null = quantity(gap.null, gap.unit)
-    tolerance = quantity(max(gap.tolerance, gap.floor), gap.unit)
-    return (
-        str(gap.beyond),
-        str(gap.leads),
-        largest,
-        at,
-        where,
-        moment(gap.first),
-        null,
-        tolerance,
+    tolerance = quantity(gap.limit, gap.unit)
+    first = moment(gap.first)
+    return str(gap.beyond), str(gap.leads), largest, at, where, first, null, tolerance
+
+
+def _forces_table(differing: Sequence[StageGap]) -> Table:
+    """Return the largest difference of a force in each unit."""
+    largest: dict[str, StageGap] = {}
+    for gap in sorted(differing, key=lambda gap: gap.worst):
+        if gap.stage in FORCES:
+            largest[gap.unit] = gap
+    rows: list[tuple[str, ...]] = []
+    for gap in largest.values():
+        rows.append((gap.stage, quantity(gap.worst, gap.unit), moment(gap.at), gap.where))
+    return Table(
+        ("stage", "largest", "at, s", "where"),
+        rows,
+        "The largest difference of a force",
+        words=frozenset({0, 3}),
     )
 
 
 def _spikes_table(spikes: Sequence[Spike]) -> Table:
-    rows = []
+    """Return a row for each moment that stands out."""
+    rows: list[tuple[str, ...]] = []
     for spike in spikes:
         size = quantity(spike.size, spike.unit)
         rows.append((moment(spike.at), size, spike.joint, spike.stage, spike.where))
@@ -187,79 +220,4 @@ def _spikes_table(spikes: Sequence[Spike]) -> Table:
         rows,
         "The moments that stand out",
         words=frozenset({0, 2, 3, 4}),
-    )
-
-
-@dataclass(frozen=True)
-class _StepVerdict:
-    """Whether both sides take the same step.
-
-    Attributes:
-        same: True where they do; else None.
-        exact: "" where every figure is the same to the last bit.
-        differs: False where they do not; else None.
-    """
-
-    same: bool | None
-    exact: str | None
-    differs: bool | None
-
-
-def _verdict_of(result: OneStep) -> _StepVerdict:
-    if result.first is not None:
-        return _StepVerdict(same=None, exact=None, differs=False)
-    exact = all(gap.worst == 0 for gap in result.stages)
-    return _StepVerdict(same=True, exact=if_true(exact), differs=None)
-
-
-@dataclass(frozen=True)
-class _FirstStage:
-    """The first stage that differs; None of all where none does.
-
-    Attributes:
-        first: Its name.
-        since: The first moment at which it differs [s].
-        beyond: At how many moments it differs.
-        where: The joint, body or pair to look at.
-    """
-
-    first: str | None = None
-    since: str | None = None
-    beyond: int | None = None
-    where: str | None = None
-
-
-def _first_stage_of(result: OneStep) -> _FirstStage:
-    gap = result.first
-    if gap is None:
-        return _FirstStage()
-    return _FirstStage(gap.stage, moment(gap.first), gap.beyond, gap.where)
-
-
-@dataclass(frozen=True)
-class _OtherStages:
-    """What else differs; None for nothing.
-
-    Attributes:
-        others: Stages that have a cause of their own at some moments, with the number of these.
-        forces: The largest difference of a force in each unit.
-    """
-
-    others: str | None
-    forces: str | None
-
-
-def _others_of(result: OneStep) -> _OtherStages:
-    differing = [gap for gap in result.stages if gap.beyond]
-    others = [
-        f"{gap.stage} ({gap.leads})" for gap in differing if gap.leads and gap != result.first
-    ]
-    forces: dict[str, str] = {}  # the largest of each unit
-    for gap in sorted(differing, key=lambda gap: gap.worst):
-        if gap.stage in FORCES:
-            size, at = quantity(gap.worst, gap.unit), moment(gap.at)
-            forces[gap.unit] = f"{gap.stage}, {size} at {at} s, {gap.where}"
-    return _OtherStages(
-        others=listed(others) if others else None,
-        forces="; ".join(forces.values()) if forces else None,
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...atomic_files import replace_bytes
 from ...interface import Array, JointType
 from ...measures import COUNT, distances
-from ...measures.text import few, milliseconds, reading, short_time
+from ...measures.text import few, listed, milliseconds, reading, rounded, short_time
 from ...show import report_template as template
 from ...show.charts import SETTINGS, SIDES, check_suffix, draw_picture, saved
 from ...show.pictures import Traces
@@ -25,7 +25,6 @@ from ..compare.chaos import ChaosFloor
 from ..recordings import Trace
 from .compared_names import long_labels, traces_of
 from .finding import parting
-from .floor_words import changed_by
 from .stage.quantity_chart import CHARTS_SHOWN, QuantityChart, charts_of, spans
 
 FIGURE_SETTINGS = {
@@ -142,7 +141,7 @@ def _notes_on_sides(
         names = few([a.name for a in comparison.agreements if a.since == first], 1)
     slots = _NoteSlots(
         right=if_true(True),
-        changed=None if floor is None else changed_by(floor),
+        changed=None if floor is None else _changed_by(floor),
         at=at,
         names=names,
         fewer=without_chart if without_chart else None,
@@ -321,3 +320,11 @@ def _draw_touches(axes: Any, plot: TracePlot) -> None:
     axes.set_ylim(len(plot.touches), 0)
     axes.set_yticks([])
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _changed_by(floor: ChaosFloor) -> str:
+    """Return what was changed in the runs that it is made of."""
+    size = floor.uncertain
+    sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
+    start = f", and the start by {listed(sizes)}" if sizes else ""
+    return f"start and commands changed by rounding ({floor.rounding:g}){start}"

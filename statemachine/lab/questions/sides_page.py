@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 
 from ...measures.text import (
     NONE,
     figure,
-    listed,
     milliseconds,
     numbers,
     quantity,
     sentence,
     short_time,
 )
-from ...show import report_template as template
-from ...show.blocks import Block, Headline, Items, Section, Table, TableCell, Text
-from ...show.report_template import if_true
+from ...show.blocks import Table, TableCell
 from ..compare import Agreement, Comparison, SidesRun
 from ..compare.alike import commands_alike
 from ..compare.series import PairContacts, Touch
 from ..recordings import Header, Trace
-from ..why.answer_page import missing
-from .compared_names import long_labels, moment, name_of, short_labels, traces_of, window
+from .compared_names import long_labels, moment, name_of, short_labels, traces_of
 
-_PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 # Of the promises that a backend may emulate, those that move the arm, in plain words.
 PHYSICS = {
     "position servo": "servos with the gains of the model",
@@ -36,27 +31,24 @@ PHYSICS = {
 }
 
 
-def commanded(comparison: Comparison) -> list[Block]:
-    """What each actuator was told, at the start and in the end; empty without actuators."""
+def commands_table(comparison: Comparison) -> Table:
+    """Return what each actuator was told, at the start and in the end; no rows without any.
+
+    Where both sides were told the same, once.
+    """
     (left, right), labels = traces_of(comparison), long_labels(comparison)
     actuators = left.header.actuators
-    if not actuators or actuators != right.header.actuators:
-        return []
-    if without_actuation((left, right)):
-        return [Text("The actuators of the file are off on both sides: nothing is commanded.")]
-    if commands_alike(left, right):
-        heading = "What was commanded (the same on both sides)"
-        traces = {"": left}
-    else:
-        heading = "What was commanded (not the same on both sides)"
+    if actuators != right.header.actuators or without_actuation((left, right)):
+        actuators = ()
+    traces = {"": left}
+    if not commands_alike(left, right):
         traces = {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
     columns: dict[str, list[str]] = {"actuator": list(actuators)}
     for side, trace in traces.items():
-        columns[f"{side}at the start"] = [figure(value) for value in trace.ctrl[0].tolist()]
-        columns[f"{side}in the end"] = [figure(value) for value in trace.ctrl[-1].tolist()]
-    rows = list(zip(*columns.values(), strict=True))
-    table = Table(list(columns), rows, "ctrl, by actuator")
-    return [Section("", heading, [table], folded=True, detail=True)]
+        count = len(actuators)
+        columns[f"{side}at the start"] = [figure(v) for v in trace.ctrl[0, :count].tolist()]
+        columns[f"{side}in the end"] = [figure(v) for v in trace.ctrl[-1, :count].tolist()]
+    return Table(list(columns), list(zip(*columns.values(), strict=True)))
 
 
 def without_actuation(traces: Sequence[Trace]) -> bool:
@@ -64,20 +56,16 @@ def without_actuation(traces: Sequence[Trace]) -> bool:
     return all(trace.header.options.get("actuation") is False for trace in traces)
 
 
-def contact_words(comparison: Comparison) -> Table:
-    """How hard each pair of bodies presses in the end on each side, and how deep it overlaps."""
-    touches = comparison.touches
-    hardest = sorted(touches, key=_pressing, reverse=True)[:_PAIRS_SHOWN]
+def pressing_table(comparison: Comparison) -> Table:
+    """Return how hard each pair of bodies presses in the end, and how deep it overlaps."""
     left, right = short_labels(comparison)
     rows = []
-    for touch in hardest:
+    for touch in sorted(comparison.touches, key=_pressing, reverse=True):
         rows.append((touch.pair, left, *_contact_cells(touch.left)))
         rows.append((touch.pair, right, *_contact_cells(touch.right)))
     return Table(
         ("bodies", "side", "force, N", "with friction, N", "deepest", "at, s", "last touch"),
         rows,
-        f"Who presses hardest ({len(hardest)} of {len(touches)} pairs; forces are means over "
-        f"{window(comparison)}, depths are of the whole run)",
         words=frozenset({0, 1}),
         wide=frozenset({5}),
     )
@@ -105,62 +93,28 @@ def _contact_cells(contact: PairContacts) -> tuple[str, ...]:
     )
 
 
-def unmatched(run: SidesRun | None) -> list[Block]:
-    """What one side has nothing of, what could not be matched, and what was not by name."""
-    if run is None:
-        return []
-    lines = [*missing(run.missing), *run.unmatched]
-    return [Items([sentence(line) for line in lines])] if lines else []
+def remarks(run: SidesRun, comparison: Comparison) -> list[str]:
+    """Return what a reader should know of how two sides were run, in sentences."""
+    lines = [*run.unmatched, *run.said, *comparison.notes]
+    return [sentence(line) for line in lines]
 
 
-def loop_note(run: SidesRun | None) -> list[Block]:
-    """Whether the two sides were told the same, where that takes one sentence."""
-    if run is None:
-        return []
-    lacking = run.matched.only[0].get("actuator", ()) if run.matched else ()
-    commands = run.commands
-    return template.blocks(
-        "lab/questions/loops_told",
-        same=if_true(commands == "the same" and not without_actuation(run.traces)),
-        recorded=if_true(commands == "recorded"),
-        more=if_true(commands == "more than ctrl"),
-        lacking=if_true(lacking and commands != "its own"),
-    )
-
-
-def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:
-    """The figures of both loops, quantity by quantity; nothing where they are the same."""
-    if played is None:
-        return []
+def loops_table(comparison: Comparison, played: Comparison | None) -> Table:
+    """Return the figures of both loops, by quantity; no rows where they are the same."""
     closed = {agreement.name: agreement for agreement in comparison.agreements}
-    opened = {agreement.name: agreement for agreement in played.agreements}
-    rows = [
-        (name_of(name), *_cells(closed.get(name)), *_cells(opened.get(name)))
-        for name in closed | opened
-    ]
-    left, right = short_labels(comparison)
-    table = Table(
+    opened: dict[str, Agreement] = {}
+    if played is not None:
+        opened = {agreement.name: agreement for agreement in played.agreements}
+    rows = []
+    if opened:
+        for name in closed | opened:
+            cells = (*_cells(closed.get(name)), *_cells(opened.get(name)))
+            rows.append((name_of(name), *cells))
+    return Table(
         ("quantity", "closed loop", "largest", "open loop", "largest"),
         rows,
-        f"{left} against {right}: each with its own commands, and both with the left's",
         words=frozenset({0, 1, 3}),
     )
-    return [
-        Section(
-            "loops",
-            "Closed loop and open loop",
-            template.blocks("lab/questions/loops", table=table),
-        )
-    ]
-
-
-def also_open(headline: Headline, played: Comparison | None) -> Headline:
-    """The headline, and what the open loop says where it says something else."""
-    if played is None or played.agrees == headline.holds:
-        return headline
-    verdict = "agree" if played.agrees else "do not agree"
-    lead = f"{headline.lead}; in open loop, with the left's commands on both, they {verdict}"
-    return replace(headline, lead=lead, holds=headline.holds and played.agrees)
 
 
 def _cells(agreement: Agreement | None) -> tuple[str, str]:
@@ -172,27 +126,39 @@ def _cells(agreement: Agreement | None) -> tuple[str, str]:
     return verdict, quantity(agreement.max, agreement.unit)
 
 
-def emulated(comparison: Comparison) -> list[Block]:
-    """What of the model a backend keeps instead of its engine."""
-    sides = {
-        side.trace.header.label: side.trace.header.provenance.emulated
-        for side in (comparison.left, comparison.right)
-        if side.trace.header.provenance.emulated and side.trace.header.defaults == "model"
-    }
-    blocks: list[Block] = []
-    for engine, promises in sides.items():
-        moving = [PHYSICS[name] for name in promises if name in PHYSICS]
-        rest = "; ".join(name for name in promises if name not in PHYSICS)
-        text = Text(f"Promises of this library, and conventions of its states and forces: {rest}.")
-        heading = f"What else this library adds to {engine}"
-        blocks += template.blocks(
-            "lab/questions/provenance",
-            engine=engine,
-            backend=engine.split()[0],
-            moving=listed(moving) if moving else None,
-            rest=[Section("", heading, [text], folded=True, detail=True)] if rest else [],
-        )
-    return blocks
+@dataclass(frozen=True)
+class EmulatedSide:
+    """What a backend computes for its engine.
+
+    Attributes:
+        engine: Engine and version.
+        backend: What computes it.
+        physics: What of it moves the robot.
+        others: Promises of the interface, and conventions.
+        without: What to type for the engine without that.
+    """
+
+    engine: str
+    backend: str
+    physics: tuple[str, ...]
+    others: tuple[str, ...]
+    without: str
+
+
+def emulated_sides(comparison: Comparison) -> list[EmulatedSide]:
+    """Return what each backend computes for its engine; two sides of one engine are one."""
+    sides: dict[str, EmulatedSide] = {}
+    for side in (comparison.left, comparison.right):
+        header = side.trace.header
+        promises = header.provenance.emulated
+        if promises and header.defaults == "model":
+            physics = [PHYSICS[name] for name in promises if name in PHYSICS]
+            others = [name for name in promises if name not in PHYSICS]
+            without = f"{header.backend}:engine"
+            sides[header.label] = EmulatedSide(
+                header.label, header.backend, tuple(physics), tuple(others), without
+            )
+    return list(sides.values())
 
 
 def provenance(comparison: Comparison) -> Table:
@@ -210,7 +176,6 @@ def provenance(comparison: Comparison) -> Table:
     return Table(
         ("what", *long_labels(comparison)),
         rows,
-        "What made the two runs",
         words=frozenset({0, 1, 2}),
     )
 

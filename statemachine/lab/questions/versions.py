@@ -3,173 +3,260 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from ...measures.text import NONE, command, listed, quantity, sentence, short_time
-from ...show import report_template as template
-from ...show.blocks import Block, Code, Items, Page, Table
+from ...engines.records import KnownChange, KnownChangeName
+from ...measures.text import NONE, quantity, sentence, short_time
+from ...show.blocks import Page, Table
+from ...show.first_screen import first_screen
 from ...show.pictures import Bars
-from ...show.report_template import slots_of
-from ..compare import Comparison, Request
+from ...show.templates import PageContent, render
+from ..compare import Agreement
+from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
 from .compared_names import name_of
 from .finding import leading
-from .requests.versions import VersionsResult
+from .requests.versions import ReleasePair, VersionsResult
+from .typed_command import command_of
+
+VersionsState = Literal["differs", "nothing moved", "agrees"]
 
 
 @dataclass(frozen=True)
-class _NextRelease:
-    """A release of MuJoCo and the next one, compared.
+class ShownChange:
+    """A known change between two releases, with the names of both.
 
     Attributes:
-        release: The version.
-        next: That of the next one.
-        backends: What to type for both.
-        comparison: Of the two.
+        release: The older one.
+        next: The newer one.
+        change: What its probe shows on both.
     """
 
     release: str
     next: str
-    backends: tuple[str, str]
-    comparison: Comparison
-
-    @classmethod
-    def of(cls, comparison: Comparison) -> _NextRelease:
-        """Return what a comparison is of."""
-        left, right = comparison.left.trace.header, comparison.right.trace.header
-        return cls(
-            release=left.provenance.versions[left.backend],
-            next=right.provenance.versions[right.backend],
-            backends=(left.backend, right.backend),
-            comparison=comparison,
-        )
+    change: KnownChange
 
     @property
-    def tolerances(self) -> float:
-        """How many tolerances the leading gap is."""
-        worst = leading(self.comparison)
-        return worst.max / worst.tolerance if worst.tolerance else 0.0
+    def name(self) -> KnownChangeName:
+        """Which change it is."""
+        return self.change.name
 
-    def cells(self) -> tuple[str, ...]:
-        """Return the row of the two."""
-        worst = leading(self.comparison)
-        outcome = self.comparison.outcome
-        verdict = outcome if outcome in ("agrees", "nothing moved") else "DIFFERS"
-        if not worst.max:
-            return (self.release, self.next, "nothing differs", NONE, NONE, NONE, verdict)
-        largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
-        return (
-            self.release,
-            self.next,
-            name_of(worst.name),
-            largest,
-            short_time(worst.at),
-            tolerance,
-            verdict,
-        )
+    @property
+    def probe(self) -> str:
+        """What was measured."""
+        return self.change.probe
 
+    @property
+    def left(self) -> float:
+        """What the probe measures on the older one."""
+        return self.change.left
 
-def page(result: VersionsResult, details: bool = False) -> Page:
-    """Return the page of releases, each compared with the next, and commands that ask why.
+    @property
+    def right(self) -> float:
+        """What the probe measures on the newer one."""
+        return self.change.right
 
-    Args:
-        result: What was found.
-        details: Whether all of it is shown, and not the first screen alone.
-    """
-    run = result.request.run
-    pairs = [_NextRelease.of(comparison) for comparison in result.comparisons]
-    slots = slots_of(_releases_of(pairs), _changes_of(pairs, run))
-    return template.page("lab/questions/versions", experiment=run.experiment, **slots)
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """What of the model it concerns."""
+        return self.change.elements
+
+    @property
+    def more(self) -> str:
+        """The release on which the probe measures more."""
+        return self.release if abs(self.left) > abs(self.right) else self.next
+
+    @property
+    def less(self) -> str:
+        """The release on which the probe measures less."""
+        return self.next if abs(self.left) > abs(self.right) else self.release
 
 
 @dataclass(frozen=True)
-class _Releases:
-    """What is compared, and how far apart it is.
+class VersionsPage(PageContent):
+    """What the page of releases shows.
 
     Attributes:
-        first: The first release.
-        last: The last one.
-        until: The last moment that is compared [s].
-        steps: A row for each release and the next.
-        bars: How far each release is from the next.
-        read: What a release reads in the file that the next does not, or the other way round.
+        experiment: What was run.
+        result: Each release with the next.
+        pairs: Table of those that differ most.
+        more: How many pairs it does not show.
+        more_changed: How many of these differ.
+        commands: What to type next for each pair that differs, the worst first.
+        details: Whether everything is shown.
     """
 
-    first: str
-    last: str
-    until: float
-    steps: Table
-    bars: Bars
-    read: Items
+    template = "versions.md.j2"
+    experiment: str
+    result: VersionsResult
+    pairs: Table
+    more: int
+    more_changed: int
+    commands: list[str]
+    details: bool
+
+    @property
+    def next_command(self) -> str:
+        """What to type next; "" for nothing."""
+        return self.commands[0] if self.commands else ""
+
+    @property
+    def further_commands(self) -> str:
+        """What to type for further pairs that differ, a line for each."""
+        return "\n".join(self.commands[1:])
+
+    @property
+    def releases(self) -> list[str]:
+        """The versions, the oldest first."""
+        return [self.result.pairs[0].release, *(pair.next for pair in self.result.pairs)]
+
+    @property
+    def until(self) -> float:
+        """The last moment that is compared [s]."""
+        return max(pair.comparison.until for pair in self.result.pairs)
+
+    @property
+    def state(self) -> VersionsState:
+        """Whether the motion changes."""
+        outcomes = {pair.comparison.outcome for pair in self.result.pairs}
+        if outcomes & {"differs", "ended"}:
+            return "differs"
+        return "nothing moved" if "nothing moved" in outcomes else "agrees"
+
+    @property
+    def changed(self) -> list[str]:
+        """The pairs of releases between which the motion changes."""
+        return [f"{pair.release} and {pair.next}" for pair in self.result.pairs if pair.is_changed]
+
+    @property
+    def several_changed(self) -> bool:
+        """Whether it changes between more than two releases."""
+        return len(self.changed) > 1
+
+    @property
+    def worst(self) -> ReleasePair:
+        """The pair of releases that is farthest apart."""
+        return _worst_first(self.result.pairs)[0]
+
+    @property
+    def worst_gap(self) -> Agreement:
+        """The coordinate that is farthest beyond its tolerance between these."""
+        return leading(self.worst.comparison)
+
+    @property
+    def worst_name(self) -> str:
+        """What that coordinate is called."""
+        return name_of(self.worst_gap.name)
+
+    @property
+    def still(self) -> str:
+        """What is said where nothing moved on some of them; "" where something did on all."""
+        for pair in self.result.pairs:
+            if pair.comparison.outcome == "nothing moved":
+                return nothing_moved(pair.comparison.motion)
+        return ""
+
+    @property
+    def changes(self) -> list[ShownChange]:
+        """The known changes of all pairs."""
+        shown: list[ShownChange] = []
+        for pair in self.result.pairs:
+            shown += [ShownChange(pair.release, pair.next, change) for change in pair.changes]
+        return shown
+
+    @property
+    def bars(self) -> Bars:
+        """How far each release is from the next."""
+        pairs = self.result.pairs
+        return Bars(
+            "How far a release is from the next",
+            "largest gap [tolerances]",
+            [f"{pair.release} to {pair.next}" for pair in pairs],
+            {"farthest beyond its tolerance": [_tolerances(pair) for pair in pairs]},
+        )
+
+    @property
+    def notes(self) -> list[str]:
+        """What is noted of each pair, as sentences."""
+        pairs = self.result.pairs
+        return [sentence(note) for pair in pairs for note in pair.comparison.notes]
+
+    @property
+    def notes_hidden(self) -> bool:
+        """Whether there are notes that are not shown."""
+        return bool(self.notes) and not self.details
 
 
-def _releases_of(pairs: Sequence[_NextRelease]) -> _Releases:
-    return _Releases(
-        first=pairs[0].release,
-        last=pairs[-1].next,
-        until=max(pair.comparison.until for pair in pairs),
-        steps=_releases_table(pairs),
-        bars=_releases_bars(pairs),
-        read=Items(_notes_of(pairs)),
+def page(result: VersionsResult, details: bool = False) -> Page:
+    """Return the page of releases, each compared with the next, and the command that asks why.
+
+    Args:
+        result: Each release with the next.
+        details: Whether every pair is shown, in its order, with what is noted of it.
+    """
+    if details:
+        return _page(result, result.pairs, details=True)
+    worst = _worst_first(result.pairs)
+    return first_screen(lambda rows: _page(result, worst[:rows]), len(worst))
+
+
+def _page(result: VersionsResult, pairs: Sequence[ReleasePair], details: bool = False) -> Page:
+    """Return the page with a row for each of some pairs."""
+    run = result.request.run
+    changed = [pair for pair in _worst_first(result.pairs) if pair.is_changed]
+    commands = [command_of(_on_releases(run, pair), "--why") for pair in changed]
+    hidden = [pair for pair in result.pairs if pair not in pairs]
+    more_changed = sum(pair.is_changed for pair in hidden)
+    content = VersionsPage(
+        experiment=run.experiment,
+        result=result,
+        pairs=_pairs_table(pairs),
+        more=len(hidden),
+        more_changed=more_changed,
+        commands=commands,
+        details=details,
     )
+    return render(content)
 
 
-def _notes_of(pairs: Sequence[_NextRelease]) -> list[str]:
-    """Return what is noted of each release and the next, as sentences."""
-    return [sentence(note) for pair in pairs for note in pair.comparison.notes]
+def _worst_first(pairs: Sequence[ReleasePair]) -> list[ReleasePair]:
+    """Return the pairs, those first whose motion differs most."""
+    return sorted(pairs, key=lambda pair: (not pair.is_changed, -_tolerances(pair)))
 
 
-def _releases_table(pairs: Sequence[_NextRelease]) -> Table:
+def _tolerances(pair: ReleasePair) -> float:
+    """Return how many tolerances the leading gap between two releases is."""
+    worst = leading(pair.comparison)
+    return worst.max / worst.tolerance if worst.tolerance else 0.0
+
+
+def _pairs_table(pairs: Sequence[ReleasePair]) -> Table:
+    """Return a row for each pair of releases: the coordinate farthest beyond its tolerance."""
     return Table(
         ("release", "next", "quantity", "largest", "at", "tolerance", "verdict"),
-        [pair.cells() for pair in pairs],
-        "From release to release",
+        [_cells(pair) for pair in pairs],
         words=frozenset({0, 1, 2, 6}),
     )
 
 
-def _releases_bars(pairs: Sequence[_NextRelease]) -> Bars:
-    return Bars(
-        "How far a release is from the next",
-        "largest gap [tolerances]",
-        [f"{pair.release} to {pair.next}" for pair in pairs],
-        {"farthest beyond its tolerance": [pair.tolerances for pair in pairs]},
-    )
+def _cells(pair: ReleasePair) -> tuple[str, ...]:
+    """Return the row of a pair of releases."""
+    worst, outcome = leading(pair.comparison), pair.comparison.outcome
+    verdict = "DIFFERS" if pair.is_changed else outcome
+    if not worst.max:
+        return pair.release, pair.next, "nothing differs", NONE, NONE, NONE, verdict
+    largest, tolerance = quantity(worst.max, worst.unit), quantity(worst.tolerance, worst.unit)
+    name, at = name_of(worst.name), short_time(worst.at)
+    return pair.release, pair.next, name, largest, at, tolerance, verdict
 
 
-@dataclass(frozen=True)
-class _Changes:
-    """Between which releases the motion changes.
-
-    Attributes:
-        why: Commands that ask why it does.
-        same: True where it does nowhere; else None.
-        differs: False where it does; else None.
-        pairs: Between which; None for none.
-        still: False where nothing moves on some of them, and the rest agrees; else None.
-        nothing: What is said of that; "" else.
-    """
-
-    why: list[Block]
-    same: bool | None = None
-    differs: bool | None = None
-    pairs: str | None = None
-    still: bool | None = None
-    nothing: str = ""
-
-
-def _changes_of(pairs: Sequence[_NextRelease], request: Request) -> _Changes:
-    what = request.what[0]
-    model = request.model if request.model else request.scenario().model
-    changed = [pair for pair in pairs if pair.comparison.outcome in ("differs", "ended")]
-    still = [pair for pair in pairs if pair.comparison.outcome == "nothing moved"]
-    if not changed and still:
-        return _Changes([], still=False, nothing=nothing_moved(still[0].comparison.motion))
-    if not changed:
-        return _Changes([], same=True)
-    why: list[Block] = []
-    for pair in changed:
-        sides = [f"{model}@{backend}" for backend in pair.backends]
-        why.append(Code([command(["statemachine", "compare", what, *sides, "--why"])]))
-    releases = [f"MuJoCo {pair.release} and {pair.next}" for pair in changed]
-    return _Changes(why, differs=False, pairs=listed(releases))
+def _on_releases(run: Request, pair: ReleasePair) -> Request:
+    """Return what is run, with the two releases as its sides."""
+    model = run.model if run.model else run.scenario().model
+    timestep = {name: value for name, value in run.options.items() if name == "timestep"}
+    options = {name: value for name, value in run.options.items() if name != "timestep"}
+    sides: list[Side] = []
+    for side in replace(run, backends=pair.backends).both_sides(model):
+        sides.append(replace(side, options=options))
+    return replace(run, sides=tuple(sides), model=None, options=timestep)

@@ -9,9 +9,13 @@ for each in found.effects:
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote as quoted
+from typing import Literal
 
 import numpy as np
 
@@ -19,12 +23,22 @@ from ...errors import BadInputError, check_name
 from ...interface import Array
 from ...measures.text import listed
 from ...show.blocks import only_on_pages
-from .design import Value
+from .design import Design, Value
 from .folder import design_of, read_manifest
-from .main_effects import main_effects
+from .main_effects import LevelMean, MainEffects, main_effects
 from .manifest import SweepManifest
-from .quantities import CellValues, cell_values, default_quantity, parse_quantity
+from .quantities import (
+    NEEDED_FOR,
+    CellValues,
+    SweepQuantity,
+    cell_values,
+    default_quantity,
+    parse_quantity,
+)
 from .rows import read_cells
+
+SweepVerdict = Literal["none", "together", "tied", "one"]
+_TIED = 2.0  # standard errors
 
 
 @dataclass(frozen=True)
@@ -36,16 +50,35 @@ class MainEffect:
         share: Its share of the quantity's variance over the settings [1], from 0 to 1; None where
             there is nothing to compute it from.
         error: The standard error of the share [1]; None where there is nothing to compute it from.
+        levels: The mean of the quantity at each value of the parameter; of a range, in each class
+            of samples.
     """
 
     parameter: str
     share: float | None
     error: float | None
+    levels: tuple[LevelMean, ...]
+
+    @property
+    @only_on_pages
+    def lowest(self) -> LevelMean | None:
+        """The value at which the mean is smallest; None where there are too few samples."""
+        return min(self.levels, key=_mean_of, default=None)
+
+    @property
+    @only_on_pages
+    def highest(self) -> LevelMean | None:
+        """The value at which the mean is largest; None where there are too few samples."""
+        return max(self.levels, key=_mean_of, default=None)
+
+
+def _mean_of(level: LevelMean) -> float:
+    return level.mean
 
 
 @dataclass(frozen=True)
-class LargestCell:
-    """The cell in which a quantity is largest.
+class ExtremeCell:
+    """The cell in which a quantity is largest, or smallest.
 
     Attributes:
         value: The quantity there, in its SI unit.
@@ -63,8 +96,12 @@ class SweepEffects:
     """The effects of all parameters on a quantity of one engine, or on the gap between two.
 
     Attributes:
-        what: The experiment.
-        folder: Of the dataset.
+        what: The experiment, or the file and function without its folder.
+        model: The names of the models' files, without their folders.
+        folder: Of the dataset; "" for one that is not kept.
+        command: What is typed to run the sweep, with the report of this quantity.
+        command_with_errors: What is typed to have the shares with their errors; "" where they
+            have them, or there are none.
         versions: Of what the dataset was made with.
         backends: The engine; or the two engines that the gap is between.
         quantity: A column of the dataset, or one number of it.
@@ -79,6 +116,7 @@ class SweepEffects:
         mean: The mean over the settings that the shares are of, in the unit of the quantity.
         deviation: The standard deviation over them: the root of the variance that is shared.
         largest: The cell with the largest value, of all cells that have one.
+        smallest: The cell with the smallest value, of all cells that have one.
         settings: How many settings the shares are of.
         left_out: How many other settings there are: those without a value, and those that go with
             them, so that all that stays was run at every combination.
@@ -88,7 +126,10 @@ class SweepEffects:
     """
 
     what: str
+    model: tuple[str, ...]
     folder: str
+    command: str
+    command_with_errors: str
     versions: Mapping[str, str]
     backends: tuple[str, ...]
     quantity: str
@@ -102,7 +143,8 @@ class SweepEffects:
     why_none: str
     mean: float
     deviation: float
-    largest: LargestCell
+    largest: ExtremeCell
+    smallest: ExtremeCell
     settings: int
     left_out: int
     left_out_values: Mapping[str, tuple[Value, ...]]
@@ -139,6 +181,54 @@ class SweepEffects:
         """The value of each parameter in the cell with the largest value."""
         return dict(zip(self.parameters, self.largest.settings, strict=True))
 
+    @property
+    @only_on_pages
+    def known_effects(self) -> tuple[MainEffect, ...]:
+        """The effects that have a share, the largest first."""
+        return tuple(effect for effect in self.effects if effect.share is not None)
+
+    @property
+    @only_on_pages
+    def together(self) -> float | None:
+        """The share that no parameter explains alone [1]; None where no parameter has a share.
+
+        Parameters do it together; of samples it is also what the quantity does within a class.
+        """
+        shares = [effect.share for effect in self.effects if effect.share is not None]
+        return max(0.0, 1 - sum(shares)) if shares else None
+
+    @property
+    @only_on_pages
+    def verdict(self) -> SweepVerdict:
+        """Which parameter moves the quantity.
+
+        Returns:
+            "none": No parameter has a share.
+            "together": What no parameter explains alone is more than what any does.
+            "tied": The two largest shares are nearer to each other than twice the standard error
+                of their difference.
+            "one": One parameter has the largest share.
+        """
+        known = self.known_effects
+        together = self.together
+        if not known or together is None:
+            return "none"
+        first = known[0]
+        if len(known) == 1 or first.share is None:
+            return "one"
+        if together > first.share:
+            return "together"
+        return "tied" if _are_tied(first, known[1]) else "one"
+
+
+def _are_tied(first: MainEffect, second: MainEffect) -> bool:
+    """Tell whether two shares differ by less than twice the standard error of their difference."""
+    if first.share is None or second.share is None:
+        return False
+    if first.error is None or second.error is None:
+        return False
+    return first.share - second.share < _TIED * math.hypot(first.error, second.error)
+
 
 def effects(
     folder: str | Path, quantity: str | None = None, backends: str | Sequence[str] = ()
@@ -171,18 +261,23 @@ def effects(
         both = "both " if len(sides) > 1 else ""
         raise BadInputError(
             f"no setting of this sweep has {asked} on {both}{' and '.join(sides)}: "
-            f"{_why_nothing(cells)}"
+            f"{_why_nothing(asked, cells)}"
         )
     shares = main_effects(design, cells.values, cells.rounding)
-    found = [
-        MainEffect(label, shares.shares[label], shares.errors[label]) for label in shares.shares
+    ranked = [
+        MainEffect(label, shares.shares[label], shares.errors[label], shares.levels[label])
+        for label in shares.shares
     ]
-    found.sort(key=_share_or_less, reverse=True)
+    ranked.sort(key=_share_or_less, reverse=True)
     units = {vary.label: vary.unit_on() for vary in design.factors}
-    largest = _largest(cells.values, [point.values for point in points])
+    settings = [point.values for point in points]
+    command = _typed_report(manifest, folder, asked, sides)
     return SweepEffects(
-        what=manifest["request"]["what"],
+        what=_last_part(manifest["request"]["what"]),
+        model=tuple(_last_part(name) for name in manifest["files"]),
         folder=str(folder),
+        command=command,
+        command_with_errors=_typed_with_errors(command, design, seeds, shares),
         versions=_versions(manifest, sides),
         backends=sides,
         quantity=str(asked),
@@ -192,11 +287,12 @@ def effects(
         scaled=tuple(vary.label for vary in design.factors if vary.times),
         seeds=seeds,
         samples=design.samples if design.sampled else 0,
-        effects=tuple(found),
+        effects=tuple(ranked),
         why_none=shares.why_none,
         mean=shares.mean,
         deviation=shares.deviation,
-        largest=largest,
+        largest=_cell_at(cells.values, settings, int(np.nanargmax(cells.values))),
+        smallest=_cell_at(cells.values, settings, int(np.nanargmin(cells.values))),
         settings=shares.settings,
         left_out=len(points) - shares.settings,
         left_out_values=shares.left_out,
@@ -213,13 +309,16 @@ def _versions(manifest: SweepManifest, backends: Sequence[str]) -> dict[str, str
     return versions
 
 
-def _why_nothing(cells: CellValues) -> str:
+def _why_nothing(quantity: SweepQuantity, cells: CellValues) -> str:
     """Return why no cell has a value."""
     failed = sum(cells.failed.values())
     if failed:
-        return f"{failed} cells failed, and the column error says why"
+        return f"{failed} cells failed, the first with {cells.first_error}"
     if cells.missing:
         return f"{cells.missing} cells have not run; the same command runs them"
+    needs = NEEDED_FOR.get(quantity.column)
+    if needs:
+        return f"it is of a robot with {needs}"
     return "the cells ran, and it came in none"
 
 
@@ -228,10 +327,49 @@ def _share_or_less(effect: MainEffect) -> float:
     return -1.0 if effect.share is None else effect.share
 
 
-def _largest(values: Array, settings: Sequence[tuple[Value, ...]]) -> LargestCell:
-    """Return the cell with the largest of values (p, s), at p settings."""
-    place, seed = divmod(int(np.nanargmax(values)), values.shape[1])
-    return LargestCell(float(values[place, seed]), settings[place], seed)
+def _cell_at(values: Array, settings: Sequence[tuple[Value, ...]], number: int) -> ExtremeCell:
+    """Return a cell of values (p, s), at p settings, by its number in the flat array."""
+    place, seed = divmod(number, values.shape[1])
+    return ExtremeCell(float(values[place, seed]), settings[place], seed)
+
+
+def without_folder(report: SweepEffects) -> SweepEffects:
+    """Return a report of a dataset that is not kept: no command names its folder."""
+    named = f" --out {quoted(report.folder)}"
+    larger = report.command_with_errors.replace(named, "").replace(" --extend", "")
+    return replace(
+        report,
+        folder="",
+        command=report.command.replace(named, ""),
+        command_with_errors=larger,
+    )
+
+
+def _typed_report(
+    manifest: SweepManifest, folder: str | Path, quantity: SweepQuantity, backends: Sequence[str]
+) -> str:
+    """Return the command that runs a sweep and reports on a quantity of it."""
+    here = f"{Path.cwd()}{os.sep}"
+    run = manifest["command"].replace(here, "")
+    run = run.replace(" --out DIR", f" --out {quoted(str(folder))}")
+    engines = [f"--backend {name}" for name in backends]
+    if set(backends) == set(manifest["design"]["backends"]):
+        engines = []  # they are in the command of the run
+    return " ".join([run, *engines, "--report", f"--quantity {quoted(str(quantity))}"])
+
+
+def _typed_with_errors(command: str, design: Design, seeds: int, shares: MainEffects) -> str:
+    """Return the command of a larger sweep, of which the shares have errors; "" for none."""
+    if shares.why_none or any(error is not None for error in shares.errors.values()):
+        return ""
+    if design.sampled:
+        return command.replace(f"--samples {design.samples}", "--samples 64") + " --extend"
+    return command.replace(f" --seeds {seeds}", "") + " --seeds 3 --extend"
+
+
+def _last_part(name: str) -> str:
+    """Return the name of a file without its folder; a known name, as so101/scene, as it is."""
+    return Path(name).name if Path(name).is_absolute() else name
 
 
 def _backends(there: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:

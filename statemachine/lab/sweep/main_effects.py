@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,19 @@ _LEAST_IN_CLASSES = 4  # samples that can be divided into two classes of two
 
 
 @dataclass(frozen=True)
+class LevelMean:
+    """The mean of a figure where one parameter has one value, whatever the others are.
+
+    Attributes:
+        value: Of the parameter; of a sampled range the mean of a class of samples.
+        mean: In the unit of the figure.
+    """
+
+    value: Value
+    mean: float
+
+
+@dataclass(frozen=True)
 class MainEffects:
     """The main effect of each parameter on a figure.
 
@@ -28,6 +41,8 @@ class MainEffects:
         shares: Of each parameter, in the order of the design, its share of the variance [1], from
             0 to 1; None where there is nothing to compute it from.
         errors: The standard error of each [1]; None where there is nothing to compute it from.
+        levels: Of each parameter the mean of the figure at each value; of a range, in each class
+            of samples; empty of too few samples.
         why_none: Why no parameter has a share; "" where one has.
         mean: The mean over the settings, in the unit of the figure.
         deviation: The standard deviation over them: the root of the variance that is shared.
@@ -37,6 +52,7 @@ class MainEffects:
 
     shares: Mapping[str, float | None]
     errors: Mapping[str, float | None]
+    levels: Mapping[str, tuple[LevelMean, ...]]
     why_none: str
     mean: float
     deviation: float
@@ -93,6 +109,7 @@ def main_effects(design: Design, values: Array, rounding: float = 0.0) -> MainEf
     return MainEffects(
         shares=_by_label(design, shares),
         errors=_by_label(design, errors),
+        levels=_levels(balanced, centre),
         why_none=why_none,
         mean=float(centre.mean()),
         deviation=float(centre.std()),
@@ -130,12 +147,14 @@ class _Balanced:
             k lists and grids, and s seeds. Each setting has one at one seed at least; others may
             be NaN.
         sampled: (n, r) the samples of the r ranges.
+        values: Of each of the k lists and grids, the levels that stay.
         left_out: The levels that are left out, by parameter.
     """
 
     design: Design
     cube: Array
     sampled: Array
+    values: Sequence[Sequence[Value]]
     left_out: Mapping[str, tuple[Value, ...]]
 
 
@@ -152,11 +171,14 @@ def _balanced(design: Design, values: Array) -> _Balanced:
     cube = values.reshape(samples, *lengths, values.shape[-1])
     kept = _without_holes(np.asarray(np.isnan(cube).all(axis=-1)))
     left_out: dict[str, tuple[Value, ...]] = {}
+    values_left: list[tuple[Value, ...]] = []
     for vary, levels in zip(design.listed, kept[1:], strict=True):
+        values_left.append(tuple(vary.values[k] for k in levels))
         gone = tuple(value for k, value in enumerate(vary.values) if k not in levels)
         if gone:
             left_out[vary.label] = gone
-    return _Balanced(design, cube[np.ix_(*kept)], design.sample_values()[kept[0]], left_out)
+    sampled = design.sample_values()[kept[0]]
+    return _Balanced(design, cube[np.ix_(*kept)], sampled, values_left, left_out)
 
 
 def _without_holes(holes: Flags) -> list[list[int]]:
@@ -209,6 +231,42 @@ def _first_order(balanced: _Balanced, centre: Array, sampled: Array) -> Array:
     return np.array(between) / centre.var()
 
 
+def _levels(balanced: _Balanced, centre: Array) -> dict[str, tuple[LevelMean, ...]]:
+    """Return the mean of the figure at each value of each parameter, by label.
+
+    Args:
+        balanced: What of.
+        centre: (n, n1, …, nk) the figure at the settings.
+    """
+    by_sample = centre.mean(axis=_others(centre.ndim, 0))
+    levels: dict[str, tuple[LevelMean, ...]] = {}
+    column, axis = 0, 0
+    for vary in balanced.design.factors:
+        if vary.bounds is not None:
+            levels[vary.label] = _means_of_classes(balanced.sampled[:, column], by_sample)
+            column += 1
+            continue
+        axis += 1
+        means = centre.mean(axis=_others(centre.ndim, axis)).tolist()
+        values = balanced.values[axis - 1]
+        levels[vary.label] = tuple(map(LevelMean, values, means))
+    return levels
+
+
+def _means_of_classes(values: Array, figures: Array) -> tuple[LevelMean, ...]:
+    """Return the mean value and the mean figure of each class of samples; none of too few."""
+    if len(values) < _LEAST_IN_CLASSES:
+        return ()
+    parts = zip(_classes(values, values), _classes(values, figures), strict=True)
+    return tuple(LevelMean(float(part.mean()), float(of.mean())) for part, of in parts)
+
+
+def _classes(values: Array, figures: Array) -> list[Array]:
+    """Return figures (n,) in classes of equally many samples, in the order of values (n,)."""
+    classes = 2 ** int(np.ceil(np.log2(len(values)) / 2 - 0.5))  # the power nearest to the root
+    return np.array_split(figures[np.argsort(values, kind="stable")], classes)
+
+
 def _between_classes(values: Array, figures: Array) -> float:
     """Return the variance of the means of classes of equally many samples; NaN of too few.
 
@@ -218,8 +276,7 @@ def _between_classes(values: Array, figures: Array) -> float:
     """
     if len(values) < _LEAST_IN_CLASSES:
         return np.nan
-    classes = 2 ** int(np.ceil(np.log2(len(values)) / 2 - 0.5))  # the power nearest to the root
-    parts = np.array_split(figures[np.argsort(values, kind="stable")], classes)
+    parts = _classes(values, figures)
     means = np.array([part.mean() for part in parts])
     sizes = [len(part) for part in parts]
     return float(np.average((means - figures.mean()) ** 2, weights=sizes))

@@ -7,7 +7,7 @@ from typing import TypedDict
 
 from .design import Kind, Value
 
-MANIFEST_VERSION = 4
+MANIFEST_VERSION = 5
 
 
 class RecordedRequest(TypedDict):

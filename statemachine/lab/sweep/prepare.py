@@ -28,6 +28,7 @@ from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
 from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc
 from .kinds import variable_names, with_kinds
+from .outcomes import unavailable_columns
 from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
 from .rows import require_parquet
 from .worker import digest_of, load_of
@@ -101,6 +102,7 @@ def prepared(sweep: Sweep) -> PreparedSweep:
         spread=spread,
         cost={model.backend: _cost(model, asked.seconds) for model in models},
         said=tuple(said),
+        unavailable=unavailable_columns(models),
     )
 
 

@@ -1,7 +1,7 @@
 """What a report of a sweep is about: one number for each setting and seed, from the dataset.
 
-A quantity is a column of the dataset, or one number of a column of lists: "energy", "tip[2]",
-"qpos[0]". On one engine it is that number; of two engines it is how far they are apart in it.
+A quantity is a column of the dataset, or one number of a column of lists: "energy", "tip z",
+"base x", "qpos[0]". On one engine it is that number; of two engines it is how far they are apart.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from ...interface import Array, Ints
 from .rows import COLUMNS, DONE, require_parquet
 
 _NAME = re.compile(r"(\w+)(?:\[([0-9]+)\])?")
+_PLACE = re.compile(r"(\w+) ([xyz])")
+_AXES = "xyz"
 _NUMBERS = ("int64", "double", "list<double>", "list<list<double>>")
 _NO_RESULT = ("seed", "sample_time")  # columns of numbers that say what was asked for
 _KINDS = {
@@ -28,8 +30,17 @@ _KINDS = {
 }
 _UNITS = {column.name: column.unit for column in COLUMNS}
 _MOMENTS = ("sample_qpos", "sample_tip")
-_PLACES = ("tip", "sample_tip")  # their three numbers are one length
+_PLACES = ("tip", "sample_tip", "base")  # their three numbers are one length
 _TOUCH = "first_touch"
+# What a robot needs so that its runs have a column.
+NEEDED_FOR = {
+    "base": "a floating base",
+    "distance": "a floating base",
+    "fell": "a floating base",
+    "tracking_error": "position servos",
+    "tip": "a site",
+    "sample_tip": "a site",
+}
 _ROUNDING = 1e-12  # of the largest number
 
 
@@ -46,7 +57,11 @@ class SweepQuantity:
     index: int | None = None
 
     def __str__(self) -> str:
-        return self.column if self.index is None else f"{self.column}[{self.index}]"
+        if self.index is None:
+            return self.column
+        if self.column in _PLACES and self.index < len(_AXES):
+            return f"{self.column} {_AXES[self.index]}"
+        return f"{self.column}[{self.index}]"
 
     @property
     def unit(self) -> str:
@@ -62,26 +77,32 @@ class CellValues:
         values: (p, s) the quantity, or the gap of two engines in it [SI]; NaN where there is none.
         rounding: What values may differ by and be the same [SI]: a 1e-12 of the largest number.
         failed: How many cells failed, by the class of the error.
+        first_error: The class and the text of the first error; "" without one.
         missing: How many cells have not run.
     """
 
     values: Array
     rounding: float
     failed: Mapping[str, int]
+    first_error: str
     missing: int
 
 
 def parse_quantity(text: str) -> SweepQuantity:
-    """Read the name of a quantity: "energy", "tip[2]".
+    """Read the name of a quantity: "energy", "tracking error", "base x", "qpos[0]".
 
     Raises:
         UnknownNameError: The dataset has no such column of numbers.
         BadInputError: It is no text.
     """
     if not isinstance(text, str):
-        raise BadInputError(f"a quantity is a name, such as energy or tip[2]; got {shown(text)}")
-    match = _NAME.fullmatch(text)
-    column = match[1] if match else text
+        raise BadInputError(f"a quantity is a name, such as energy or base x; got {shown(text)}")
+    place = _PLACE.fullmatch(text)
+    if place and place[1] in _PLACES:
+        return SweepQuantity(place[1], _AXES.index(place[2]))
+    words = text.replace(" ", "_")
+    match = _NAME.fullmatch(words)
+    column = match[1] if match else words
     check_name("quantity", column, _KINDS)
     index = match[2] if match else None
     return SweepQuantity(column, None if index is None else int(index))
@@ -90,10 +111,15 @@ def parse_quantity(text: str) -> SweepQuantity:
 def default_quantity(table: Any, backends: Sequence[str]) -> SweepQuantity:
     """Choose what a report is about where nobody said it.
 
-    Of two engines it is the usual site at the moments that are kept, or the joints of a model
-    without a site; of one engine the height of the site at the end, or the fastest joint.
+    Of a robot that floats it is where the base is at the end: how far two engines are apart in
+    it, or how far it got on one. Of two engines it is else the usual site at the moments that are
+    kept, or the joints of a model without a site; of one engine the height of the site at the end,
+    or the fastest joint.
     """
+    floats = table["base"].null_count < table.num_rows
     has_site = table["tip"].null_count < table.num_rows
+    if floats:
+        return SweepQuantity("base" if len(backends) > 1 else "distance")
     if len(backends) > 1:
         return SweepQuantity("sample_tip" if has_site else "sample_qpos")
     return SweepQuantity("tip", 2) if has_site else SweepQuantity("max_qvel")
@@ -139,12 +165,41 @@ def cell_values(
     else:
         values = _gap(quantity, numbers[0] - numbers[1])
     failed = Counter(kind for kind in table["error_class"].to_pylist() if kind)
+    largest = float(np.fmax.reduce(np.abs(numbers), axis=None, initial=0.0))
     return CellValues(
         values,
-        rounding=_ROUNDING * float(np.fmax.reduce(np.abs(numbers), axis=None, initial=0.0)),
+        rounding=_ROUNDING * largest,
         failed=dict(failed.most_common()),
+        first_error=_first_error(table),
         missing=int(np.prod(shape)) - len(rows),
     )
+
+
+def check_is_one_number(quantity: SweepQuantity) -> None:
+    """Refuse what has several numbers in a run, before there is one.
+
+    Raises:
+        BadInputError: It does.
+    """
+    kind = _KINDS[quantity.column]
+    if quantity.index is None and quantity.column in _PLACES:
+        _check_is_one_number(quantity, len(_AXES))
+    elif quantity.column in _MOMENTS:
+        _check_is_one_number(quantity, 1)
+    elif quantity.index is None and kind.startswith("list"):
+        raise BadInputError(f"{quantity} has several numbers: say which one, as {quantity}[0]")
+    elif quantity.index is not None and not kind.startswith("list"):
+        raise BadInputError(f"there is no {quantity}: {quantity.column} is one number")
+
+
+def _first_error(table: Any) -> str:
+    """Return the class and the text of the first error of a dataset; "" without one."""
+    for kind, text in zip(
+        table["error_class"].to_pylist(), table["error"].to_pylist(), strict=True
+    ):
+        if kind:
+            return f"{kind}: {text}"
+    return ""
 
 
 def _check_is_one_number(quantity: SweepQuantity, count: int) -> None:
@@ -157,12 +212,12 @@ def _check_is_one_number(quantity: SweepQuantity, count: int) -> None:
         end = quantity.column.removeprefix("sample_")
         raise BadInputError(
             f"{quantity} is of several moments, whose gap between two engines a report can be "
-            f"about; of one engine {end}[0] is the value at the end"
+            f"about; of one engine {SweepQuantity(end, 0)} is the value at the end"
         )
     if count > 1:
         raise BadInputError(
-            f"{quantity} has {count} numbers: say which one, {quantity}[0] to "
-            f"{quantity}[{count - 1}]"
+            f"{quantity} has {count} numbers: say which one, {SweepQuantity(quantity.column, 0)} "
+            f"to {SweepQuantity(quantity.column, count - 1)}"
         )
 
 

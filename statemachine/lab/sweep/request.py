@@ -115,15 +115,20 @@ class Sweep:
         Args:
             out: The folder of the dataset.
         """
+        words = ["statemachine", "sweep", self.what]
+        if self.model is not None:
+            words.append(self.model)
         options: list[tuple[str, object, object]] = []
-        for option in dataclasses.fields(self)[1:]:
+        for option in dataclasses.fields(self):
+            if option.name in ("what", "model"):
+                continue
             flag = f"--{option.name.replace('_', '-').replace('backends', 'backend')}"
             value = getattr(self, option.name)
-            words = value if option.name in ("vary", "backends") else [value]
-            for word in words:
+            values = value if option.name in ("vary", "backends") else [value]
+            for word in values:
                 if word != option.default:
                     options.append((flag, word, option.default))
-        return command(["statemachine", "sweep", self.what], *options, ("--out", out, None))
+        return command(words, *options, ("--out", out, None))
 
 
 def _check_at_least(smallest: int, flag: str, value: int) -> None:
@@ -174,6 +179,7 @@ class PreparedSweep:
         spread: How far from its start a seed puts a run.
         cost: Roughly what a cell takes on each backend [s].
         said: What a reader should know before it runs, in lines.
+        unavailable: Columns that no robot of the sweep has.
     """
 
     sweep: Sweep
@@ -187,6 +193,7 @@ class PreparedSweep:
     spread: Uncertainty = field(default_factory=Uncertainty)
     cost: Mapping[str, float] = field(default_factory=dict)
     said: tuple[str, ...] = ()
+    unavailable: tuple[str, ...] = ()
 
     def settings(self, cell: SweepCell, kind: Kind) -> list[tuple[Vary, Value]]:
         """Return the factors of a kind and their values in a cell."""

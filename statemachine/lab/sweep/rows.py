@@ -64,6 +64,31 @@ COLUMNS = (
         "m",
         "(3,) the usual site at the end, in world axes; none without a site",
     ),
+    Column(
+        "base",
+        "list<double>",
+        "m",
+        "(3,) the origin of the floating base at the end, in world axes; none of a fixed base",
+    ),
+    Column(
+        "distance",
+        "double",
+        "m",
+        "how far the floating base is from its start at the end, level; none of a fixed base",
+    ),
+    Column(
+        "fell",
+        "double",
+        "",
+        "1 if the floating base was below a third of its height at the start after any step, or "
+        "turned over; else 0; none of a fixed base",
+    ),
+    Column(
+        "tracking_error",
+        "double",
+        "rad or m",
+        "root mean square, over steps and position servos, of joint minus ctrl; none without",
+    ),
     Column("max_qvel", "double", "rad/s or m/s", "the largest size of a velocity in any step"),
     Column("energy_start", "double", "J", "kinetic and potential energy at the start"),
     Column("energy", "double", "J", "the same at the end"),

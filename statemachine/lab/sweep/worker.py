@@ -38,6 +38,7 @@ from ..runs.drive import check_length, drive, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from .design import Value, Vary, digest
+from .outcomes import Outcomes
 from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
 from .rows import DONE, FAILED, known
 
@@ -270,10 +271,12 @@ def _run(
             values[list(start)] = list(start.values())
         qpos[:] = drawn_start(model, qpos, ready.spread, cell.seed)
         at_start = qpos.copy(), qvel.copy()
+        outcomes = Outcomes(model, qpos)
         try:
             for k, (began, now) in enumerate(pairwise(drive(model, data, controller, total)), 1):
                 row["steps"] = k
                 np.maximum(fastest, np.abs(qvel, out=speed), out=fastest)
+                outcomes.look(data)
                 if "touch" not in row and len(contacts := data.contacts):
                     # As derived arrays are: of the state in which the step began.
                     row["first_touch"] = began
@@ -289,6 +292,7 @@ def _run(
             row["max_qvel"] = float(np.nan_to_num(fastest).max(initial=0.0))
             row["qpos"], row["qvel"] = qpos.tolist(), qvel.tolist()
             row["time"] = float(data.time)
+            row |= outcomes.columns(qpos)
             row["sample_qpos"] = [sample.tolist() for sample in samples]
         states = np.array([at_start[0], qpos]), np.array([at_start[1], qvel])
         row["sample_tip"] = tips = _tips(model, data, samples)

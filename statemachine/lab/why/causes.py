@@ -16,6 +16,7 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ...measures.text import few, listed
 from ..compare.matching import Matched
+from ..runs.floating import Bases, base_of
 
 _NOT_COMPILED_ANEW = "its file is binary: it cannot be compiled anew"
 EXTRA_ACTUATOR = "extra actuator"
@@ -95,6 +96,10 @@ def differences_of(
     if finer:
         rows = [part for row in rows for part in own.entries(right.compiled, row)]
     only_left, only_right = matched.only
+    base = Bases(base_of(left), base_of(right))
+    if base.differ:
+        only_left, only_right = matched.only_beside_bases
+        rows.append(_other_base(base))
     rows += [_extra_joint(name, "there", None) for name in only_left.get("joint", ())]
     rows += [_extra_joint(name, None, "there") for name in only_right.get("joint", ())]
     return tuple(rows)
@@ -113,6 +118,17 @@ def _specified(row: ModelDifference, left: Model, right: Model) -> ModelDifferen
     if row.spec_edits_one and own.can_be_respecified(left.path):
         return replace(row, spec_edits=())
     return replace(row, spec_edits=(), spec_edits_one=(), refused=_NOT_COMPILED_ANEW)
+
+
+def _other_base(bases: Bases) -> ModelDifference:
+    """Return that the base floats on one side alone."""
+    return ModelDifference(
+        subject="base",
+        kind="joint",
+        where="",
+        values=(DifferingQuantity("base", bases.left, bases.right),),
+        refused="it is read from the file: type base=free or base=fixed behind a side",
+    )
 
 
 def _extra_joint(name: str, left: str | None, right: str | None) -> ModelDifference:

@@ -6,7 +6,7 @@ HTML page under its sections.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -14,7 +14,7 @@ from typing import Literal
 from ...installed import DEFAULT
 from ...measures import Deviation
 from ...show.blocks import Block, Page, Table, Text
-from ...show.screen import first_that_fits
+from ...show.first_screen import MOST_ROWS, first_screen
 from ...show.templates import PageContent, render, render_blocks
 from ..compare.chaos import CLEAR
 from ..compare.labels import lacking
@@ -23,7 +23,7 @@ from .causes_page import causes, nothing_differs, what_is_apart
 from .changes_page import engine_as_it_comes, steps
 from .explanation import Explanation
 from .rewritten_page import rewritten_blocks
-from .table_page import MOST_ROWS, summary_table
+from .table_page import summary_table
 from .verdict import UNEXPLAINED
 
 Conclusion = Literal["wider", "divided", "no gap", "refused", "chance", "nothing moved"]
@@ -202,13 +202,7 @@ def page(result: Explanation, details: bool = False) -> Page:
     """
     if details:
         return render(WhyPage(result, MOST_ROWS, render_blocks(WhyDetails(result))))
-    return first_that_fits(_ever_shorter(result))
-
-
-def _ever_shorter(result: Explanation) -> Iterator[Page]:
-    """Yield the page with ever fewer rows of causes."""
-    for rows in range(MOST_ROWS, -1, -1):
-        yield render(WhyPage(result, rows, ()))
+    return first_screen(lambda rows: render(WhyPage(result, rows, ())))
 
 
 def _conclusion(result: Explanation) -> Conclusion:

@@ -24,7 +24,6 @@ _SHOWN = 12  # rows; the rest is folded away
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
 _SUMMARY_HEADS = ("what", "left", "right", "part", "right's file")
-MOST_ROWS = 8  # of the first screen
 _HEADS = ("what", "left", "right", "part", "alone", "last")
 _WORDS = frozenset({0, 1, 2})  # columns
 _TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"

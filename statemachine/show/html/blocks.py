@@ -97,7 +97,8 @@ def _section(block: Section, interactive: DrawInteractive, level: int) -> Html:
         return drawn(block.blocks, interactive, level)
     inside = drawn(block.blocks, interactive, level + 1)
     if block.folded:
-        return tag("details", tag("summary", block.heading), inside)
+        name = block.name if block.name else None
+        return tag("details", tag("summary", block.heading), inside, id=name)
     if not block.name:
         return tag("section", tag(f"h{level}", block.heading), inside)
     labelled = f"{block.name}-heading"

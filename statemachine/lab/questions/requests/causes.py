@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -15,6 +16,7 @@ from ....interface import Model
 from ....models import AnyPath
 from ....processes import checked_jobs
 from ...compare.alike import for_left
+from ...compare.bases import load_sides
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
 from ...compare.sides import Request, Side, with_options
@@ -131,7 +133,7 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
         if request.write is not None:
             inputs = [Path(word) for word in run.what]
             check_target(Path(request.write), sides[0].path, sides[1].path, inputs)
-        models = [side.load() for side in sides]
+        models = load_sides(sides, {}, run.names).models
         recordings = [
             for_left(trace, model, run) for trace, model in zip(traces, models, strict=False)
         ]
@@ -156,7 +158,7 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
             explanation, question.left, question.right, run.names, request.finer
         )
         if request.write is not None:
-            explanation = _with_file(explanation, question, sides[1], Path(request.write))
+            explanation = _with_file(explanation, question, sides, Path(request.write))
     notes = [*run.taken]
     if run.is_traces:
         notes.append(_PLAYED)
@@ -168,24 +170,26 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
 
 
 def _with_file(
-    explanation: Explanation, question: WhyRequest, right: Side, target: Path
+    explanation: Explanation, question: WhyRequest, sides: Sequence[Side], target: Path
 ) -> Explanation:
     """Write the right's file with the left's values, and run it.
 
     Args:
         explanation: What both sides differ in.
         question: What was asked.
-        right: The right side, as it is loaded.
+        sides: The left and the right, as they are loaded.
         target: The file that is written.
 
     Returns:
         The explanation, with what was written.
     """
 
-    def load(path: Path) -> Model:
-        return replace(right, model=str(path)).load()
-
     names = {} if question.names is None else question.names
+
+    def load(path: Path) -> Model:
+        right = replace(sides[1], model=str(path))
+        return load_sides((sides[0], right), {}, names).models[1]
+
     written, model = rewrite(RewriteRequest(question.left, question.right, target, load, names))
     quantity = explanation.quantity
     gap = measured_gap(question, model, quantity, explanation.measure)

@@ -42,16 +42,18 @@ class ConvergeRequest:
 
 
 @dataclass(frozen=True, repr=False)
-class ConvergeResult(ShownResult, Convergence):
-    """What becomes of each gap with finer and finer steps, and what was asked.
+class ConvergeResult(ShownResult):
+    """What of a gap vanishes with the timestep.
 
     Attributes:
         request: What was asked.
+        limits: What becomes of the gap of each quantity.
     """
 
     page_function: ClassVar[str] = "questions.convergence:page"
 
-    request: ConvergeRequest = field(kw_only=True, metadata={"json": False})
+    request: ConvergeRequest = field(metadata={"json": False})
+    limits: Convergence
 
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each quantity over the whole run.
@@ -59,12 +61,13 @@ class ConvergeResult(ShownResult, Convergence):
         "gap_1" is the largest gap with the steps as given, "gap_2" with half of them, and so on
         [unit]; "limit" is what it tends to [unit].
         """
-        columns: dict[str, Column] = {"quantity": [limit.name for limit in self.whole]}
-        columns |= columns_of(self.whole, ("kind", "unit"))
-        runs = len(self.whole[0].gaps) if self.whole else 0
+        limits = self.limits.whole
+        columns: dict[str, Column] = {"quantity": [limit.name for limit in limits]}
+        columns |= columns_of(limits, ("kind", "unit"))
+        runs = len(limits[0].gaps) if limits else 0
         for number, finer in enumerate(FINER[:runs]):
-            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in self.whole]
-        columns |= columns_of(self.whole, ("limit", "verdict"))
+            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in limits]
+        columns |= columns_of(limits, ("limit", "verdict"))
         return columns
 
 
@@ -79,8 +82,7 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> ConvergeResu
         return run_sides(request.with_finer_steps(times)).traces
 
     with reporter.stage("converge") as progress:
-        limits = convergence(run, progress=progress)
-    return ConvergeResult(**vars(limits), request=request)
+        return ConvergeResult(request, convergence(run, progress=progress))
 
 
 def _substeps(options: Mapping[str, OptionValue], usual: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 from ....errors import BadInputError, check_name
@@ -19,6 +20,7 @@ from ...compare.witnessed import WitnessResult, witness
 from ...runs.controllers import is_function
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
+from ..finding import Finding, finding_of
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,11 @@ class CompareResult(ShownResult):
     floor: ChaosFloor | None
     instead: Instead | None
 
+    @cached_property
+    def finding(self) -> Finding:
+        """What it comes to: what differs most, since when, how far at the end, by chance or not."""
+        return finding_of(self.comparison, self.floor, self.played, self.run.missing)
+
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each quantity: the fields of `Agreement`, in `unit` and in s."""
         agreements = self.comparison.agreements
@@ -100,6 +107,7 @@ class CompareResult(ShownResult):
     def figures(self) -> dict[str, object]:
         """Return what JSON shows of it."""
         figures: dict[str, object] = {
+            "finding": self.finding,
             "comparison": self.comparison,
             "touches": self.comparison.touches,
             "witness": self.witness,

@@ -1,0 +1,133 @@
+"""Whether the base of a robot floats, on each of two sides: what is told, and what is taken over.
+
+A URDF without a joint of type floating leaves open whether its base floats. In a comparison it has
+the base of the other side unless it is told one: free, and then it starts at the place of the
+other's, or fixed. A file that says it, as an MJCF does, keeps its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...backends.compiled.algebra import quat_of_matrix
+from ...interface import Array, Model, make_data, reset
+from ...interface.options import OptionValue
+from ...interface.records import FreeBase
+from ...rotations import HERE, Placement, matrix_from_quat
+from ..runs.floating import Bases, base_of, free_joint_of_robot
+from .matching import match_trees
+from .sides import Side
+
+_SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
+_SAME = 1e-12  # [m] and of a quaternion; what is nearer is one place
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedSides:
+    """Two sides, loaded.
+
+    Attributes:
+        models: The left and the right.
+        bases: Whether their bases float.
+    """
+
+    models: tuple[Model, Model]
+    bases: Bases
+
+
+def load_sides(
+    sides: Sequence[Side],
+    options: Mapping[str, OptionValue],
+    names: Mapping[str, str],
+) -> LoadedSides:
+    """Load two sides; one whose file leaves its base open gets that of the other.
+
+    Args:
+        sides: The left and the right.
+        options: Of what is run; those of a side win.
+        names: Joints, bodies and sites of the left that go by other names on the right.
+
+    Raises:
+        StateMachineError: As `Side.load`.
+    """
+    is_open = [_leaves_base_open(side, options) for side in sides]
+    if is_open[0] is is_open[1]:
+        left, right = (side.load(**options) for side in sides)
+        return LoadedSides((left, right), Bases(base_of(left), base_of(right)))
+    taker = is_open.index(True)
+    giver = sides[1 - taker].load(**options)
+    taken_by: Literal["left", "right", ""] = ""
+    if base_of(giver) == "free":
+        taken_by = _SIDES[taker]
+        model = sides[taker].load(base="free", **options)
+        start = _start_of(giver, model, names, is_left=bool(taker))
+        if start is not None:
+            model = sides[taker].load(base=start, **options)
+    else:
+        model = sides[taker].load(**options)  # it is fixed, as of every such file
+    models = (giver, model) if taker else (model, giver)
+    return LoadedSides(models, Bases(base_of(models[0]), base_of(models[1]), taken_by))
+
+
+def _leaves_base_open(side: Side, options: Mapping[str, OptionValue]) -> bool:
+    """Tell whether neither a side nor its file says whether its base floats."""
+    if "base" in options or "base" in side.options or side.path.suffix.lower() != ".urdf":
+        return False
+    try:
+        root = ElementTree.parse(side.path).getroot()
+    except (OSError, ElementTree.ParseError, ValueError, LookupError):
+        return False  # the engine says what is wrong with it
+    links = {link.get("name") for link in root.findall("link")}
+    is_floating = any(joint.get("type") == "floating" for joint in root.findall("joint"))
+    return not is_floating and "world" not in links
+
+
+def _start_of(
+    giver: Model, taker: Model, names: Mapping[str, str], *, is_left: bool
+) -> FreeBase | None:
+    """Return where a base has to start to be where that of another Model is; None at its own place.
+
+    Args:
+        giver: The other Model.
+        taker: The Model.
+        names: Joints, bodies and sites of the left that go by other names on the right.
+        is_left: Whether the other Model is the left.
+    """
+    free_joint, own = free_joint_of_robot(giver), free_joint_of_robot(taker)
+    if free_joint is None or own is None:
+        return None
+    place = _place_of(giver, free_joint)
+    if is_left:
+        place = place @ _frame_on_right(giver, taker, int(giver.jnt_bodyid[free_joint]), names)
+    else:
+        place = place @ _frame_on_right(taker, giver, int(taker.jnt_bodyid[own]), names).inverse
+    here = _place_of(taker, own)
+    if place.distance(here) <= _SAME and place.angle(here) <= _SAME:
+        return None
+    x, y, z = place.pos.tolist()
+    qw, qx, qy, qz = quat_of_matrix(place.mat.ravel()).tolist()
+    return FreeBase((x, y, z), (qw, qx, qy, qz))
+
+
+def _frame_on_right(left: Model, right: Model, body: int, names: Mapping[str, str]) -> Placement:
+    """Return the frame of the counterpart of a body of the left, in that of the body."""
+    if left.compiled is None or right.compiled is None:
+        return HERE
+    for pair in match_trees(left, right, names, one_world=False).matching.pairs:
+        if pair.left.body == body:
+            return pair.align.inverse
+    return HERE
+
+
+def _place_of(model: Model, free_joint: int) -> Placement:
+    """Return where a free joint puts its body in the default state."""
+    with make_data(model) as data:
+        reset(model, data)
+        first = int(model.jnt_qposadr[free_joint])
+        pose: Array = data.qpos[first : first + 7].copy()
+    return Placement(pose[:3], matrix_from_quat(pose[3:] / np.linalg.norm(pose[3:])))

@@ -1,0 +1,207 @@
+"""The verdict of a comparison in two sentences, from the fields of its `Finding`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...measures.text import quantity
+from ...show.blocks import Headline, Text
+from ...show.markdown import plain_text
+from ...show.templates import PageContent, render_blocks
+from ..compare import Agreement, Comparison
+from ..compare.instead import Instead
+from ..compare.motion import MotionExtent
+from .compared_names import name_of, named, short_labels, shortened
+from .finding import Divergence, EarlyEnd, Finding
+
+_NAME = 30  # characters of a name within a sentence
+_LABEL = 24  # of what a side is called within one
+_REASON = 100  # of why a run ended
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """What the sentences of each verdict may name.
+
+    Attributes:
+        finding: What the comparison comes to.
+        comparison: The figures.
+        left: What the left side is called in a sentence.
+        right: What the right side is called.
+    """
+
+    finding: Finding
+    comparison: Comparison
+    left: str
+    right: str
+
+    @property
+    def lead(self) -> Agreement:
+        """The quantity that is farthest beyond its tolerance, or nearest to it."""
+        return self.finding.lead
+
+    @property
+    def lead_name(self) -> str:
+        """What that is called in a sentence."""
+        return _named(self.lead)
+
+    @property
+    def divergence(self) -> Divergence | None:
+        """When the runs diverge."""
+        return self.finding.divergence
+
+
+@dataclass(frozen=True)
+class DifferVerdict(_Verdict, PageContent):
+    """The runs differ."""
+
+    template = "compare_differ.md.j2"
+
+    @property
+    def bodies(self) -> str:
+        """The two bodies of a first touch, where the lead is one."""
+        return _short(self.lead.name.partition(", ")[0])
+
+    @property
+    def is_number(self) -> bool:
+        """Whether the lead has a largest difference: it may be no number at some moments."""
+        return self.lead.max == self.lead.max
+
+    @property
+    def noticed_name(self) -> str | None:
+        """What one would see apart, in a sentence; None for nothing beside the lead."""
+        noticed = self.finding.noticed
+        return None if noticed is None else _named(noticed)
+
+    @property
+    def event(self) -> tuple[str, str] | None:
+        """The body that touches another when the runs diverge, and the other."""
+        at = self.finding.divergence
+        if at is None or not at.body:
+            return None
+        return _short(at.body), _short(at.ground)
+
+
+@dataclass(frozen=True)
+class AgreeVerdict(_Verdict, PageContent):
+    """Every quantity stays within its tolerance."""
+
+    template = "compare_agree.md.j2"
+
+    @property
+    def moved(self) -> bool:
+        """Whether a coordinate moved, and not a force or the energy alone."""
+        return self.comparison.motion.moved
+
+    @property
+    def extents(self) -> list[str]:
+        """How far both sides move at most."""
+        return extents_of(self.comparison.motion)
+
+
+@dataclass(frozen=True)
+class EndedVerdict(_Verdict, PageContent):
+    """A run ended before its time."""
+
+    template = "compare_ended.md.j2"
+
+    @property
+    def ended(self) -> EarlyEnd:
+        """The run that ended first."""
+        return min(self.finding.ended, key=lambda early_end: early_end.time)
+
+    @property
+    def who(self) -> str:
+        """What that side is called."""
+        return (self.left, self.right)[self.ended.side]
+
+    @property
+    def reason(self) -> str:
+        """Why it ended."""
+        return shortened([self.ended.reason], _REASON)[0]
+
+    @property
+    def other(self) -> str | None:
+        """What the other side is called, where its run ended early, too."""
+        return (self.right, self.left)[self.ended.side] if len(self.finding.ended) > 1 else None
+
+    @property
+    def first(self) -> str | None:
+        """The quantity that leaves its tolerance first; None for none."""
+        return None if self.divergence is None else _short(name_of(self.divergence.quantity))
+
+
+@dataclass(frozen=True)
+class StillVerdict(_Verdict, PageContent):
+    """Nothing moved, so that nothing was compared.
+
+    Attributes:
+        instead: What moves the model; None where that was not looked for.
+    """
+
+    template = "compare_still.md.j2"
+    instead: Instead | None
+
+    @property
+    def motion(self) -> MotionExtent:
+        """How far both sides move."""
+        return self.comparison.motion
+
+    @property
+    def extents(self) -> list[str]:
+        """How far both sides move at most."""
+        return extents_of(self.motion)
+
+
+def headline_of(
+    finding: Finding, comparison: Comparison, instead: Instead | None, causes: Sequence[str] = ()
+) -> Headline:
+    """Return the verdict of a comparison.
+
+    Args:
+        finding: What it comes to.
+        comparison: The figures.
+        instead: What to run where nothing moved; None where that was not looked for.
+        causes: What explains it, in sentences, where that was asked.
+    """
+    sides = sentence_labels(comparison)
+    content: PageContent
+    match finding.outcome:
+        case "differs":
+            content = DifferVerdict(finding, comparison, *sides)
+        case "agrees":
+            content = AgreeVerdict(finding, comparison, *sides)
+        case "ended":
+            content = EndedVerdict(finding, comparison, *sides)
+        case "nothing moved":
+            content = StillVerdict(finding, comparison, *sides, instead)
+    texts = [plain_text(b.text) for b in render_blocks(content) if isinstance(b, Text)]
+    lead, *rest = texts
+    return Headline(lead.removesuffix("."), tuple(causes), " ".join(rest), finding.holds)
+
+
+def sentence_labels(comparison: Comparison) -> tuple[str, str]:
+    """Return what the sides are called in a sentence: "the left" where their names are long."""
+    left, right = short_labels(comparison)
+    if max(len(left), len(right)) > _LABEL:
+        return "the left", "the right"
+    return left, right
+
+
+def extents_of(motion: MotionExtent) -> list[str]:
+    """Return how far both sides move at most: an angle, a length, or both."""
+    extents: list[str] = []
+    if motion.angle is not None:
+        extents.append(quantity(motion.angle, "rad"))
+    if motion.length is not None:
+        extents.append(quantity(motion.length, "m"))
+    return extents
+
+
+def _named(agreement: Agreement) -> str:
+    return named(agreement, _NAME)
+
+
+def _short(name: str) -> str:
+    return shortened([name], _NAME)[0]

@@ -1,0 +1,122 @@
+"""Whether the base of a robot floats, and by which joint: of a Model as of a recorded run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...interface import JointType
+from ...interface.records import Base
+
+
+class RobotFacts(Protocol):
+    """What is known of joints, bodies and actuators: of a Model, and of the header of a trace.
+
+    Attributes:
+        jnt_type: (njnt,) as in a Model.
+        jnt_bodyid: (njnt,) as in a Model.
+        body_parentid: (nbody,) as in a Model.
+        actuator_jntid: (nu,) as in a Model.
+    """
+
+    @property
+    def jnt_type(self) -> ArrayLike: ...
+    @property
+    def jnt_bodyid(self) -> ArrayLike: ...
+    @property
+    def body_parentid(self) -> ArrayLike: ...
+    @property
+    def actuator_jntid(self) -> ArrayLike: ...
+
+
+@dataclass(frozen=True)
+class Bases:
+    """Whether the base of the robot floats, on each of two sides.
+
+    Attributes:
+        left: "free" or "fixed"; None where the model has no joints, or several robots that differ
+            in that.
+        right: The same of the right.
+        taken_by: The side whose file leaves it open, and that floats since the other does; "" for
+            none.
+    """
+
+    left: Base | None
+    right: Base | None
+    taken_by: Literal["left", "right", ""] = ""
+
+    @property
+    def differ(self) -> bool:
+        """Whether one base floats and the other is fixed."""
+        return None not in (self.left, self.right) and self.left != self.right
+
+    def notes(self) -> Iterator[str]:
+        """Yield a line for bases that differ, and for one that is taken over."""
+        if self.differ:
+            yield (
+                f"the base of the left is {self.left}, that of the right is {self.right}: "
+                "base=free or base=fixed behind a side makes them alike"
+            )
+        if self.taken_by:
+            other = "right" if self.taken_by == "left" else "left"
+            yield (
+                f"the base of the {self.taken_by} is free, as that of the {other}: its file does "
+                "not say it (base=fixed behind it says otherwise)"
+            )
+
+
+def base_of(facts: RobotFacts) -> Base | None:
+    """Return whether the base of a robot floats.
+
+    The robot is what actuators drive, or else what has joints beside free ones. A model of a single
+    part is free if its only joint is a free one.
+
+    Args:
+        facts: Of a Model or of a run.
+
+    Returns:
+        None for a model without joints, and for one with several robots that differ in that.
+    """
+    free_joints = _free_joints_of_robot(facts)
+    if len(free_joints) != 1:
+        return None
+    return "fixed" if free_joints.pop() is None else "free"
+
+
+def free_joint_of_robot(facts: RobotFacts) -> int | None:
+    """Return the id of the free joint of a robot's base; None where that is fixed, or unknown."""
+    free_joints = _free_joints_of_robot(facts)
+    return free_joints.pop() if len(free_joints) == 1 else None
+
+
+def _free_joints_of_robot(facts: RobotFacts) -> set[int | None]:
+    """Return the free joints that carry the joints of a robot; None among them for a fixed base."""
+    kinds = np.asarray(facts.jnt_type)
+    owners = np.asarray(facts.jnt_bodyid)
+    if not len(kinds) or len(owners) != len(kinds):  # traces of before do not tell the owners
+        return set()
+    driven = [joint for joint in np.asarray(facts.actuator_jntid).tolist() if joint >= 0]
+    joints = [joint for joint in driven if kinds[joint] != JointType.FREE]
+    if not joints:
+        joints = np.flatnonzero(kinds != JointType.FREE).tolist()
+    if not joints:
+        return {0} if len(kinds) == 1 else set()
+    return {_free_joint_above(facts, int(owners[joint])) for joint in joints}
+
+
+def _free_joint_above(facts: RobotFacts, body: int) -> int | None:
+    """Return the free joint that carries a body; None where none does."""
+    kinds, owners = np.asarray(facts.jnt_type), np.asarray(facts.jnt_bodyid)
+    parents = np.asarray(facts.body_parentid)
+    above = set[int]()
+    while body and body not in above:
+        above.add(body)
+        free = np.flatnonzero((owners == body) & (kinds == JointType.FREE))
+        if len(free):
+            return int(free[0])
+        body = int(parents[body])
+    return None
