@@ -28,8 +28,9 @@ from .verdict import UNEXPLAINED
 
 Conclusion = Literal["wider", "divided", "no gap", "refused", "chance", "nothing moved"]
 Advice = Literal[
-    "settings", "write", "refused", "both", "engines", "between", "files", "chance", "details", ""
-]
+    "settings", "write", "refused", "both", "engines", "between", "files", "chance", "details",
+    "written", "",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -224,7 +225,7 @@ def _advice(result: Explanation) -> Advice:
     """Return which sentence leads to the next command."""
     verdict = result.verdict
     if result.rewritten is not None:
-        return "details"
+        return "written"
     if verdict.answer == "nothing moved":
         return ""
     if not verdict.divides:
@@ -259,7 +260,7 @@ def _next_command(result: Explanation, advice: Advice) -> str:
             flags = ("--converge",)
         case "write":
             flags = ("--why", "--write", f"fixed{Path(result.right_file).suffix}")
-        case "refused" | "details":
+        case "refused" | "details" | "written":
             flags = ("--why", "--details")
         case "":
             return ""

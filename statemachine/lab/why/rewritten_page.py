@@ -16,11 +16,13 @@ class RewrittenPart(PageContent):
 
     Attributes:
         rewritten: The file.
-        most: How many rows there are of what was written, and of what was not.
+        has_changes: Whether each attribute that was changed has a row.
+        most: How many rows there are of what was not written.
     """
 
     template = "why_rewritten.md.j2"
     rewritten: RewrittenFile
+    has_changes: bool
     most: int
 
     @property
@@ -36,12 +38,7 @@ class RewrittenPart(PageContent):
     @property
     def changes(self) -> tuple[AttributeChange, ...]:
         """The attributes that have a row."""
-        return self.rewritten.written[: self.most]
-
-    @property
-    def more_changes(self) -> int:
-        """How many attributes have none."""
-        return len(self.rewritten.written) - len(self.changes)
+        return self.rewritten.written if self.has_changes else ()
 
     @property
     def refusals(self) -> tuple[UnwrittenChange, ...]:
@@ -59,8 +56,9 @@ def rewritten_blocks(rewritten: RewrittenFile, most: int | None = None) -> list[
 
     Args:
         rewritten: The file.
-        most: How many rows there are of each; None for all.
+        most: How many rows there are of what was not written, and none of what was; None for all
+            of both.
     """
     if most is None:
-        most = len(rewritten.written) + len(rewritten.not_written)
-    return render_blocks(RewrittenPart(rewritten, most))
+        return render_blocks(RewrittenPart(rewritten, True, len(rewritten.not_written)))
+    return render_blocks(RewrittenPart(rewritten, False, most))

@@ -183,7 +183,6 @@ def _with_file(
     Returns:
         The explanation, with what was written.
     """
-
     names = {} if question.names is None else question.names
 
     def load(path: Path) -> Model:
