@@ -39,7 +39,7 @@ class WhyPage(PageContent):
 
     Attributes:
         result: The explanation.
-        most_rows: How many causes have a row of their own, and how much of what was not written.
+        most_rows: How many causes have a row of their own; of what was not written one less.
         further: Everything else, under `--details`.
     """
 
@@ -119,7 +119,9 @@ class WhyPage(PageContent):
         """What was written of the right's file, if that was asked."""
         if self.result.rewritten is None:
             return []
-        return rewritten_blocks(self.result.rewritten, None if self.further else self.most_rows)
+        if self.further:
+            return rewritten_blocks(self.result.rewritten)
+        return rewritten_blocks(self.result.rewritten, self.most_rows - 1)
 
     @property
     def advice(self) -> Advice:
