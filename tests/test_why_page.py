@@ -178,8 +178,8 @@ def test_what_was_not_written_is_told_on_the_first_screen(gains: Explanation) ->
     rewritten = RewrittenFile("fixed.xml", "right.xml", (), refusals, 1e-9, 0.1, "joints", "rad")
     result = replace(gains, command=COMMAND, rewritten=rewritten)
     assert_one_screen(result)
-    assert "Cause 0: of a reason" in shown(page(result))
-    assert "Cause 29" in shown(page(result, details=True))
+    assert "cause 0: of a reason" in shown(page(result))
+    assert "cause 29" in shown(page(result, details=True))
 
 
 @pytest.mark.parametrize("width", [10, 60])

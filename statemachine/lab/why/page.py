@@ -14,7 +14,7 @@ from typing import Literal
 from ...installed import DEFAULT
 from ...measures import Deviation
 from ...show.blocks import Block, Page, Table, Text
-from ...show.first_screen import MOST_ROWS, first_screen
+from ...show.first_screen import LINES, MOST_ROWS, first_screen, lines_of
 from ...show.templates import PageContent, render, render_blocks
 from ..compare.chaos import CLEAR
 from ..compare.labels import lacking
@@ -39,7 +39,7 @@ class WhyPage(PageContent):
 
     Attributes:
         result: The explanation.
-        most_rows: How many causes have a row of their own; of what was not written one less.
+        most_rows: How many causes have a row of their own, and how much of what was not written.
         further: Everything else, under `--details`.
     """
 
@@ -121,7 +121,7 @@ class WhyPage(PageContent):
             return []
         if self.further:
             return rewritten_blocks(self.result.rewritten)
-        return rewritten_blocks(self.result.rewritten, self.most_rows - 1)
+        return rewritten_blocks(self.result.rewritten, self.most_rows)
 
     @property
     def advice(self) -> Advice:
@@ -205,7 +205,12 @@ def page(result: Explanation, details: bool = False) -> Page:
     """
     if details:
         return render(WhyPage(result, MOST_ROWS, render_blocks(WhyDetails(result))))
-    return first_screen(lambda rows: render(WhyPage(result, rows, ())))
+
+    def page_with(rows: int) -> Page:
+        return render(WhyPage(result, rows, ()))
+
+    shown = first_screen(page_with)
+    return shown if lines_of(shown) <= LINES else page_with(0)
 
 
 def _conclusion(result: Explanation) -> Conclusion:

@@ -36,6 +36,11 @@ class RewrittenPart(PageContent):
         return self.rewritten.gap is not None
 
     @property
+    def all_written(self) -> bool:
+        """Whether nothing stays that differs."""
+        return not self.rewritten.not_written
+
+    @property
     def changes(self) -> tuple[AttributeChange, ...]:
         """The attributes that have a row."""
         return self.rewritten.written if self.has_changes else ()

@@ -63,7 +63,7 @@ def summary_table(result: Explanation, most: int) -> Table:
 
 def _summary_of_cause(result: Explanation, row: Share) -> Row:
     """Return a cause in one row, with the line of the right's file that says it."""
-    left, right = sides_of(row)
+    left, right = sides_of(row, most=1)
     place = NONE
     if row.place is not None:
         place = f"{row.place.file}:{row.place.line}"

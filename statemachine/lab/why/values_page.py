@@ -49,20 +49,28 @@ def heading_of(row: Share) -> str:
     return title_of(row, row.values[0]) if len(distinct(row.values)) == 1 else row.name
 
 
-def sides_of(row: Share) -> tuple[str, str]:
+def sides_of(row: Share, most: int = _SHOWN) -> tuple[str, str]:
     """Return what each side has of a cause, in words: "solref 0.02 and solmix 1".
 
     Both are `NONE` where a side has nothing that a value could tell.
+
+    Args:
+        row: The cause.
+        most: How many of its quantities are told.
     """
     if not row.values:
         return NONE, NONE
-    values = _largest_first(distinct(row.values))
-    pairs = [_named(value, alone=len(values) == 1) for value in values[:_SHOWN]]
+    values = _largest_first(distinct(row.values), most)
+    pairs = [_named(value, alone=len(values) == 1) for value in values[:most]]
     left, right = zip(*pairs, strict=True)
-    more = f" and {len(values) - _SHOWN} more" if len(values) > _SHOWN else ""
-    if more:
-        return ", ".join(left) + more, ", ".join(right) + more
-    return listed([text for text in left if text]), listed([text for text in right if text])
+    more = len(values) - most
+    sides: list[str] = []
+    for texts in (left, right):
+        named = [text for text in texts if text]
+        if more > 0:
+            named.append(f"{more} more")
+        sides.append(listed(named))
+    return sides[0], sides[1]
 
 
 def distinct(values: Sequence[DifferingQuantity]) -> list[DifferingQuantity]:
@@ -70,9 +78,9 @@ def distinct(values: Sequence[DifferingQuantity]) -> list[DifferingQuantity]:
     return list(dict.fromkeys(values))
 
 
-def _largest_first(values: Sequence[DifferingQuantity]) -> list[DifferingQuantity]:
-    """Return quantities; of more than a sentence has, those that differ most come first."""
-    if len(values) <= _SHOWN:
+def _largest_first(values: Sequence[DifferingQuantity], most: int) -> list[DifferingQuantity]:
+    """Return quantities; of more than so many, those that differ most come first."""
+    if len(values) <= most:
         return list(values)
     return sorted(values, key=relative_difference, reverse=True)
 
