@@ -121,8 +121,8 @@ def test_json_terminal_and_page_say_what_was_found(name, ran, tmp_path, here):
     told = json.loads(here(*words, "--json", code=int(not pair.explained)).stdout)
     (found,) = ran
     expected = json.loads(dumps(found))
-    for name, value in expected.items():
-        assert name == "shares" or told[name] == value, name
+    for key, value in expected.items():
+        assert key == "shares" or told[key] == value, key
     for each, share in zip(told["shares"], expected["shares"], strict=True):
         assert {**each, "changes": [], "not_written": ""} == share
     assert not any(each["name"].startswith("start") for each in told["shares"])

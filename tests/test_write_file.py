@@ -260,7 +260,8 @@ def test_a_place_that_is_counted_from_a_frame_is_refused(rewritten) -> None:
 
 def test_an_included_file_with_changes_stands_in_place_of_its_include(rewritten, tmp_path) -> None:
     part = (
-        '<mujocoinclude><!-- of the part --><body name="a"><joint name="j" damping="{}"/>'
+        '<!-- above --><mujocoinclude><!-- of the part --><body name="a" pos="0 0 1">'
+        '<joint name="j" damping="{}"/>'
         '<geom size="0.1"/></body></mujocoinclude>'
     )
     for name, damping in (("one", 1), ("two", 2)):
@@ -277,6 +278,7 @@ def test_an_included_file_with_changes_stands_in_place_of_its_include(rewritten,
     (change,) = result.written
     assert (change.file, change.new) == ("two.xml", "1")
     text = target.read_text()
+    assert "<!-- above -->" in text
     assert "<!-- of the part -->" in text
     assert "<!-- here -->" in text
     assert '<include file="floor.xml"/>' in text

@@ -20,7 +20,10 @@ from .file_changes import AttributeChange
 
 _ATTRIBUTE = re.compile(rb"\s+([^\s=/>\"']+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 _TAG = re.compile(rb"<[^\s/>]+")
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _INDENT = "  "
+# The elements whose files are looked for in the folder that an attribute of `<compiler>` names.
+_FOLDERS = {"meshdir": {"mesh", "hfield", "skin"}, "texturedir": {"texture"}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +222,10 @@ class XmlSource:
         if not self._references:
             return self.changed_text(inline=True)
         compilers = [each for each in self.elements if each.tag == "compiler"]
-        for attribute in ("meshdir", "texturedir"):
+        tags = {element.tag for element in self._references}
+        for attribute, kinds in _FOLDERS.items():
+            if not tags & kinds:
+                continue
             having = [e for e in compilers if {attribute, "assetdir"} & e.attributes.keys()]
             here = ""
             if having:
@@ -269,8 +275,13 @@ class XmlSource:
         changed = self._changed(path, inline)
         # The root itself is not changed: what is in front of it and its end keep their lengths.
         behind = len(self._texts[path]) - self._ends[root]
-        inner = changed[root.end : len(changed) - behind]
-        return inner.rpartition(b"</")[0].strip()
+        inner = changed[root.end : len(changed) - behind].rpartition(b"</")[0].strip()
+        text = self._texts[path]
+        above, below = (
+            _COMMENT.findall(text[: root.start]),
+            _COMMENT.findall(text[len(text) - behind :]),
+        )
+        return b"\n".join([*above, inner, *below])
 
     def _start_tag(self, element: XmlElement, changes: _Changes) -> bytes:
         """Return the start tag of an element with the changes, and the children that are added."""
