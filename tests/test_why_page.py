@@ -24,7 +24,7 @@ from .support.explained import ALONE, ARM, changed, explained, with_changes
 from .support.files import written
 from .support.pages import blocks, shown
 
-COMMAND = TypedCommand(("statemachine", "compare", "waves", "left.xml", "right.xml"))
+COMMAND = TypedCommand(("statemachine", "compare", "waves", "left.xml", "right.xml"), ("--why",))
 
 
 def chain(joints: int, damping: float) -> str:
@@ -171,6 +171,7 @@ def test_changes_are_told_in_the_form_of_the_file(tmp_path: Path) -> None:
     assert result.right_file == "right.xml"
     assert result.command is not None
     assert result.command.words[-2:] == ("--seconds", "0.3")
+    assert result.command.question == ("--why", "--no-chaos")
 
 
 def test_what_was_not_written_is_told_on_the_first_screen(gains: Explanation) -> None:

@@ -19,9 +19,11 @@ class TypedCommand:
 
     Attributes:
         words: As they are typed, each by itself.
+        question: The words that ask what was asked, such as "--why".
     """
 
     words: tuple[str, ...]
+    question: tuple[str, ...] = ()
 
     def lines(self, *further: str) -> str:
         """Return the command as one types it, continued on further lines where it is long.
@@ -46,8 +48,13 @@ class TypedCommand:
         return "\n".join([*lines, line])
 
 
-def typed_command(run: Request) -> TypedCommand:
-    """Return the command that runs something on two sides, or opens two traces."""
+def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand:
+    """Return the command that runs something on two sides, or opens two traces.
+
+    Args:
+        run: What is run.
+        question: The words that ask what was asked.
+    """
     words = ["statemachine", "compare", *run.what]
     if run.model:
         words.append(run.model)
@@ -62,7 +69,7 @@ def typed_command(run: Request) -> TypedCommand:
         for backend in run.backends:
             words += ["--backend", backend]
     words += _words_of_run(run)
-    return TypedCommand(tuple(words))
+    return TypedCommand(tuple(words), tuple(question))
 
 
 def _words_of_side(side: Side) -> list[str]:

@@ -266,9 +266,10 @@ def _next_command(result: Explanation, advice: Advice) -> str:
         case "between" | "chance":
             flags = ("--converge",)
         case "write":
-            flags = ("--why", "--write", f"fixed{Path(result.right_file).suffix}")
+            target = f"fixed{Path(result.right_file).suffix}"
+            flags = (*result.command.question, "--write", target)
         case "refused" | "details" | "written":
-            flags = ("--why", "--details")
+            flags = (*result.command.question, "--details")
         case "":
             return ""
     return result.command.lines(*flags)

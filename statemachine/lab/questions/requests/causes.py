@@ -163,10 +163,26 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     if run.is_traces:
         notes.append(_PLAYED)
     explanation = replace(
-        explanation, notes=(*notes, *explanation.notes), command=typed_command(run)
+        explanation,
+        notes=(*notes, *explanation.notes),
+        command=typed_command(run, _question(request)),
     )
     facts = vars(explanation)
     return ExplainResult(**facts, request=request)
+
+
+def _question(request: ExplainRequest) -> list[str]:
+    """Return the words that ask this question."""
+    words = ["--why"]
+    if request.quantity is not None:
+        words += ["--quantity", request.quantity]
+    if request.measure != "worst":
+        words += ["--measure", request.measure]
+    if request.finer:
+        words.append("--finer")
+    if request.uncertainty is None:
+        words.append("--no-chaos")
+    return words
 
 
 def _with_file(
