@@ -12,7 +12,7 @@ from statemachine.lab.compare import Request, Side
 from statemachine.lab.compare.agreement import compare
 from statemachine.lab.compare.prepared_sides import prepare_sides
 from statemachine.lab.compare.two_sides import run_sides
-from statemachine.lab.runs.floating import base_of, free_joint_of_robot
+from statemachine.lab.runs.floating import base_of, free_joint_of_base
 from statemachine.lab.why.causes import differences_of
 
 from .support.legged import FLOATING, STANDING, mjcf, urdf, written
@@ -129,7 +129,7 @@ def test_the_joint_that_lets_a_base_float_is_that_which_carries_the_actuated_one
     text = mjcf().split("<keyframe>")[0].replace('<body name="trunk"', f'{box}<body name="trunk"')
     path = written(tmp_path, "scene.xml", f"{text}</mujoco>")
     model = Side(str(path)).load()
-    joint = free_joint_of_robot(model)
+    joint = free_joint_of_base(model)
     assert model.body_names[model.jnt_bodyid[joint]] == "trunk"
     assert base_of(model) == "free"
-    assert free_joint_of_robot(Side(str(path), options={"base": "fixed"}).load()) is None
+    assert free_joint_of_base(Side(str(path), options={"base": "fixed"}).load()) is None

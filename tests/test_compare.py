@@ -24,12 +24,12 @@ from statemachine.lab.compare import (
     witness,
 )
 from statemachine.lab.compare.series import normal_forces, total_forces
-from statemachine.lab.questions import compare_page as report
 from statemachine.lab.recordings import Trace, record, write
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.measures import COUNT, QUANTITIES, parse_tolerances, tolerance_of
 
 from .support.claims import assert_has, assert_in, refused
+from .support.compared import page_of
 from .support.files import written
 from .support.motions import opened
 from .support.processes import Cli, one_line
@@ -355,7 +355,7 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     assert ", recorded" in found.right.label
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
-    assert report.page(found, said=run.said).blocks
+    assert page_of(found, run=run).blocks
 
 
 # The command.

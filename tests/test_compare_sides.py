@@ -23,11 +23,11 @@ from statemachine.lab.compare import (
     run_sides,
     split_words,
 )
-from statemachine.lab.questions import compare_page as report
 from statemachine.lab.recordings import RunStart, record, write
 from statemachine.lab.runs.controllers import function_scenario
 
 from .support.claims import assert_has, refused
+from .support.compared import page_of
 from .support.explained import with_changes
 from .support.files import written, written_all
 from .support.processes import Cli, one_line
@@ -397,7 +397,7 @@ def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files
     closed, opened = compare(run.left, run.right), compare(run.left, run.played)
     assert not closed.agrees
     assert largest(opened) == 0
-    assert not report.page(closed, run=run, played=opened).holds
+    assert not page_of(closed, run=run, played=opened).holds
 
 
 def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
@@ -499,10 +499,11 @@ def test_what_a_side_has_nothing_of_is_said_first_and_its_switch_shows_the_rest(
     monkeypatch.chdir(tmp_path)
     written_all(tmp_path, {"whole.xml": _WITH.format(damping=0.3), "bare.xml": _bare(0.5)})
     words = ("compare", "hold", "whole.xml", "bare.xml", "--seconds", "0.5")
-    for more in ((), ("--why",)):
-        lines = [line for line in here(*words, *more).stdout.splitlines() if "gives" in line]
-        assert ["--actuators left" in line for line in lines] == [True, False]
-        assert ["--floor left" in line for line in lines] == [False, True]
+    lines = [line for line in here(*words, "--why").stdout.splitlines() if "gives" in line]
+    assert ["--actuators left" in line for line in lines] == [True, False]
+    assert ["--floor left" in line for line in lines] == [False, True]
+    typed = here(*words, "--no-chaos").stdout.splitlines()[-2]
+    assert typed.strip() == f"statemachine {' '.join(words)} --actuators left --floor left"
     both = ("--actuators", "left", "--floor", "left", "--json", "--no-chaos")
     found = json.loads(here(*words, "--why", *both).stdout)
     assert_has(found, missing=[], explained=pytest.approx(1.0))

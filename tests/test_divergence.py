@@ -17,9 +17,9 @@ from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
 from statemachine.lab.compare import Request, run_sides
 from statemachine.lab.compare import compare as compare_traces
-from statemachine.lab.questions import compare_page as report
 
 from .support.claims import overlapping, refused
+from .support.compared import page_of
 from .support.files import written
 from .support.motions import after, opened
 from .support.requirements import need_engine
@@ -174,4 +174,4 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
     )
     traces = run_sides(Request(("droop",), model=str(path))).traces
     assert all(trace.header.ended for trace in traces)
-    assert "ended early" in report.page(compare_traces(*traces)).headline.text
+    assert "ended early" in page_of(compare_traces(*traces)).headline.text

@@ -19,15 +19,15 @@ from statemachine.lab.compare.convergence import Convergence, convergence, verdi
 from statemachine.lab.compare.matching import match_models
 from statemachine.lab.compare.perturbed import ROUNDING, RUNS, parse_uncertainty
 from statemachine.lab.compare.sides import Request
-from statemachine.lab.questions import compare_page as report
 from statemachine.lab.questions.convergence import page
-from statemachine.lab.questions.finding import headline, leading
+from statemachine.lab.questions.finding import finding_of, leading
 from statemachine.lab.questions.requests.converge import ConvergeRequest, ConvergeResult
 from statemachine.lab.recordings import Rerun, Trace, record
 from statemachine.lab.why.gap import Ruler
 from statemachine.show.blocks import Code, Page
 
 from .support.claims import refused
+from .support.compared import page_of as compared_page
 from .support.files import written
 from .support.pages import blocks, shown
 from .support.processes import Cli
@@ -78,7 +78,7 @@ def test_identical_sides_are_inside_all_the_time(tmp_path: Path) -> None:
     floor = chaos_floor(comparison, (run, run))
     assert {band.inside_from for band in floor.bands} == {0.0}
     assert {band.chance for band in floor.bands} == {None}
-    text = shown(report.page(comparison, floor=floor))
+    text = shown(compared_page(comparison, floor=floor, details=True))
     assert "Every gap lies inside it, all the time." in " ".join(text.split())
 
 
@@ -185,7 +185,7 @@ def test_a_gap_within_its_tolerance_agrees_whatever_the_floor(tmp_path: Path) ->
     comparison = compare(run.record(), near.record())
     floor = chaos_floor(comparison, (run, near), uncertain=Uncertainty(0.0, 0.5))
     assert comparison.agrees
-    assert report.page(comparison, floor=floor).holds
+    assert compared_page(comparison, floor=floor).holds
     assert {band.chance for band in floor.bands} == {None}
 
 
@@ -199,9 +199,8 @@ def test_what_may_be_chance_is_not_what_leads(tmp_path: Path) -> None:
     bands = [replace(b, chance="inside") if b.name == first.name else b for b in floor.bands]
     assert leading(comparison, replace(floor, bands=tuple(bands))).name != first.name
     everywhere = replace(floor, bands=tuple(replace(b, chance="inside") for b in bands))
-    finding = headline(comparison, [], floor=everywhere)
-    assert "Nothing can be concluded" in finding.end
-    assert "1 perturbed runs of each side" in finding.end
+    finding = finding_of(comparison, everywhere)
+    assert finding.rounding.verdict == "as much"
     assert not finding.holds
 
 
@@ -266,18 +265,18 @@ def test_uncertainties_are_read_in_their_units() -> None:
 def test_the_command_line_shows_the_floor(here: Cli) -> None:
     asked = ("compare", "hold", "--seconds", "0.4")
     assert json.loads(here(*asked, "--json").stdout)["floor"]["runs"] == RUNS
-    assert "chaos" not in here(*asked, "--no-chaos").stdout
+    assert "chaos" not in here(*asked, "--no-chaos", "--details").stdout
     # Where it is above a tolerance it stands in the table, quantity by quantity.
-    assert re.search("RMS +settled +from, s\n", here(*asked).stdout)
-    assert re.search("settled +from, s +floor\n", here(*asked, "--uncertainty", "5deg").stdout)
+    assert re.search("at the end +verdict\n", here(*asked).stdout)
+    assert re.search("rounding +verdict\n", here(*asked, "--uncertainty", "5deg").stdout)
 
 
 def test_a_trace_has_a_floor_where_it_is_played_on_two_sides(here: Cli, tmp_path: Path) -> None:
     file = tmp_path / "a.npz"
     here("trace", "record", "droop", "--seconds", "0.2", "-o", file)
-    assert "chaos" not in here("compare", file, file).stdout
+    assert "chaos" not in here("compare", file, file, "--details").stdout
     sides = ("so101/scene", "so101/scene", "damping=0.7")
-    assert "The chaos floor" in here("compare", file, *sides).stdout
+    assert "chaos floor" in here("compare", file, *sides, "--details").stdout
 
 
 # What vanishes with the timestep

@@ -242,6 +242,17 @@ def test_two_models_with_nothing_that_moves_are_compared(tmp_path: Path) -> None
     assert np.isfinite(result.posed.distance)
 
 
+def test_of_two_models_with_nothing_that_moves_no_run_is_suggested(
+    here: Cli, tmp_path: Path
+) -> None:
+    text = '<mujoco><worldbody><geom size="{}"/></worldbody></mujoco>'
+    written_all(tmp_path, {"left.xml": text.format(0.1), "right.xml": text.format(0.2)})
+    answer = here("compare", "--models", "left.xml", "right.xml", code=1)
+    assert "statemachine compare" not in answer.stdout
+    refused = here("compare", "gravity", "left.xml", "right.xml", code=2)
+    assert "compare --models" in refused.stderr
+
+
 def test_a_coupling_that_only_one_file_has_is_told_in_words(tmp_path: Path) -> None:
     more = (
         '<link name="b"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" '

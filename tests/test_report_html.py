@@ -19,18 +19,20 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from PIL import Image
-from statemachine.lab.questions.compare_page import PageParts
-from statemachine.lab.questions.compare_page import page as compared
 
 import statemachine as sm
 from statemachine.course.notebook import markdown
 from statemachine.engines.records import DifferingQuantity
 from statemachine.errors import BadInputError, MissingEngineError
-from statemachine.lab.compare import Comparison, compare, touches
+from statemachine.lab.compare import Comparison, SidesRun, compare, touches
 from statemachine.lab.compare.series import total_forces
-from statemachine.lab.questions.events import events_of
-from statemachine.lab.questions.finding import headline, leading, subject
-from statemachine.lab.questions.sides_page import commanded
+from statemachine.lab.questions.compare_report import (
+    ReportParts,
+    explained_quantity,
+    report_page,
+)
+from statemachine.lab.questions.finding import finding_of, leading
+from statemachine.lab.questions.sides_page import commands_table
 from statemachine.lab.questions.stage.bones import bones_of
 from statemachine.lab.questions.stage.page import report
 from statemachine.lab.questions.stage.poses import rows_at
@@ -61,6 +63,7 @@ from statemachine.show.html.geometry import mesh_as_data, mesh_of
 
 from .support.browser import Tab, browser
 from .support.claims import assert_has, assert_in, refused
+from .support.compared import result_of
 from .support.processes import soon
 from .support.requirements import ROOT
 from .support.shapes import area_of
@@ -78,7 +81,8 @@ def of(one: Trace, two: Trace) -> Made:
 
 
 def page_of(made: Made, looks: Any = None, said: Sequence[str] = (), **more: Any) -> str:
-    page = compared(made[0], said=said, parts=PageParts(**more))
+    run = SidesRun(*made[1:3], made[2], said=tuple(said))
+    page = report_page(result_of(made[0], run), ReportParts(**more))
     return report(page, looks or made[3:] * 2)
 
 
@@ -271,27 +275,27 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
 # What it says.
 
 
+def headline_of_page(made: Made, **more: Any) -> Headline:
+    headline = report_page(result_of(made[0]), ReportParts(**more)).headline
+    assert headline is not None
+    return headline
+
+
 def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     comparison, one, *_ = hold
     (wrist,) = (each for each in comparison.agreements if each.name == "wrist_flex")
-    finding = headline(comparison, events_of(comparison))
-    far = quantity(wrist.max, wrist.unit)
-    assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
+    finding, shown = finding_of(comparison), headline_of_page(hold)
     since = min(row.since for row in comparison.agreements if row.since is not None)
-    assert_in(
-        finding.lead,
-        f", at {wrist.at:.3f} s; ",
-        f"the runs part at {since:.3f} s, when gripper touches floor",
-    )
-    assert finding.causes == ()  # nothing was asked about causes
-    # The end is a mean over the last tenth, and the last moment is something else.
+    far, end = (quantity(value, wrist.unit) for value in (wrist.max, wrist.settled))
+    assert_in(shown.lead, far, f"{wrist.at:.3f} s", f"{end} at the end", f"at {since:.3f} s")
+    assert shown.causes == ()  # nothing was asked about causes
+    # The end is a mean over the last tenth.
     (curve,) = (each for each in comparison.curves if each.name == "wrist_flex")
-    tail = np.degrees(curve.difference[curve.time >= 1.8 - 1e-9])
-    said = [float(x) for x in re.findall(r"([\d.]+)°", finding.end)]
-    assert said == pytest.approx([tail.mean(), tail[-1]], rel=0.005)
-    assert "still changing" in finding.end
+    tail = curve.difference[curve.time >= 1.8 - 1e-9]
+    assert finding.lead.settled == pytest.approx(tail.mean())
+    assert finding.is_changing
     still = edited(one, qpos=added(one.qpos, np.s_[100:, 3], 0.05))
-    assert "changing" not in headline(compare(one, still), []).end
+    assert not finding_of(compare(one, still)).is_changing
 
 
 def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explanation:
@@ -329,7 +333,7 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
 
 def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     def said(**more: Any) -> Headline:
-        return headline(hold[0], [], explanation_of(hold, **more))
+        return headline_of_page(hold, explanation=explanation_of(hold, **more))
 
     assert said().lead.startswith("Joint wrist_flex is up to 2.58° apart")
     assert said().causes == (
@@ -344,13 +348,9 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     # Of two that are as far apart the page names one, here and where it counts agreements.
     lead = leading(hold[0])
     tied = (replace(lead, max=lead.max * (1 - 1e-9)), *hold[0].agreements)
-    assert subject(replace(hold[0], agreements=tied), explanation_of(hold))[3] is lead
-    twin = replace(tied[0], name="twin", settled=lead.settled * (1 + 1e-9))
-    both = replace(hold[0], agreements=(twin, *hold[0].agreements))
-    assert "joint wrist_flex is still" in headline(both, []).end
-    # Of another quantity than any that is compared: named as it is.
-    other = said(quantity="box relative to gripperframe")
-    assert other.lead.startswith("The box relative to gripperframe is up to 2.58° apart")
+    assert explained_quantity(replace(hold[0], agreements=tied), explanation_of(hold)) is lead
+    # Of another quantity than any that is compared no cause stands beside the lead.
+    assert said(quantity="box relative to gripperframe").causes == ()
 
 
 def refused_cause(name: str, why: str) -> Share:
@@ -501,8 +501,7 @@ def test_who_presses_on_what(hold: Made) -> None:
 
 
 def test_what_was_commanded(hold: Made) -> None:
-    sections: Any = commanded(hold[0])
-    ((table,),) = [section.blocks for section in sections]
+    table = commands_table(hold[0])
     for row, value in zip(table.rows, hold[1].ctrl[0], strict=True):
         assert float(row[1]) == float(row[2]) == pytest.approx(value, rel=1e-2)
     assert table.rows[0][0] in page_of(hold)
@@ -517,7 +516,6 @@ def test_a_link_only_to_what_is_there(hold: Made) -> None:
         text = page_of(of_look(hold[1], other, hold[3]), models=models)
         links = set(re.findall(r'href="#([^"]+)"', text))
         assert links <= set(re.findall(r'id="([^"]+)"', text))
-        assert ("emulated" in links) == (kind == "model")
 
 
 def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:

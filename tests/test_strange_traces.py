@@ -16,7 +16,6 @@ from statemachine.atomic_files import check_place, replace_file
 from statemachine.errors import ModelFileError, TraceError
 from statemachine.interface import JointType
 from statemachine.lab.compare import compare, witness
-from statemachine.lab.questions import compare_page as report
 from statemachine.lab.recordings import (
     RunMetadata,
     RunStart,
@@ -28,6 +27,7 @@ from statemachine.lab.recordings import (
 )
 
 from .support.claims import assert_has, refused
+from .support.compared import page_of
 from .support.files import written_all
 from .support.pages import shown
 from .support.processes import Cli
@@ -59,7 +59,7 @@ def test_what_is_no_number_never_agrees(column: str, quantity: str, box: Trace) 
     assert not found.agrees
     assert (named(found)[quantity].verdict, found.worst.name) == ("differs", quantity)
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
-    assert "nan" not in shown(report.page(found))
+    assert "nan" not in shown(page_of(found, details=True))
 
 
 def test_a_column_that_is_not_told_is_not_compared_and_that_is_said(box: Trace) -> None:
@@ -83,7 +83,7 @@ def test_who_ended_early_does_not_agree(box: Trace) -> None:
     found = compare(box, cut(box, 5, ended="it diverged"))
     assert {each.verdict for each in found.agreements} == {"agrees"}
     assert_has(found, ended=True, agrees=False)
-    assert not report.page(found).holds
+    assert not page_of(found).holds
     assert any("0.02 s is not compared" in note for note in found.notes)
 
 

@@ -40,6 +40,7 @@ __all__ = [
     "backend_names",
     "check_backend",
     "load",
+    "load_for_places",
     "load_to_run",
     "parse_backend",
     "register",
@@ -122,6 +123,10 @@ class BackendChoice:
     def load_to_run(self, model: AnyPath, **arguments: Any) -> Model:
         """Load a model on it, as the function of this name does."""
         return load_to_run(model, self.name, defaults=self.defaults, **arguments)
+
+    def load_for_places(self, model: AnyPath, **arguments: Any) -> Model:
+        """Load a model on it, as the function of this name does."""
+        return load_for_places(model, self.name, defaults=self.defaults, **arguments)
 
 
 def parse_backend(word: str) -> BackendChoice:
@@ -266,14 +271,7 @@ def load(
     if backend in ENGINES:
         require(backend)
     loader = _loader_at(place, backend)
-    read_options = ReadOptions(
-        balance_inertia=as_switch(balance_inertia, "balance_inertia"),
-        meshes=as_switch(meshes, "meshes"),
-    )
-    if base is not None:
-        from ..interface.read_options import with_base
-
-        read_options = with_base(read_options, base)
+    read_options = _checked_read_options(balance_inertia, meshes, base)
     takes = inspect.signature(loader).parameters
     takes_options = "options" in takes
     early: dict[str, Any] = {"options": options} if options and takes_options else {}
@@ -291,6 +289,27 @@ def load(
     if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
+
+
+def _checked_read_options(
+    balance_inertia: bool, meshes: bool, base: Base | FreeBase | None
+) -> ReadOptions:
+    """Return how a file is read, as `load` was told.
+
+    Raises:
+        UnknownNameError: There is no such base.
+        BadInputError: A switch is neither True nor False, or a free base starts nowhere.
+    """
+    read_options = ReadOptions(
+        balance_inertia=as_switch(balance_inertia, "balance_inertia"),
+        meshes=as_switch(meshes, "meshes"),
+        least_mass=_FOR_PLACES.get(),
+    )
+    if base is None:
+        return read_options
+    from ..interface.read_options import with_base
+
+    return with_base(read_options, base)
 
 
 def _of_usual_start(model: Model) -> str:
@@ -314,6 +333,25 @@ def load_to_run(model: AnyPath, backend: str = DEFAULT, **arguments: Any) -> Mod
         _TOLD_BY_THE_RUN.reset(token)
 
 
+# Whether `load` reads a file of which places alone are asked.
+_FOR_PLACES: ContextVar[bool] = ContextVar("for places", default=False)
+
+
+def load_for_places(model: AnyPath, backend: str = DEFAULT, **arguments: Any) -> Model:
+    """Load a Model of which places alone are asked, as `load` does, but refuse less of its file.
+
+    Places need no masses, inertias or meshes: an inertia that MuJoCo refuses is balanced, a body
+    that moves without mass gets the least that MuJoCo takes, and meshes are left out. No motion of
+    this Model means anything.
+    """
+    read = {"balance_inertia": True, "meshes": False, **arguments}
+    token = _FOR_PLACES.set(True)
+    try:
+        return load_to_run(model, backend, **read)
+    finally:
+        _FOR_PLACES.reset(token)
+
+
 def on_default(model: Model) -> Model:
     """A model on the engine that compiles MJCF: itself, or what that engine makes of its file.
 
@@ -325,7 +363,8 @@ def on_default(model: Model) -> Model:
         if model.backend == DEFAULT:
             return model
         read = model.read_options
-        return load(
+        again = load_for_places if read.least_mass else load
+        return again(
             model.path,
             balance_inertia=read.balance_inertia,
             meshes=read.meshes,

@@ -30,6 +30,7 @@ import numpy as np
 from ..interface.records import AS_WRITTEN, FreeBase, ReadOptions
 from ..models import mesh_file, what_is_there
 from ..rotations import matrix_from_quat
+from .repair_record import LEAST
 
 # Suffixes by which MuJoCo knows that a file is XML.
 _KNOWN = (".xml", ".urdf")
@@ -89,8 +90,8 @@ def urdf_text(
         path: The file.
         visuals: Whether visual shapes are to be read, too, which MuJoCo leaves out unless the file
             says `discardvisual="false"`.
-        options: What is written into the text, too: the `balanceinertia` of its <compiler>, and
-            shapes without those that are meshes.
+        options: What is written into the text, too: `balanceinertia`, `boundmass` and
+            `boundinertia` of its <compiler>, and shapes without those that are meshes.
         moments: Moments of inertia [kg m^2] that are written in place of those of some links, about
             each axis the same, by name of the link.
         base: How its base is fixed to the world, or floats; None for what the file says.
@@ -108,15 +109,8 @@ def urdf_text(
         return None
     compiler = _compiler_of(root)
     is_changed = _name_meshes(root, compiler, path.parent)
-    if options.balance_inertia:
-        compiler.set("balanceinertia", "true")
-        is_changed = True
-    for link in root.iter("link"):
-        inertia = link.find("inertial/inertia")
-        if inertia is not None and link.get("name", "") in moments:
-            moment = repr(moments[link.get("name", "")])
-            inertia.attrib = dict.fromkeys(("ixx", "iyy", "izz"), moment)
-            inertia.attrib |= dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+    is_changed = _set_bounds(compiler, options) or is_changed
+    _set_moments(root, moments)
     if not options.meshes:
         is_changed = _drop_meshes(root) or is_changed
     if base is not None:
@@ -126,6 +120,34 @@ def urdf_text(
         compiler.set("discardvisual", "false")
         is_changed = True
     return ElementTree.tostring(root, encoding="unicode") if is_changed else None
+
+
+def _set_bounds(compiler: Element, options: ReadOptions) -> bool:
+    """Write into a <compiler> what inertias and masses must be; return whether anything was."""
+    if options.balance_inertia:
+        compiler.set("balanceinertia", "true")
+    if options.least_mass:
+        for bound in ("boundmass", "boundinertia"):
+            compiler.set(bound, repr(max(LEAST, _number(compiler.get(bound, "0")))))
+    return options.balance_inertia or options.least_mass
+
+
+def _set_moments(root: Element, moments: Mapping[str, float]) -> None:
+    """Write moments of inertia [kg m^2] into a URDF, one about all axes, by name of the link."""
+    for link in root.iter("link"):
+        inertia = link.find("inertial/inertia")
+        if inertia is not None and link.get("name", "") in moments:
+            moment = repr(moments[link.get("name", "")])
+            inertia.attrib = dict.fromkeys(("ixx", "iyy", "izz"), moment)
+            inertia.attrib |= dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+
+
+def _number(text: str) -> float:
+    """Return a number of a file; zero where the text is none, of which MuJoCo complains."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
 
 
 def _set_base(root: Element, base: BaseOfText) -> None:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from xml.parsers import expat
 
 from ..interface.records import ReadOptions
+from ..measures.text import few
 from ..models import what_is_there
 from .compiled.reading import compile_with
 from .compiled.spec_files import ENGINE_ERRORS, reason_of
 
+_NO_MASS = "must be larger than mjMINVAL"
+_BOUNDS = 'boundmass="0.001" boundinertia="1e-6"'
 _OPENED = re.compile(r"opening file '(.*)'")
 
 
@@ -24,12 +29,82 @@ def explained(path: Path, options: ReadOptions, error: BaseException) -> str:
     """
     texts = [reason_of(error)]
     if isinstance(error, ValueError):  # not where memory ended
+        if _NO_MASS in texts[0] and (without_mass := _of_massless(path, options)):
+            return without_mass
         missing = _OPENED.search(texts[0])
         if missing is not None:
             texts.append(_of_missing_file(path, missing[1]))
         if with_options := _options_that_read(path, options):
             texts.append(with_options)
     return "; ".join(texts)
+
+
+def _of_massless(path: Path, options: ReadOptions) -> str:
+    """Return which bodies move without mass, where the first is, and what to write into the file.
+
+    Args:
+        path: The file, in which there is one.
+        options: With which it was refused.
+
+    Returns:
+        "" where more than that is wrong with the file.
+    """
+    least = replace(options, least_mass=True)
+    balanced = replace(least, balance_inertia=True)
+    for further in (least, balanced, replace(least, meshes=False), replace(balanced, meshes=False)):
+        try:
+            _, repairs = compile_with(path, further)
+        except (ValueError, *ENGINE_ERRORS):
+            continue
+        massless = [repair for repair in repairs if repair.is_massless]
+        names = list(dict.fromkeys(repair.name for repair in massless))
+        is_urdf = path.suffix.lower() == ".urdf"
+        line = _line_of_link(path, names[0]) if is_urdf else massless[0].line
+        return _without_mass(names, is_urdf, line)
+    return ""
+
+
+def _without_mass(names: Sequence[str], is_urdf: bool, line: int | None) -> str:
+    """Return what is wrong with bodies that move without mass, and what to write into the file.
+
+    Args:
+        names: Of the bodies.
+        is_urdf: Whether the file is a URDF, and not an MJCF.
+        line: Where the first of them begins; None where that is not known.
+    """
+    compiler = f"<compiler {_BOUNDS}/>"
+    kind, remedy, place = "body", "an <inertial> or a geom with mass", "into <mujoco>"
+    if is_urdf:
+        kind, remedy, place = "link", "an <inertial> with mass", "into <robot>"
+        compiler = f"<mujoco>{compiler}</mujoco>"
+    where = "" if line is None else f"line {line}: "
+    if len(names) > 1:
+        kind = {"link": "links", "body": "bodies"}[kind]
+        moves, has, each = "move", "have", "each"
+    else:
+        moves, has, each = "moves", "has", "it"
+    quoted = few([repr(name) for name in names], 5)
+    return (
+        f"{where}the {kind} {quoted} {moves} and {has} no mass or inertia; give {each} {remedy}, "
+        f"or write {compiler} {place}, which gives every body at least so much [kg, kg m²]"
+    )
+
+
+def _line_of_link(path: Path, name: str) -> int | None:
+    """Return the line in which a link of a URDF begins; None where the file does not tell."""
+    lines: list[int] = []
+    parser = expat.ParserCreate()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if tag == "link" and attributes.get("name") == name:
+            lines.append(parser.CurrentLineNumber)
+
+    parser.StartElementHandler = start
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except (OSError, expat.ExpatError):
+        return None
+    return lines[0] if lines else None
 
 
 def _of_missing_file(path: Path, name: str) -> str:

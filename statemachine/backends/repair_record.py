@@ -11,6 +11,10 @@ import numpy as np
 
 from ..interface import Array
 
+# The mass [kg] and the moment of inertia [kg m^2] that a body gets which moves and has none. MuJoCo
+# refuses what is not above 1e-15 (mjMINVAL).
+LEAST = 1e-12
+
 Stated = float | tuple[float, ...] | str | None
 
 
@@ -48,6 +52,13 @@ class Repair:
     def is_deleted(self) -> bool:
         """Whether the element is not in the compiled model."""
         return self.used is None
+
+    @property
+    def is_massless(self) -> bool:
+        """Whether it gave a body a mass or an inertia that the file does not give it."""
+        if self.kind != "body":
+            return False
+        return self.quantity == "mass" or not (_numbers(self.stated) != 0).any()
 
     @property
     def factor(self) -> float:

@@ -102,12 +102,16 @@ class ReadOptions:
         base: "free" where the base of the robot gets a free joint, "fixed" where it has none; None
             for what the file says. A URDF without a floating joint says nothing, and is fixed.
         start: Where a free base is in the default state; None for where it stands in the file.
+        least_mass: Whether a body that moves without mass or inertia, which MuJoCo refuses, gets
+            the least that it takes: enough for places, and for no motion. `load` does not take it;
+            `backends.load_for_places` reads a file so.
     """
 
     balance_inertia: bool = False
     meshes: bool = True
     base: Base | None = None
     start: FreeBase | None = None
+    least_mass: bool = False
 
 
 AS_WRITTEN = ReadOptions()

@@ -20,6 +20,7 @@ _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as small servos have"
 _LEVER = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
 _ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts
+_DISTANCE, _NEAR = 0.01, 1e-3  # of the distance that a base travels; m, what is less is nothing
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,8 @@ class Quantity:
         plural: What several of the kind are called.
         moves: Whether it says where something is.
         own: Whether it is a coordinate of its own, and nothing that follows from others.
+        of_base: Whether it is a coordinate of the floating base of the robot.
+        is_outcome: Whether it is one number of a whole run, without a curve over time.
         tolerance: A difference that does not matter [unit]; None: `tolerance_of` says it of a run.
         reason: Why that much.
     """
@@ -41,6 +44,8 @@ class Quantity:
     plural: str
     moves: bool = False
     own: bool = False
+    of_base: bool = False
+    is_outcome: bool = False
     tolerance: float | None = None
     reason: str = ""
 
@@ -92,8 +97,53 @@ _KINDS = (
         tolerance=np.radians(1.0),
         reason="a degree: it moves what is 57 mm from the origin by 1 mm",
     ),
+    Quantity(
+        "base",
+        "m",
+        "position of the base",
+        moves=True,
+        own=True,
+        of_base=True,
+        tolerance=1e-3,
+        reason="a millimetre",
+    ),
+    Quantity(
+        "base rotation",
+        "rad",
+        "rotation of the base",
+        moves=True,
+        own=True,
+        of_base=True,
+        tolerance=np.radians(0.1),
+        reason="0.1°: it moves what is 0.57 m from the origin of the base by 1 mm",
+    ),
+    Quantity(
+        "fall",
+        "s",
+        "falls",
+        is_outcome=True,
+        tolerance=0.02,
+        reason="20 ms: one period of a controller at 50 Hz",
+    ),
+    Quantity("distance", "m", "distances travelled", is_outcome=True),
+    Quantity(
+        "tracking",
+        "rad",
+        "tracking errors",
+        is_outcome=True,
+        tolerance=COUNT,
+        reason=_COUNT_SAYS,
+    ),
+    Quantity(
+        "slide tracking",
+        "m",
+        "tracking errors of slides",
+        is_outcome=True,
+        tolerance=1e-4,
+        reason="a tenth of a millimetre",
+    ),
     Quantity("energy", "J", "energy"),
-    Quantity("contact", "s", "first touches"),
+    Quantity("contact", "s", "first touches", is_outcome=True),
     Quantity("force", "N", "normal forces"),
 )
 QUANTITIES = {quantity.name: quantity for quantity in _KINDS}
@@ -144,6 +194,12 @@ def tolerance_of(
             COUNT * reach,
             f"what one count of a 12-bit encoder moves it, at a reach of {reach:.2f} m",
         )
+    if kind == "distance":
+        farthest = float(np.max([left, right], initial=0.0))
+        share = _DISTANCE * farthest
+        if share >= _NEAR:
+            return Tolerance(share, f"1 % of {rounded(farthest, 'm')}, which the base travels")
+        return Tolerance(_NEAR, "a millimetre")
     if kind == "energy":
         return _of_energy(max(_change(left), _change(right)), scale)
     if kind == "force":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from .blocks import Page
 from .terminal import text_of
@@ -10,7 +10,6 @@ from .terminal import text_of
 LINES = 24  # of a terminal, blank ones included
 COLUMNS = 80
 MOST_ROWS = 8
-_AROUND = 2  # blank lines before and behind a page
 
 
 def lines_of(page: Page) -> int:
@@ -19,7 +18,22 @@ def lines_of(page: Page) -> int:
     A line that is to be typed is not broken by us, and continues on the next of the terminal.
     """
     lines = text_of(page).splitlines()
-    return _AROUND + sum(max(1, -(-len(line) // COLUMNS)) for line in lines)
+    blank = 1 if page.headline else 2  # one below; where no answer is the first line, one above
+    return blank + sum(max(1, -(-len(line) // COLUMNS)) for line in lines)
+
+
+def first_that_fits(pages: Iterable[Page]) -> Page:
+    """Return the first page that fits on one screen; the last where none does.
+
+    Args:
+        pages: At least one, ever shorter.
+    """
+    shortest = Page("", "")
+    for page in pages:
+        shortest = page
+        if lines_of(page) <= LINES:
+            break
+    return shortest
 
 
 def first_screen(page_with: Callable[[int], Page], rows: int = MOST_ROWS) -> Page:
@@ -31,9 +45,5 @@ def first_screen(page_with: Callable[[int], Page], rows: int = MOST_ROWS) -> Pag
         page_with: Makes the page with at most so many rows.
         rows: How many rows there are to show; more than eight are not.
     """
-    page = page_with(min(rows, MOST_ROWS))
-    for fewer in range(min(rows, MOST_ROWS) - 1, 0, -1):
-        if lines_of(page) <= LINES:
-            break
-        page = page_with(fewer)
-    return page
+    most = min(rows, MOST_ROWS)
+    return first_that_fits(page_with(number) for number in range(most, min(most, 1) - 1, -1))

@@ -126,10 +126,13 @@ class _Printer:
         self._headings: list[Block] = []  # which stay with what is under them
 
     def page(self, page: Page, footer: str) -> None:
-        """Print a page, and a last line under it."""
-        if page.headline:  # the answer comes first
+        """Print a page, and a last line under it; where it has an answer, that first.
+
+        Its title is then for media that have a place for it beside the answer.
+        """
+        if page.headline:
             self.answer(page.headline)
-        if page.title:
+        else:
             self.write([page])
         blocks = [block for block in page.blocks if not isinstance(block, RobotPicture)]
         for block, following in zip(blocks, [*blocks[1:], None], strict=True):
@@ -145,7 +148,7 @@ class _Printer:
         self._tell(_text(self._console(), blocks))
 
     def answer(self, headline: Headline) -> None:
-        """Print the answer of the page, as its first line."""
+        """Print the answer of a page, from its first line on."""
         text = _text(self._console(), [Verdict(headline.text, headline.holds)])
         self._tell(text.removeprefix("\n"))
 

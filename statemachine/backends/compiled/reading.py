@@ -20,7 +20,7 @@ from ...measures.text import few, listed
 from ..file_text import BaseOfText
 from ..repair_record import Repair
 from ..served.release_base import free_joint_name, free_joint_of, root_of, set_base
-from .repairs import balance_all, mend_inertia
+from .repairs import balance_all, mend_inertia, mend_mass
 from .spec_assets import assets_of, delete_assets
 from .spec_files import compile_spec, read_spec
 
@@ -47,9 +47,8 @@ def compile_with(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list
     faults: list[str] = []
     while True:
         spec, repairs = read_spec(path), list[Repair]()
-        if options.balance_inertia:
-            for fault in faults:
-                repairs += mend_inertia(spec, fault)
+        for fault in faults:
+            repairs += _mended(spec, fault, options)
         repairs += prepare(spec, options)
         try:
             if spec.compiler.fusestatic:
@@ -58,10 +57,16 @@ def compile_with(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list
         except ValueError as error:
             # What breaks the rule by a rounding error alone, the compiler has to tell.
             fault = str(error)
-            is_mended = options.balance_inertia and mend_inertia(read_spec(path), fault)
-            if fault in faults or not is_mended:
+            if fault in faults or not _mended(read_spec(path), fault, options):
                 raise
             faults.append(fault)
+
+
+def _mended(spec: mujoco.MjSpec, fault: str, options: ReadOptions) -> list[Repair]:
+    """Mend a fault that MuJoCo names, as far as options say so; none where they do not."""
+    if options.balance_inertia and (repairs := mend_inertia(spec, fault)):
+        return repairs
+    return mend_mass(spec, fault) if options.least_mass else []
 
 
 def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> list[Repair]:

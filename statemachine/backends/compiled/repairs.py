@@ -35,13 +35,10 @@ import numpy as np
 
 from ...errors import ModelError, one_line
 from ...interface import Array
-from ..repair_record import Repair, label_of
+from ..repair_record import LEAST, Repair, label_of
 from .spec_assets import asset_named, assets_of_file, delete_assets
 from .spec_files import ENGINE_ERRORS, compile_spec, read_spec, reason_of
 
-# The mass [kg] and the moment of inertia [kg m^2] that a body gets which moves and has none. MuJoCo
-# refuses what is not above 1e-15 (mjMINVAL).
-LEAST = 1e-12
 _SMALLEST = 1e-15
 # What an eigenvalue of an inertia must be at least (mjEPS) [kg m^2].
 _LEAST_EIGENVALUE = 1e-14
@@ -231,6 +228,16 @@ def mend_inertia(spec: mujoco.MjSpec, message: str) -> list[Repair]:
     """
     is_of_inertia = _UNBALANCED in message or _NOT_POSITIVE in message
     return _mend(spec, message) if is_of_inertia else []
+
+
+def mend_mass(spec: mujoco.MjSpec, message: str) -> list[Repair]:
+    """Give the body that MuJoCo refuses the least mass; none where its fault is another one.
+
+    Args:
+        spec: The specification, which was not compiled yet.
+        message: What MuJoCo says.
+    """
+    return _mend(spec, message) if _NO_MASS in message else []
 
 
 def _balance(spec: mujoco.MjSpec, body: Any, fault: _Fault) -> list[Repair]:

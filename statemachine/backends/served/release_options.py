@@ -11,8 +11,11 @@ import runpy
 
 import mujoco
 
+# The mass [kg] and inertia [kg m^2] of a body that moves without; as `repair_record.LEAST`.
+_LEAST = 1e-12
 
-def spec_with_options(file, balance_inertia, meshes, base, start):
+
+def spec_with_options(file, balance_inertia, meshes, base, start, least_mass):
     """Return the spec of a file that is read with options."""
     if not hasattr(mujoco, "MjSpec"):
         raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads an MJCF as it is written")
@@ -22,6 +25,10 @@ def spec_with_options(file, balance_inertia, meshes, base, start):
         runpy.run_path(place)["set_base"](spec, base, start)
     if balance_inertia:
         getattr(spec, "compiler", spec).balanceinertia = True
+    if least_mass:
+        compiler = getattr(spec, "compiler", spec)
+        compiler.boundmass = max(compiler.boundmass, _LEAST)
+        compiler.boundinertia = max(compiler.boundinertia, _LEAST)
     if not meshes:
         for element in [geom for geom in spec.geoms if geom.meshname] + list(spec.meshes):
             if hasattr(spec, "delete"):

@@ -94,9 +94,8 @@ def _of_mesh(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 def _counts(sides: Sides, name: str, a: int, b: int) -> tuple[str, str]:
     """Return what two flexes have in an array of whole numbers, in words."""
-    entries = getattr(sides.left, name)[a], getattr(sides.right, name)[b]
-    left, right = (" ".join(str(number) for number in np.ravel(entry)) for entry in entries)
-    return left, right
+    left, right = np.ravel(getattr(sides.left, name)[a]), np.ravel(getattr(sides.right, name)[b])
+    return " ".join(map(str, left)), " ".join(map(str, right))
 
 
 def _of_part(sides: Sides, part: _PartOfFlex, a: int, b: int) -> Iterator[ModelDifference]:

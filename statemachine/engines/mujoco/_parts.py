@@ -27,6 +27,7 @@ from ._fields import word_of
 from ._quantities import plain, same
 from ._rigid_parts import apart, quat_of
 from ._sides import NEAR, Sides, copies, name_of, zeros
+from .respecified import SIMPLE
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
 # What a body weighs: the arrays of each subject.
@@ -35,6 +36,7 @@ _WEIGHS = {
     "centre of mass": ("body_ipos",),
     "inertia": ("body_inertia", "body_iquat"),
 }
+_STORED = "its frames lie elsewhere, and the compiler decides how its mass matrix is stored"
 _TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal have of rounding
 
 
@@ -46,7 +48,11 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
             continue  # what no force moves has no weight
         here, there = ours.massive(pair.left), theirs.massive(pair.right)
         composite = ours.inertial(*here).seen_from(pair.align)
-        if not (here or there) or not _differing(composite, theirs.inertial(*there)):
+        if not (here or there):
+            continue
+        if not _differing(composite, theirs.inertial(*there)):
+            if len(here) == len(there) == 1:
+                yield from _stored_otherwise(sides, pair, here[0], there[0])
             continue
         if len(there) == 1:
             yield from _of_body(sides, pair, there[0], composite, here)
@@ -55,6 +61,27 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
                 yield from _of_body(sides, replace(pair, left=a), b, ours.inertial(a), [a])
         else:
             yield _lumped(sides, pair, composite, there)
+
+
+def _stored_otherwise(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDifference]:
+    """Yield that two bodies which weigh the same have other inverse weights.
+
+    Of a body whose inertial frame lies along its own the compiler stores the mass matrix as a
+    diagonal, and takes its inverse weight, by which contacts are soft, of that: a sphere that is
+    turned about itself touches otherwise.
+    """
+    left, right = sides.raws
+    weights_of_both = left.body_invweight0[a], right.body_invweight0[b]
+    if left.body_simple[a] == right.body_simple[b] or same(*weights_of_both):
+        return
+    value = DifferingQuantity("invweight0", plain(weights_of_both[0]), plain(weights_of_both[1]))
+    if pair.align is not HERE or sides.solids[0].place(a) is not sides.solids[1].place(b):
+        yield sides.tell("inverse weight", "body", a, (value,), refused=_STORED)
+        return
+    spec_edits = _specified(copies(_WEIGHS["inertia"], left, a, b))
+    # Whether the compiler may store it as a diagonal.
+    spec_edits += (SpecEdit("body", b, SIMPLE, int(left.body_simple[a] > 0)),)
+    yield replace(sides.tell("inverse weight", "body", a, (value,)), spec_edits=spec_edits)
 
 
 def _differing(left: Inertial, right: Inertial) -> dict[str, list[DifferingQuantity]]:

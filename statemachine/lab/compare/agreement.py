@@ -15,61 +15,18 @@ from ...measures import (
     RobotScale,
     Tolerance,
     common_moments,
-    same_pairs,
     tolerance_of,
 )
-from ...measures.text import on
 from ..recordings import Trace
 from ..runs.floating import Bases, base_of
 from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
 from .motion import LeastMotion, MotionExtent, least_motions, motion_of, with_efforts
+from .outcomes import Outcome, outcomes_of
+from .quantity_agreement import Agreement, Verdict, first_touch, missed_touch, of_outcome
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
-Verdict = Literal["agrees", "settles", "differs"]
 ComparisonOutcome = Literal["agrees", "differs", "ended", "nothing moved"]
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """One quantity of two traces.
-
-    Attributes:
-        name: What is compared.
-        kind: Which sort of quantity it is.
-        unit: Its SI unit.
-        max: The largest difference [unit].
-        at: When that is [s from the start].
-        rms: Root mean square of the difference over common time [unit].
-        settled: Mean of the difference over the last tenth of common time; of a force the
-            difference of the means [unit].
-        since: When it was first beyond the tolerance [s]; None if never.
-        tolerance: What does not matter [unit].
-        reason: Why that much.
-        verdict: "agrees" within tolerance always; "settles" beyond it on the way, but
-            `settled` within; "differs" else.
-        note: What the figures do not say, as which side never touched.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    max: float
-    at: float
-    rms: float
-    settled: float
-    since: float | None
-    tolerance: float
-    reason: str
-    verdict: Verdict
-    note: str = ""
-
-    def tolerances(self) -> float:
-        """How many tolerances the largest difference is; what is not a number is beyond all."""
-        if self.max == 0:
-            return 0.0  # the tolerance of what does not move may be zero, too
-        share = self.max / self.tolerance if self.tolerance else np.inf
-        return np.inf if np.isnan(share) else share
 
 
 @dataclass(frozen=True)
@@ -147,6 +104,8 @@ class Comparison:
         motion: How far both sides move: where neither does, nothing was compared.
         bases: Whether the base of the robot floats, on each side. Where one floats and the other is
             fixed, the sides differ, whatever else agrees.
+        outcomes: What came of both runs of a robot that floats: did it fall, how far did it get,
+            how well did its servos track. Each is one of the agreements, too.
         touches: One for each pair of bodies that touches on either side.
         curves: The quantities over time; first touches have none.
     """
@@ -160,6 +119,7 @@ class Comparison:
     notes: tuple[str, ...]
     motion: MotionExtent
     bases: Bases
+    outcomes: tuple[Outcome, ...]
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 
@@ -194,8 +154,13 @@ class Comparison:
 
     @property
     def worst(self) -> Agreement | None:
-        """The quantity that is farthest beyond its tolerance; None if nothing was compared."""
-        return max(self.agreements, key=Agreement.tolerances, default=None)
+        """Return the quantity that is farthest beyond its tolerance; None if nothing was compared.
+
+        Of a robot that floats it is the pose of the base, where that is beyond its tolerance.
+        """
+        of_base = [a for a in self.agreements if QUANTITIES[a.kind].of_base]
+        beyond = [a for a in of_base if a.verdict != "agrees"]
+        return max(beyond or self.agreements, key=Agreement.tolerances, default=None)
 
 
 def compare(
@@ -237,9 +202,11 @@ def compare(
     labels = labels_of(left.header, right.header)
     allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
     until = float(common.time[-1])
+    outcomes = outcomes_of(left, right, until, tolerances)
+    agreements += [of_outcome(outcome, until, labels.short) for outcome in outcomes]
     for touch in pairs:
-        missed = _missed_touch(touch, left, right, labels.short)
-        agreements.append(_first_touch(touch, missed, until, allowed))
+        missed = missed_touch(touch, left, right, labels.short)
+        agreements.append(first_touch(touch, missed, until, allowed))
     strange = [
         f"{agreement.name}: {agreement.note}, so it cannot agree"
         for agreement in agreements
@@ -260,6 +227,7 @@ def compare(
         notes=tuple(notes_on(left, right, common, strange)),
         motion=motion,
         bases=bases,
+        outcomes=outcomes,
         touches=pairs,
         curves=curves,
     )
@@ -330,48 +298,4 @@ def _agreement_of(curve: Series, allowed: Tolerance) -> Agreement:
         reason=allowed.reason,
         verdict=verdict,
         note=note,
-    )
-
-
-def _missed_touch(touch: Touch, left: Trace, right: Trace, labels: tuple[str, str]) -> str:
-    """Say on which side a pair of bodies does not touch while they are compared; "" for neither."""
-    if touch.left.first is None:
-        trace, label = left, labels[0]
-    elif touch.right.first is None:
-        trace, label = right, labels[1]
-    else:
-        return ""
-    touching_later = same_pairs({touch.pair: None}, dict.fromkeys(trace.touches()))
-    when = "later" if touch.pair in touching_later else "never"
-    return f"{when} {on(label)}"
-
-
-def _first_touch(touch: Touch, missed: str, until: float, allowed: Tolerance) -> Agreement:
-    """Compare when a pair of bodies first touches.
-
-    Args:
-        touch: The pair.
-        missed: On which side it does not touch; "" for neither. Then it differs at any size, and
-            it touches there as late as can be: it had not when the comparison ended.
-        until: When that was [s].
-        allowed: What does not matter.
-    """
-    left_first = until if touch.left.first is None else touch.left.first
-    right_first = until if touch.right.first is None else touch.right.first
-    gap = abs(left_first - right_first)
-    at = min(left_first, right_first)
-    is_beyond = bool(missed) or not gap <= allowed.value
-    return Agreement(
-        name=f"{touch.pair}, first touch",
-        kind="contact",
-        unit=QUANTITIES["contact"].unit,
-        max=gap,
-        at=at,
-        rms=gap,
-        settled=gap,
-        since=at if is_beyond else None,
-        tolerance=allowed.value,
-        reason=allowed.reason,
-        verdict="differs" if is_beyond else "agrees",
-        note=missed,
     )

@@ -82,7 +82,16 @@ def _with_actuators_in(order: Sequence[int], header: Header) -> Header:
     actuators = tuple(header.actuators[number] for number in order)
     joints = tuple(header.actuator_jntid[number] for number in order)
     ranges = tuple(header.ctrlrange[number] for number in order)
-    return replace(header, actuators=actuators, actuator_jntid=joints, ctrlrange=ranges)
+    gears = header.servo_gear
+    if gears:
+        gears = tuple(gears[number] for number in order)
+    return replace(
+        header,
+        actuators=actuators,
+        actuator_jntid=joints,
+        ctrlrange=ranges,
+        servo_gear=gears,
+    )
 
 
 def translated(trace: Trace, matched: Matched, right_start: SideStart) -> Trace:

@@ -14,12 +14,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...backends.compiled.algebra import quat_of_matrix
 from ...interface import Array, Model, make_data, reset
 from ...interface.options import OptionValue
 from ...interface.records import FreeBase
 from ...rotations import HERE, Placement, matrix_from_quat
-from ..runs.floating import Bases, base_of, free_joint_of_robot
+from ..runs.floating import Bases, base_of, free_joint_of_base
 from .matching import match_trees
 from .sides import Side
 
@@ -98,7 +97,11 @@ def _start_of(
         names: Joints, bodies and sites of the left that go by other names on the right.
         is_left: Whether the other Model is the left.
     """
-    free_joint, own = free_joint_of_robot(giver), free_joint_of_robot(taker)
+    from ...backends.compiled.algebra import (
+        quat_of_matrix,  # it needs MuJoCo, which a trace does not
+    )
+
+    free_joint, own = free_joint_of_base(giver), free_joint_of_base(taker)
     if free_joint is None or own is None:
         return None
     place = _place_of(giver, free_joint)

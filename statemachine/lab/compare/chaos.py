@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from ...errors import BadInputError, EngineError, TraceError
 from ...interface import Array, Ints
-from ...measures import common_moments, same_pairs
+from ...measures import QUANTITIES, common_moments, same_pairs
 from ...processes.parallel import forks_for, in_forks
 from ..recordings import Rerun, Trace
 from ..runs.drive import Progress, silent
 from .agreement import Agreement, Comparison
+from .outcomes import outcomes_of
 from .perturbed import EXACT, ROUNDING, RUNS, Uncertainty, perturbed_run
 from .series import NORMAL, at_the_end, series, touches
 
@@ -187,10 +188,10 @@ def chaos_floor(
 
 
 def _gaps_of(comparison: Comparison) -> dict[str, Array]:
-    """Return how far apart the sides are (n,) in each quantity; (1,) [s] of a first touch."""
+    """Return how far apart the sides are (n,) in each quantity; (1,) of a touch or an outcome."""
     gaps = {curve.name: curve.difference for curve in comparison.curves}
     for agreement in comparison.agreements:
-        if agreement.kind == "contact":
+        if QUANTITIES[agreement.kind].is_outcome:
             gaps[agreement.name] = np.array([agreement.max])
     return gaps
 
@@ -207,7 +208,7 @@ class _Departure:
 
     Attributes:
         distances: By quantity (n,) at the common moments, infinite where the run has ended; of a
-            first touch (1,) [s].
+            first touch or an outcome (1,).
         ended: Whether the run ended early.
     """
 
@@ -272,6 +273,9 @@ def _departure(
             if left_first is not None and right_first is not None:
                 apart = abs(left_first - right_first)
             distances[f"{touch.pair}{_FIRST_TOUCH}"] = np.array([apart])
+        for outcome in outcomes_of(trace, perturbed, comparison.until):
+            far = np.inf if run.header.ended else outcome.difference
+            distances[outcome.name] = np.array([far])
     except TraceError:  # it ended at once
         curves, count = series(trace, trace, comparison.tip), 0
     for curve in curves:
@@ -297,11 +301,11 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
 
     Args:
         agreement: Of the two sides.
-        gap: (n,) how far apart they are; (1,) of a first touch.
+        gap: (n,) how far apart they are; (1,) of a first touch or an outcome.
         width: Of the same length, how far a perturbed run gets from its side at the most.
         moments: (n,) since the start [s].
     """
-    if agreement.kind == "contact":
+    if QUANTITIES[agreement.kind].is_outcome:
         moments = np.zeros(1)
     else:
         width = _largest_nearby(width, round(_WINDOW * (len(moments) - 1)))

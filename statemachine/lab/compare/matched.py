@@ -13,7 +13,7 @@ from ...backends.controls import ctrl_owners
 from ...engines.records import Counterparts, Pairs
 from ...interface import Array, JointType, Model, State
 from ..recordings import SideStart
-from ..runs.floating import free_joint_of_robot
+from ..runs.floating import free_joint_of_base
 
 Only = Mapping[str, tuple[str, ...]]
 
@@ -179,7 +179,7 @@ def joint_name(model: Model, joint: int) -> str:
 
 def _without_base(model: Model, only: Only) -> Only:
     """Return what a Model alone has without the free joint of the base of its robot."""
-    joint = free_joint_of_robot(model)
+    joint = free_joint_of_base(model)
     if joint is None:
         return only
     base = joint_name(model, joint)

@@ -18,7 +18,7 @@ from ...measures import OF_A_RUN, QUANTITIES, RobotScale, distances, largest_or_
 from ...measures.floors import energy_floor, force_floor
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings import Trace
-from .series import SCALARS, Series, joint_columns
+from .series import SCALARS, Series, base_label, joint_columns
 
 LeastMotion = Mapping[str, float]
 # What two runs have to move by so that a gap that is rounding says that they move alike: 100 times
@@ -127,9 +127,10 @@ def _extents(trace: Trace, rows: Ints, name: str) -> dict[str, float]:
     positions = trace.qpos[rows, joint.qpos]
     if joint.kind in SCALARS:
         return {SCALARS[joint.kind]: largest_or_inf(np.abs(positions - positions[0]).ravel())}
-    extents = {"body rotation": largest_or_inf(_turned(positions[:, -4:]))}
+    kind = "base" if name == base_label(trace.header) else "body"
+    extents = {f"{kind} rotation": largest_or_inf(_turned(positions[:, -4:]))}
     if joint.kind is JointType.FREE:
-        extents["body"] = largest_or_inf(distances(positions[:, :3], positions[0, :3]))
+        extents[kind] = largest_or_inf(distances(positions[:, :3], positions[0, :3]))
     return extents
 
 

@@ -14,8 +14,10 @@ from ...interface.sites import usual_site
 from ...measures import QUANTITIES, SAME, common_moments, distances, same_pairs
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings import Header, Trace
+from ..runs.floating import free_joint_of_robot
 
 NORMAL = ", normal force"  # after a pair of bodies: the sum over its contacts
+BASE = "base"  # what the floating base of the robot is called, whatever its file calls it
 SETTLED = 0.1  # share of the common time, at its end, that "settled" is taken over
 # Joints whose position is one number, and what kind of quantity it is.
 SCALARS = {JointType.HINGE: "joint", JointType.SLIDE: "slide"}
@@ -81,9 +83,10 @@ def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
     time, sides = common.time, ((left, common.left), (right, common.right))
     curves: list[Series] = []
     right_names = right.header.joint_labels
+    base = base_label(left.header, right.header)
     for name in left.header.joint_labels:
         if name in right_names:
-            curves += _joint(name, time, sides)
+            curves += _joint(name, time, sides, is_base=name == base)
     site = default_tip(left.header, right.header) if tip is None else tip
     if site and tell(left, right, "site_xpos") and tell(left, right, "site_xmat"):
         curves += _site(site, time, sides)
@@ -146,8 +149,15 @@ def _turned(name: str, kind: str, time: Array, left: Array, right: Array) -> Ser
     return Series(name, kind, time, np.empty(0), np.empty(0), angle_between(left, right))
 
 
-def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
-    """A number for a hinge or a slide; position and rotation for a free body."""
+def _joint(name: str, time: Array, sides: Sides, *, is_base: bool) -> list[Series]:
+    """Compare the number of a hinge or a slide, position and rotation of a free body.
+
+    Args:
+        name: The label of the joint.
+        time: (n,) the common moments [s].
+        sides: Both runs.
+        is_base: Whether it lets the base of the robot float.
+    """
     joints = [joint_columns(trace.header, name) for trace, _ in sides]
     kind = joints[0].kind
     if kind is not joints[1].kind:
@@ -156,17 +166,32 @@ def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
     if kind in SCALARS:
         return [_curve(name, SCALARS[kind], time, *(side[:, 0] for side in values))]
     curves = []
+    called, of_body = (BASE, "base") if is_base else (name, "body")
     if kind is JointType.FREE:
-        curves.append(_curve(f"{name}, position", "body", time, *(side[:, :3] for side in values)))
+        positions = [side[:, :3] for side in values]
+        curves.append(_curve(f"{called}, position", of_body, time, *positions))
     with np.errstate(invalid="ignore"):  # all zero is not a rotation: NaN, which never agrees
         rotations = [matrix_from_quat(_unit_length(side[:, -4:])) for side in values]
-        curves.append(_turned(f"{name}, rotation", "body rotation", time, *rotations))
+        curves.append(_turned(f"{called}, rotation", f"{of_body} rotation", time, *rotations))
     return curves
 
 
 def _unit_length(quats: Array) -> Array:
     """Return quaternions (n, 4), scaled to unit length."""
     return quats / np.linalg.norm(quats, axis=1, keepdims=True)
+
+
+def base_label(*headers: Header) -> str:
+    """Return the label of the joint that lets the base of the robot float in all runs; "" if none.
+
+    Args:
+        *headers: Of runs whose joints go by the same names.
+    """
+    labels: set[str] = set()
+    for header in headers:
+        joint = free_joint_of_robot(header)
+        labels.add("" if joint is None else header.joint_labels[joint])
+    return labels.pop() if len(labels) == 1 else ""
 
 
 def default_tip(*headers: Header) -> str:

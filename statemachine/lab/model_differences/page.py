@@ -256,6 +256,8 @@ def _next_command(result: ModelsComparison) -> str:
     """
     if not any(row.cause and not row.refused for row in result.differences):
         return ""
+    if not (result.left.joints and result.right.joints):  # no experiment runs on it
+        return ""
     experiment = "waves" if result.has_actuators else "gravity"
     words = ["statemachine", "compare", experiment]
     for side, label in zip(("left", "right"), result.labels, strict=True):

@@ -10,19 +10,22 @@ from ...errors import StateMachineError
 from ...show.blocks import Block, Page, Section
 from ...show.templates import PageContent, render_blocks
 from .. import model_differences as models
-from ..compare import Comparison
+from ..compare import Agreement, Comparison
 from ..compare.sides import Request
 from ..model_differences import page as model_diff
 from ..recordings import Trace
 from ..runs.reporter import QUIET, Reporter
 from ..why import Explanation
-from ..why import page as why
 from ..why.answer_page import answer, proofs
+from ..why.causes_page import causes as causes_blocks
+from ..why.changes_page import steps as steps_blocks
+from ..why.page import three_parts
 from .compare_details import details_of
 from .compare_verdict import headline_of
 from .compared_names import traces_of
 from .comparison import origin_of, title_of
 from .events import events_of
+from .finding import Finding, finding_about, leading
 from .requests import causes
 from .requests.causes import ExplainRequest
 from .requests.gap import CompareResult
@@ -38,6 +41,23 @@ _RECORDED = (
 
 
 @dataclass(frozen=True)
+class ReportParts:
+    """What a page that stands alone shows beside a comparison.
+
+    Attributes:
+        explanation: What explains the gap; None where that was not asked, or not found.
+        why_not: Why nothing explains it; "" where something does, or nobody asked.
+        models: What each engine makes of the model; None where that is the same, or not known.
+        command: What makes the page again; "" where that is not said.
+    """
+
+    explanation: Explanation | None = None
+    why_not: str = ""
+    models: Page | None = None
+    command: str = ""
+
+
+@dataclass(frozen=True)
 class CompareReport(PageContent):
     """What a page of a comparison shows that stands alone, below its verdict.
 
@@ -45,24 +65,20 @@ class CompareReport(PageContent):
         runs: Both runs in 3-D.
         worst: The quantities that are farthest apart.
         causes: What explains the gap; empty where that was not asked.
-        why_not: Why nothing explains it; "" where something does, or nobody asked.
         curves: A chart for each quantity, those that agree folded away.
         details: Everything else, in sections.
-        models: What each engine makes of the model; None where that is the same, or not known.
         steps: What to change so that both sides agree.
-        command: What makes the page again.
+        parts: What it was asked to show besides.
     """
 
     template = "compare_report.md.j2"
     runs: BothRuns
     worst: WorstQuantities
     causes: Sequence[Block]
-    why_not: str
     curves: Sequence[Block]
     details: Sequence[Block]
-    models: Page | None
     steps: Sequence[Block]
-    command: str
+    parts: ReportParts
 
     @property
     def total(self) -> int:
@@ -86,32 +102,66 @@ def whole_page(
         typed: The command that makes it again.
         reporter: Told how the search for causes gets on.
     """
-    comparison, finding = result.comparison, result.finding
+    comparison = result.comparison
     explanation, why_not = None, ""
-    if ask_why is not None and finding.outcome not in ("ended", "nothing moved"):
+    if ask_why is not None and comparison.outcome not in ("ended", "nothing moved"):
         explanation, why_not = _explained(ask_why, comparison, reporter)
-    runs = _both_runs(result, explanation)
-    explained: list[str] = []
-    causes_blocks: list[Block] = []
+    models_page = _models_page(result.request.run, traces_of(comparison))
+    parts = ReportParts(explanation, why_not, models_page, typed)
+    return report_page(result, parts)
+
+
+def report_page(result: CompareResult, parts: ReportParts) -> Page:
+    """Return the page of a comparison that stands alone, from all that stands on it."""
+    comparison, finding = result.comparison, result.finding
+    explanation = parts.explanation
+    headline_causes: list[str] = []
+    why: list[Block] = []
     steps: list[Block] = []
     if explanation is not None:
-        explained = [*proofs(explanation), f"{answer(explanation)}."]
-        causes_blocks = [*why.causes(explanation), *why.three_parts(explanation)]
-        steps = [*why.steps(explanation)]
+        why = [*causes_blocks(explanation), *three_parts(explanation)]
+        steps = steps_blocks(explanation)
+        subject = explained_quantity(comparison, explanation)
+        if subject is not None:
+            finding = finding_about(finding, subject, comparison, result.floor)
+            headline_causes = [*proofs(explanation), f"{answer(explanation)}."]
+    runs = _both_runs(result, finding)
     content = CompareReport(
         runs=runs,
         worst=worst_of(comparison, finding, result.floor),
-        causes=causes_blocks,
-        why_not=why_not,
+        causes=why,
         curves=_ranked_charts(runs),
         details=details_of(result),
-        models=_models_page(result.request.run, traces_of(comparison)),
         steps=steps,
-        command=typed,
+        parts=parts,
     )
-    headline = headline_of(finding, comparison, result.instead, explained)
+    headline = headline_of(finding, comparison, result.instead, headline_causes)
     blocks = render_blocks(content)
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
+
+
+def explained_quantity(comparison: Comparison, explanation: Explanation) -> Agreement | None:
+    """Return the quantity of the comparison whose gap was explained.
+
+    None where no quantity of the comparison has that gap: it may be measured otherwise.
+    """
+    if not explanation.verdict.divides:
+        return leading(comparison)
+    gap, name = explanation.first[explanation.quantity], explanation.quantity
+    kind = {"joints": "joint", "slides": "slide"}.get(name)
+    same = [
+        agreement
+        for agreement in comparison.agreements
+        if _is_of(agreement, name, kind) and abs(agreement.max - gap.worst) <= 1e-6 * gap.worst
+    ]
+    return max(same, key=lambda agreement: agreement.max, default=None)
+
+
+def _is_of(agreement: Agreement, name: str, kind: str | None) -> bool:
+    """Tell whether a quantity is of a kind, or where there is none, of a name."""
+    if kind is not None:
+        return agreement.kind == kind
+    return agreement.name in (name, f"{name}, position")
 
 
 def _explained(
@@ -145,20 +195,17 @@ def _models_page(run: Request, traces: Sequence[Trace]) -> Page | None:
         return None
 
 
-def _both_runs(result: CompareResult, explanation: Explanation | None) -> BothRuns:
+def _both_runs(result: CompareResult, finding: Finding) -> BothRuns:
     """Return the scene, which opens where the gap is largest, and the charts below it."""
-    comparison, finding = result.comparison, result.finding
+    comparison = result.comparison
     charts = charts_of(comparison, result.floor)
-    start = finding.lead.at
-    if explanation is not None and explanation.verdict.divides:
-        start = explanation.first[explanation.quantity].at
     lead = [k for k, chart in enumerate(charts) if chart.curve.name == finding.lead.name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
     spoken = tuple(dict.fromkeys(lead))[:_SPOKEN]
     return BothRuns(
         comparison.left.trace.header.experiment,
         comparison=comparison,
-        start=start,
+        start=finding.lead.at,
         events=tuple(events_of(comparison)),
         charts=charts,
         lead=spoken if spoken else (0,),

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...measures.text import milliseconds
 from ...show.blocks import Block, Page, Table
-from ...show.templates import PageContent, render
+from ...show.first_screen import first_that_fits
+from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison
 from ..compare.matched import Matched
 from .compare_details import details_of
 from .compare_verdict import headline_of, sentence_labels
 from .compared_names import long_labels, shortened, traces_of
 from .finding import VerdictCounts
-from .next_command import NextCommand, next_command
+from .next_command import Purpose, next_command
 from .requests.gap import CompareResult
-from .worst import worst_of
+from .worst import WORST, worst_of
 
 _TITLE = 30  # characters of a name in the title of the table
 
@@ -48,7 +49,8 @@ class ComparePage(PageContent):
         worst: A row for each of the quantities that are farthest apart.
         rest: The verdicts of those that have no row.
         counts: How many things there are to know of both sides.
-        next: What to type next.
+        purpose: What the command is for.
+        command: What to type next, in lines; "" for nothing.
         details: Everything else, in sections; empty where that is not asked for.
     """
 
@@ -57,7 +59,8 @@ class ComparePage(PageContent):
     worst: Table
     rest: VerdictCounts
     counts: SideCounts
-    next: NextCommand
+    purpose: Purpose
+    command: str
     details: Sequence[Block]
 
     @property
@@ -83,6 +86,11 @@ class ComparePage(PageContent):
         return _in_title(left), _in_title(right)
 
     @property
+    def missing(self) -> list[str]:
+        """What one side has nothing of."""
+        return [missing.part for missing in self.result.finding.missing]
+
+    @property
     def until(self) -> float:
         """How long the comparison is [s]."""
         return self.result.comparison.until
@@ -101,21 +109,47 @@ def page(result: CompareResult, details: bool = False) -> Page:
         details: Whether everything follows that is known: all quantities, contacts, what rounding
             makes, tolerances and their reasons, what was paired and emulated, a third party.
     """
-    finding = result.finding
-    worst = worst_of(result.comparison, finding, result.floor)
+    if details:
+        return _with_rows(result, WORST, details_of(result))
+    return first_that_fits(_ever_shorter(result))
+
+
+def _ever_shorter(result: CompareResult) -> Iterator[Page]:
+    """Yield the page, then with a shorter command, then with ever fewer rows."""
+    yield _with_rows(result, WORST, ())
+    for rows in range(WORST, 0, -1):
+        yield _with_rows(result, rows, (), is_short=True)
+
+
+def _with_rows(
+    result: CompareResult, rows: int, details: Sequence[Block], is_short: bool = False
+) -> Page:
+    """Return the page.
+
+    Args:
+        result: How far apart two runs are.
+        rows: How many of the worst quantities have a row.
+        details: What follows.
+        is_short: Whether dots stand for a part of the command.
+    """
+    comparison, finding = result.comparison, result.finding
+    worst = worst_of(comparison, finding, result.floor, rows)
     table, rest = worst.narrow_table, worst.rest
     if finding.outcome == "nothing moved":  # there is nothing that a row could say
         table, rest = replace(table, rows=[]), VerdictCounts(0, 0, 0)
+    following = next_command(result.request.run, finding, result.instead)
     content = ComparePage(
         result=result,
         worst=table,
         rest=rest,
         counts=side_counts(result),
-        next=next_command(result.request.run, finding, result.instead),
-        details=details_of(result) if details else [],
+        purpose=following.purpose,
+        command=following.short_text if is_short else following.text,
+        details=details,
     )
-    headline = headline_of(finding, result.comparison, result.instead)
-    return replace(render(content), headline=headline)
+    headline = headline_of(finding, comparison, result.instead)
+    blocks = render_blocks(content)
+    return Page(title_of(comparison), origin_of(comparison), blocks, headline)
 
 
 def _in_title(name: str) -> str:

@@ -6,13 +6,13 @@ Every figure and every choice that the sentences of a page rest on is a field he
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from ...measures import QUANTITIES
-from ..compare import Agreement, Comparison, Series
+from ..compare import Agreement, Comparison
 from ..compare.agreement import ComparisonOutcome
 from ..compare.chaos import Chance, ChaosFloor
 from ..compare.series import at_the_end
@@ -192,8 +192,7 @@ def finding_of(
     if played is not None:
         open_loop = "agrees" if played.agrees else "differs"
     is_same = all(agreement.max == 0 for agreement in comparison.agreements)
-    of_lead = [curve for curve in comparison.curves if curve.name == lead.name]
-    is_changing = any(_is_changing(curve, lead) for curve in of_lead)
+    is_changing = _changes_at_the_end(comparison, lead)
     counts = VerdictCounts.of(comparison.agreements)
     noticed = _noticed(comparison.agreements, lead)
     divergence, rounding = _divergence(comparison), _rounding(lead, floor)
@@ -211,6 +210,26 @@ def finding_of(
         open_loop=open_loop,
         ended=ended,
         missing=lacking,
+    )
+
+
+def finding_about(
+    finding: Finding, lead: Agreement, comparison: Comparison, floor: ChaosFloor | None
+) -> Finding:
+    """Return what a comparison comes to, said of another quantity than the one that leads.
+
+    Args:
+        finding: What it comes to.
+        lead: The quantity, such as one whose gap was explained.
+        comparison: Of the two runs.
+        floor: What rounding alone makes; None where that was not computed.
+    """
+    return replace(
+        finding,
+        lead=lead,
+        is_changing=_changes_at_the_end(comparison, lead),
+        noticed=_noticed(comparison.agreements, lead),
+        rounding=_rounding(lead, floor),
     )
 
 
@@ -302,10 +321,13 @@ def _noticed(agreements: Sequence[Agreement], lead: Agreement) -> Agreement | No
     return None if farthest == lead else farthest
 
 
-def _is_changing(curve: Series, agreement: Agreement) -> bool:
+def _changes_at_the_end(comparison: Comparison, agreement: Agreement) -> bool:
     """Tell whether a difference moves within the end by more than it may to be settled."""
-    tail = curve.difference[at_the_end(curve.time)]
-    return float(np.ptp(tail)) > min(agreement.tolerance, _STEADY * agreement.settled)
+    for curve in comparison.curves:
+        if curve.name == agreement.name:
+            tail = curve.difference[at_the_end(curve.time)]
+            return float(np.ptp(tail)) > min(agreement.tolerance, _STEADY * agreement.settled)
+    return False
 
 
 def _early_ends(comparison: Comparison) -> Iterator[EarlyEnd]:

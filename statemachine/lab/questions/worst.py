@@ -69,10 +69,18 @@ class WorstQuantities:
         return quantity(self.floors[agreement.name], agreement.unit)
 
 
-def worst_of(comparison: Comparison, finding: Finding, floor: ChaosFloor | None) -> WorstQuantities:
+def worst_of(
+    comparison: Comparison, finding: Finding, floor: ChaosFloor | None, most: int = WORST
+) -> WorstQuantities:
     """Return the quantities that are farthest apart: the lead, then by verdict and tolerances.
 
     Of one verdict those that rounding alone may make come last, and contacts before them.
+
+    Args:
+        comparison: Of the two runs.
+        finding: What it comes to.
+        floor: What rounding alone makes; None where that was not computed.
+        most: How many there are at most.
     """
     chances = {} if floor is None else {band.name: band.chance for band in floor.bands}
 
@@ -86,11 +94,11 @@ def worst_of(comparison: Comparison, finding: Finding, floor: ChaosFloor | None)
         )
 
     ranked = sorted(comparison.agreements, key=rank)
-    worst = tuple(ranked[:WORST])
+    worst = tuple(ranked[:most])
     floors: dict[str, float] = {}
     if floor is not None and is_noisy(worst, floor):
         floors = {band.name: band.most for band in floor.bands}
-    return WorstQuantities(worst, VerdictCounts.of(ranked[WORST:]), floors)
+    return WorstQuantities(worst, VerdictCounts.of(ranked[most:]), floors)
 
 
 def is_noisy(agreements: Sequence[Agreement], floor: ChaosFloor) -> bool:

@@ -72,6 +72,9 @@ class Header:
         jnt_type, jnt_qposadr, jnt_dofadr: As in a Model.
         geom_bodyid, body_parentid, actuator_jntid, jnt_bodyid, site_bodyid: As in a Model.
         ctrlrange: (nu, 2), infinite where unlimited.
+        servo_gear: (nu,) the gear of each position servo on a hinge or a slide, whose ctrl is the
+            target of the joint times the gear; 0 of another actuator. Empty of a trace that was
+            recorded before there was this.
         energy_by: The engine that computed the energies, or "".
         rewritten: Rows whose state is not what the step before left: the controller wrote it
             (or the engine does not give the same bits twice).
@@ -113,6 +116,7 @@ class Header:
     nmocap: int = 0
     jnt_bodyid: tuple[int, ...] = ()  # traces before it have none
     site_bodyid: tuple[int, ...] = ()  # nor have they this
+    servo_gear: tuple[float, ...] = ()
     schema: int = SCHEMA
 
     @property
@@ -206,6 +210,8 @@ class Header:
             _check_ids("jnt_bodyid", self.jnt_bodyid, joints, range(bodies))
         if self.site_bodyid:
             _check_ids("site_bodyid", self.site_bodyid, len(self.sites), range(bodies))
+        if self.servo_gear:
+            _check_length("servo_gear", self.servo_gear, self.nu)
         for name, kind, qpos, dof in zip(
             self.joint_labels, self.jnt_type, self.jnt_qposadr, self.jnt_dofadr, strict=True
         ):
@@ -359,6 +365,7 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
     "jnt_dofadr": _integers,
     "jnt_bodyid": _integers,
     "site_bodyid": _integers,
+    "servo_gear": _finites,
     "geom_bodyid": _integers,
     "body_parentid": _integers,
     "actuator_jntid": _integers,

@@ -23,7 +23,7 @@ from ...interface.read_options import told
 from ...interface.records import Arrays, Defaults
 from ..runs.drive import Controller, Progress, drive, part_of, silent, steps_in
 from ..runs.provenance import provenance
-from ..runs.robot import warn_of_start
+from ..runs.robot import is_servo, warn_of_start
 from .energies import energies
 from .header import Header
 from .repetition import derived
@@ -202,6 +202,7 @@ class ModelLayout(TypedDict):
     jnt_dofadr: tuple[int, ...]
     jnt_bodyid: tuple[int, ...]
     site_bodyid: tuple[int, ...]
+    servo_gear: tuple[float, ...]
     geom_bodyid: tuple[int, ...]
     body_parentid: tuple[int, ...]
     actuator_jntid: tuple[int, ...]
@@ -211,6 +212,7 @@ class ModelLayout(TypedDict):
 def layout_of(model: Model) -> ModelLayout:
     """Return what a header says of a model: lengths, names, and where everything is."""
     ctrlrange = tuple(tuple(row) for row in model.actuator_ctrlrange.tolist())
+    servo_gear = np.where(is_servo(model), model.actuator_gear, 0.0)
     layout: ModelLayout = {
         "nq": model.nq,
         "nv": model.nv,
@@ -230,6 +232,7 @@ def layout_of(model: Model) -> ModelLayout:
         "body_parentid": tuple(model.body_parentid.tolist()),
         "actuator_jntid": tuple(model.actuator_jntid.tolist()),
         "ctrlrange": ctrlrange,
+        "servo_gear": tuple(servo_gear.tolist()),
     }
     return layout
 

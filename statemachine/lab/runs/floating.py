@@ -87,10 +87,15 @@ def base_of(facts: RobotFacts) -> Base | None:
     return "fixed" if free_joints.pop() is None else "free"
 
 
-def free_joint_of_robot(facts: RobotFacts) -> int | None:
+def free_joint_of_base(facts: RobotFacts) -> int | None:
     """Return the id of the free joint of a robot's base; None where that is fixed, or unknown."""
     free_joints = _free_joints_of_robot(facts)
     return free_joints.pop() if len(free_joints) == 1 else None
+
+
+def free_joint_of_robot(facts: RobotFacts) -> int | None:
+    """Return the same of a robot that has other joints, too: a part that flies alone is none."""
+    return None if len(np.asarray(facts.jnt_type)) < 2 else free_joint_of_base(facts)
 
 
 def _free_joints_of_robot(facts: RobotFacts) -> set[int | None]:

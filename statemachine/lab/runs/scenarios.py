@@ -98,7 +98,10 @@ def _need_box(model: Model) -> None:
 
 def _need_joints(model: Model) -> None:
     if not model.nv:
-        raise BadInputError(f"{model.path.name} has no joints: nothing in it can move")
+        raise BadInputError(
+            f"{model.path.name} has no joints: nothing in it can move (two such files are compared "
+            "by compare --models LEFT RIGHT)"
+        )
 
 
 def _need_actuators(model: Model) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from ...installed import PAIR, WITNESS
 from ...measures.text import degrees, grouped, millimetres, vector
@@ -14,6 +15,7 @@ from ...show.lesson_template import by_engine, differences
 from ...show.templates import PageContent, render
 from .fingertip_result import SAME_FRAME, FingertipResult, FrameOffset, TipGap
 
+_Choice = Literal["asked for", "usual site", "only end", "ends"]
 _SHOWN = 12  # rows of a table of tips
 _TINY = 5e-6  # [m or rad] that two decimals of a millimetre or a degree do not show
 
@@ -41,6 +43,15 @@ class _OfEngines:
         return str(self.result.provenance.seed)
 
     @property
+    def choice(self) -> _Choice:
+        """How the sites or bodies were chosen."""
+        if not self.result.chosen:
+            return "asked for"
+        if not self.result.has_one_tip:
+            return "ends"
+        return "usual site" if self.result.kind == "site" else "only end"
+
+    @property
     def renamed_tip(self) -> bool:
         """Whether the one site or body goes by another name for the witness."""
         return self.result.has_one_tip and self.result.has_other_names
@@ -48,8 +59,14 @@ class _OfEngines:
     @property
     def balanced(self) -> tuple[str, ...]:
         """Bodies whose inertia was balanced."""
-        repairs = self.result.repairs
+        repairs = [repair for repair in self.result.repairs if not repair.is_massless]
         return tuple(repair.name for repair in repairs if repair.quantity == "inertia")
+
+    @property
+    def massless(self) -> tuple[str, ...]:
+        """Bodies that move without mass, and got the least that the engine takes."""
+        names = [repair.name for repair in self.result.repairs if repair.is_massless]
+        return tuple(dict.fromkeys(names))
 
     @property
     def left_out_meshes(self) -> tuple[str, ...]:
@@ -118,7 +135,7 @@ def _by_engines(
 
 def _reading_of(result: FingertipResult) -> Hashable:
     """Return all that the page says of what the witness read."""
-    tips = result.site if result.has_one_tip else len(result.tips)
+    tips = (result.site if result.has_one_tip else len(result.tips), result.chosen)
     read = (result.grade, result.reason, result.witness_file, result.prepared)
     pairs = (result.relative_to, result.renamed_joints, result.left_out)
     pairs += (result.refusal, result.repairs)

@@ -85,6 +85,7 @@ def certify(
     versions = {WITNESS: known.version}
     result = FingertipResult(
         tips=tuple(gaps),
+        site_asked=site,
         left_out=left_out,
         relative_to=parts.relative_to,
         renamed_joints=renamed_joints,
@@ -214,6 +215,7 @@ def _gaps(asked: _Witness, configurations: Array, progress: Progress) -> list[Ti
             theirs = relative(base, theirs)
         gap = TipGap(
             site=tip.name,
+            kind=tip.kind,
             witness_frame=frame.name,
             body=bodies[tip.body],
             frames=frame.offset,

@@ -18,7 +18,8 @@ from .fingertip import certify
 from .fingertip_poses import checked_poses
 from .fingertip_result import FingertipResult
 
-_ADVICE = "; load("  # what an error says to type, which is done here
+# Where an error begins to say what to type or to write, which is done here.
+_ADVICE = ("; load(", "; give ")
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,10 @@ def answer(request: FingertipRequest, reporter: Reporter = QUIET) -> dict[str, F
             mended = _load_for_places(backend, model, menagerie)
             if mended is None:
                 raise
-            refusals[str(backend)] = str(error).partition(_ADVICE)[0]
+            reason = str(error)
+            for advice in _ADVICE:
+                reason = reason.partition(advice)[0]
+            refusals[str(backend)] = reason
             return mended
 
     def compute(model: Model, backend: str, progress: Progress) -> FingertipResult:
@@ -101,14 +105,12 @@ def answer(request: FingertipRequest, reporter: Reporter = QUIET) -> dict[str, F
 def _load_for_places(
     backend: BackendChoice, model: AnyPath, menagerie: AnyPath | None
 ) -> Model | None:
-    """Return a refused model with its inertias balanced and without its meshes; None if it cannot.
+    """Return a refused model as it is read for its places alone; None if it cannot be read so.
 
     What that changes is in the certificate, so no warning tells of it.
     """
     with warnings.catch_warnings(action="ignore", category=EngineWarning):
         try:
-            return backend.load_to_run(
-                model, menagerie=menagerie, balance_inertia=True, meshes=False
-            )
+            return backend.load_for_places(model, menagerie=menagerie)
         except StateMachineError:
             return None

@@ -49,6 +49,7 @@ class TipGap:
 
     Attributes:
         site: The site or body on the engine.
+        kind: Which of the two it is.
         witness_frame: Its name for the witness.
         body: The body that it is, or that carries it, on the engine.
         frames: Offset between the two frame definitions; None where they are on no common body
@@ -61,6 +62,7 @@ class TipGap:
     """
 
     site: str
+    kind: Literal["site", "body"]
     witness_frame: str
     body: str
     frames: FrameOffset | None
@@ -115,6 +117,8 @@ class FingertipResult:
 
     Attributes:
         tips: The gap of each site or body that was compared, the worst first.
+        site_asked: The site or body that was asked for; None where none was. Then the tips are
+            the site gripperframe, or else every body that joints move and that carries no other.
         left_out: Sites or bodies that the witness's file does not have.
         relative_to: Body that all places are relative to, on both sides; None where they are those
             in the world. Two files need not put a robot at one place of the world, and in one of
@@ -128,12 +132,13 @@ class FingertipResult:
         reason: Why it is not an own reading; "" if it is.
         prepared: What was done to the file's text before Pinocchio read it.
         provenance: What it was computed with, the seed of the poses included.
-        repairs: Inertias of the file that were balanced and meshes that were left out so that the
-            engine reads it; they have no part in places.
+        repairs: Inertias of the file that were balanced, masses that bodies got which have none,
+            and meshes that were left out, so that the engine reads it; they have no part in places.
         refusal: Why the engine refuses the file as it is; "" where it does not.
     """
 
     tips: tuple[TipGap, ...]
+    site_asked: str | None
     left_out: tuple[str, ...]
     relative_to: CommonBody | None
     renamed_joints: tuple[RenamedJoint, ...]
@@ -208,6 +213,22 @@ class FingertipResult:
     def has_one_tip(self) -> bool:
         """Tell whether one site or body was compared, and not several."""
         return len(self.tips) == 1
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """Return the names of the sites or bodies that were chosen; none where one was asked for.
+
+        They are in the order of their names.
+        """
+        if self.site_asked is not None:
+            return ()
+        return tuple(sorted([*(gap.site for gap in self.tips), *self.left_out]))
+
+    @property
+    @only_on_pages
+    def kind(self) -> Literal["site", "body"]:
+        """Return which of the two it is."""
+        return self.worst_tip.kind
 
     @property
     @only_on_pages

@@ -55,7 +55,8 @@ def named_quantity(trials: Trials, words: str | None) -> str | None:
         return None
     quantity = trials.ruler.named(words)
     if quantity not in trials.ruler.units:
-        known = (*trials.ruler.units, *trials.traces[0].header.joint_labels)
+        further = trials.ruler.further_quantities
+        known = (*trials.ruler.units, *further, *trials.traces[0].header.joint_labels)
         called = dict.fromkeys(name.replace(",", "") for name in known)
         raise unknown_name("quantity", quantity, called)
     return quantity
@@ -98,9 +99,10 @@ def _quantity(
 ) -> str:
     """Choose the quantity that a gap is explained in.
 
-    It is a body that is held, relative to the tip, where that is beyond its tolerance. Else it is
-    the one that is farthest beyond, among those that are more than rounding and chaos make of a
-    run: a coordinate, as `compare` names it, if one is. Where none is beyond, it is the first.
+    It is the pose of the base of a robot that floats, or a body that is held, relative to the tip,
+    where that is beyond its tolerance. Else it is the one that is farthest beyond, among those that
+    are more than rounding and chaos make of a run: a coordinate, as `compare` names it, if one is.
+    Where none is beyond, it is the first.
     """
     ruler = trials.ruler
     robot = frozenset(model.body_names[body] for body in moved_by_actuators(model))
@@ -123,6 +125,9 @@ def _quantity(
             break
     if preferred not in ruler.coordinates and beyond.get(preferred, 0.0) > 1:
         return preferred
+    of_base = {name: beyond[name] for name in ruler.of_base if beyond.get(name, 0.0) > 1}
+    if of_base:
+        return max(of_base, key=of_base.__getitem__)
     own = {name: beyond[name] for name in ruler.coordinates if beyond.get(name, 0.0) > 1}
     most = max(own or beyond, key=beyond.__getitem__, default=preferred)
     if preferred in beyond and beyond[most] <= 1:

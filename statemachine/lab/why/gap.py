@@ -24,14 +24,14 @@ from ...measures import (
 )
 from ...show.drawing.scene import posed
 from ..compare.matching import Matched
-from ..compare.series import SCALARS
+from ..compare.outcomes import OUTCOMES
+from ..compare.series import BASE, SCALARS
 from ..recordings import Trace
+from ..runs.floating import free_joint_of_robot
+from .asked_quantities import ASKED, Curves, curves_asked, kinds_asked
 
 BALLS = "ball joints"
 Measure = Literal["worst", "end", "rms"]
-# One run, as the quantities that runs are compared by: for each moment k numbers (n, k), in the
-# unit of the quantity.
-Curves = dict[str, Array]
 
 
 def size_of(gap: Deviation, measure: Measure) -> float:
@@ -68,24 +68,32 @@ class _Places:
         joints: Where in qpos its joints are.
         free_bodies: (n,) ids of the bodies that are free.
         tip: Id of the site that is the tip; None without one.
+        base: Where in qpos the pose of the floating base begins; None of a fixed one.
     """
 
     joints: JointPlaces
     free_bodies: Ints
     tip: int | None
+    base: int | None
 
     @classmethod
-    def of(cls, model: Model, joints: Ints, tip: int | None) -> _Places:
+    def of(cls, model: Model, joints: Ints, tip: int | None, base: int | None) -> _Places:
         """Find the places.
 
         Args:
             model: The Model.
             joints: (n,) ids of the joints that both sides have.
             tip: Id of its tip, or None.
+            base: Id of the free joint of its base, or None.
         """
         types = model.jnt_type[joints]
         free = joints[types == int(JointType.FREE)]
-        return cls(JointPlaces.of(types, model.jnt_qposadr[joints]), model.jnt_bodyid[free], tip)
+        return cls(
+            joints=JointPlaces.of(types, model.jnt_qposadr[joints]),
+            free_bodies=model.jnt_bodyid[free],
+            tip=tip,
+            base=None if base is None else int(model.jnt_qposadr[base]),
+        )
 
 
 class Ruler:
@@ -107,7 +115,8 @@ class Ruler:
                 first, unless `curves` is given another.
             left: A run of the first Model.
             right: One of the second.
-            quantity: A joint that is measured beside all of them, hinge or slide, as on the left.
+            quantity: What is measured beside all of them: a joint, hinge or slide, as on the left;
+                "base x", "base y", "base z", or an outcome, such as "fell".
         """
         self.time, self.between = _moments_of(left, right)
         self._model = model = matched.left
@@ -115,13 +124,14 @@ class Ruler:
         moving, sites = model.moving_sites, [a for a, _ in matched.sites]
         usual_tip = usual_site([model.site_names[a] for a in sites], [moving[a] for a in sites])
         tips = (None, None) if usual_tip is None else matched.sites[usual_tip]
+        bases = _bases(matched)
         self._places = (
-            _Places.of(model, joints[0], tips[0]),
-            _Places.of(matched.right, joints[1], tips[1]),
+            _Places.of(model, joints[0], tips[0], bases[0]),
+            _Places.of(matched.right, joints[1], tips[1], bases[1]),
         )
         labels = left.header.joint_labels
         free = joints[0][model.jnt_type[joints[0]] == int(JointType.FREE)]
-        self._names = [labels[joint] for joint in free]
+        self._names = [BASE if joint == bases[0] else labels[joint] for joint in free]
         self._tip = "" if tips[0] is None else model.site_names[tips[0]] or f"site {tips[0]}"
         self._kinds = self._kinds_of_joints()
         self._single: dict[str, tuple[int, int]] = {}  # places in qpos of a joint asked for
@@ -131,6 +141,8 @@ class Ruler:
                 self._kinds[name] = kind
                 self._single[name] = int(model.jnt_qposadr[a]), int(matched.right.jnt_qposadr[b])
         self._kinds |= self._kinds_of_bodies()
+        until = float(self.time[-1])
+        self._kinds |= kinds_asked(quantity, (left, right), until, floats=bases[0] is not None)
         self.units = {name: QUANTITIES[kind].unit for name, kind in self._kinds.items()}
         if not self.units:
             raise BadInputError(
@@ -156,11 +168,17 @@ class Ruler:
         if self._tip:
             kinds[self._tip] = "body"
         for name in self._names:
-            kinds[name] = "body"
-            kinds[f"{name}, rotation"] = "body rotation"
-            if self._tip:
+            kind = "base" if name == BASE and self._places[0].base is not None else "body"
+            kinds[name] = kind
+            kinds[f"{name}, rotation"] = f"{kind} rotation"
+            if self._tip and kind == "body":
                 kinds[self._relative_to_tip(name)] = "body"
         return kinds
+
+    @property
+    def further_quantities(self) -> tuple[str, ...]:
+        """Return what is measured only where it is asked for, of a robot that floats."""
+        return () if self._places[0].base is None else ASKED
 
     def named(self, words: str) -> str:
         """Return the quantity that a table calls so: "torso rotation", "torso position"."""
@@ -187,6 +205,8 @@ class Ruler:
                 curves |= self._poses(qpos, model or self._model, side)
             except DivergedError:
                 return None
+        base, until = self._places[side].base, float(self.time[-1])
+        curves |= curves_asked(self._kinds, trace, qpos, base, until)
         return {name: curves[name] for name in self.units}
 
     def _of_joints(self, qpos: Array, side: int) -> Curves:
@@ -220,6 +240,8 @@ class Ruler:
             curves[self._tip] = site = values[:, 3 * count : 3 * count + 3]
             turned = np.ascontiguousarray(values[:, 3 * count + 3 :]).reshape(-1, 3, 3)
             for k, name in enumerate(self._names):
+                if self._kinds[name] == "base":
+                    continue
                 relative = np.einsum("nij,ni->nj", turned, where[:, k] - site)
                 curves[self._relative_to_tip(name)] = relative
         return curves
@@ -231,31 +253,47 @@ class Ruler:
     def default_quantity(self, touching: frozenset[str]) -> str:
         """Return what is measured unless asked.
 
-        It is a body that is touched, relative to the tip, else the joints.
+        It is the place of the base of a robot that floats; else a body that is touched, relative to
+        the tip; else the joints.
         """
+        if self._places[0].base is not None:
+            return BASE
         if self._tip:
             for name in self._names:
                 if name in touching:
                     return self._relative_to_tip(name)
         return next(iter(self.units))
 
+    def of_motion(self, quantity: str) -> str:
+        """Return the quantity that tells whether anything moves: of an outcome the usual one."""
+        return self.default_quantity(frozenset()) if quantity in OUTCOMES else quantity
+
     @property
     def coordinates(self) -> list[str]:
         """The quantities that follow from no others, as those that `compare` names first."""
         places = {self._tip, *map(self._relative_to_tip, self._names)}
-        return [name for name in self.units if name not in places]
+        coordinates = [name for name in self.units if name not in places]
+        return [name for name in coordinates if name not in ASKED]
+
+    @property
+    def of_base(self) -> list[str]:
+        """The quantities that are the pose of the floating base; none where it is fixed."""
+        return [name for name in self.coordinates if QUANTITIES[self._kinds[name]].of_base]
 
     def tolerance(self, quantity: str) -> float:
         """Return what a gap has to be above to matter; of a place, that of a body."""
-        return QUANTITIES[self._kinds[quantity]].tolerance or 0.0
+        tolerance = QUANTITIES[self._kinds[quantity]].tolerance
+        if tolerance is None:  # of a distance, which is compared with no run here
+            tolerance = QUANTITIES["base"].tolerance
+        return tolerance or 0.0
 
     def distances(self, quantity: str, left: Curves, right: Curves) -> Array:
         """Return how far apart (n,): the worst joint, or the length of the way between."""
         a, b = left[quantity], right[quantity]
         match self._kinds[quantity]:
-            case "body":
+            case "body" | "base":
                 return distances(a, b)
-            case "body rotation":
+            case "body rotation" | "base rotation":
                 return turns(a, b)
         if quantity == BALLS:
             return turns(a, b).max(axis=1)
@@ -287,6 +325,14 @@ class Ruler:
             sizes = [size_of(self.gap(name, run, curves), measure) for curves in stood]
             floors[name] = max([bound, *sizes])
         return floors
+
+
+def _bases(matched: Matched) -> tuple[int, int] | tuple[None, None]:
+    """Return the free joints of the bases of both robots, where they are counterparts."""
+    left, right = free_joint_of_robot(matched.left), free_joint_of_robot(matched.right)
+    if left is None or right is None or (left, right) not in matched.joints:
+        return None, None
+    return left, right
 
 
 def _moments_of(left: Trace, right: Trace) -> tuple[Array, bool]:

@@ -119,6 +119,7 @@ class Trials:
         curves = self._curves(RunKey(0, NONE, without))
         if not curves:
             return 0.0
+        quantity = self.ruler.of_motion(quantity)
         start = {name: curve[:1] for name, curve in curves.items()}
         return float(self.ruler.distances(quantity, curves, start).max())
 
