@@ -152,6 +152,18 @@ def test_what_an_experiment_switches_off_is_missed_by_nobody(tmp_path: Path) -> 
         assert tuple(part for _, part in result.missing) == missing
 
 
+def test_what_is_paired_by_its_place_has_a_row_each_and_no_paragraph(tmp_path: Path) -> None:
+    other = ARM.replace('"shoulder"', '"first"').replace('"elbow"', '"second"')
+    waves = replace(scenario("waves"), seconds=0.3, keyframe=None)
+    result = explained(tmp_path, ARM, other, scenario=waves, uncertain=None, jobs=1)
+    names = {(pair.kind, pair.left, pair.right) for pair in result.renamed}
+    assert {("joint", "shoulder", "first"), ("joint", "elbow", "second")} <= names
+    assert not any("taken for" in note for note in result.notes)
+    details = blocks(page(result, details=True), Table)
+    assert len(result.renamed) in [len(table.rows) for table in details]
+    assert not blocks(page(result), Table)
+
+
 def test_what_several_elements_have_alike_is_one_row(tmp_path: Path) -> None:
     text = with_changes(ARM, [('<geom density="0"/>', '<geom density="0" friction="0.4"/>')])
     result = explained(tmp_path, ARM, text, quantity="ball", uncertain=None, jobs=1)

@@ -131,6 +131,7 @@ def explain(request: WhyRequest, progress: Progress = silent) -> Explanation:
         unmatched=matched.only,
         missing=_missing(request),
         notes=_notes(matched, left, right),
+        renamed=matched.renamed,
         unread=_unread(matched, request, gap),
         still=_still(causes, left, trials.traces[0]),
         motion=motion,
@@ -335,7 +336,7 @@ def _redundant(shares: Sequence[Share]) -> tuple[str, ...]:
 
 def _notes(matched: Matched, left: Model, right: Model) -> tuple[str, ...]:
     """Return what a reader should know, in sentences."""
-    notes = list(matched.notes)
+    notes = list(matched.other_notes)
     for model in (left, right):
         for what in room(engine_of(model.backend)).ignored(model):
             if "integrator" not in what:  # which is a cause

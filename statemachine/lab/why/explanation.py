@@ -11,6 +11,7 @@ from ...engines.description.lines import SourceLine
 from ...engines.records import DifferingQuantity
 from ...measures import Deviation
 from ..compare.instead import Instead
+from ..compare.matched import RenamedPair
 from ..compare.matching import Only
 from ..compare.motion import MotionExtent
 from ..compare.typed_command import TypedCommand
@@ -108,6 +109,7 @@ class Explanation:
         took: What it took by the clock [s].
         provenance: What each side was computed with.
         right_file: Name of the right's file, without its folder.
+        renamed: What was taken for one although the names differ, and nobody said so.
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
     """
@@ -150,6 +152,7 @@ class Explanation:
     took: float
     provenance: tuple[Provenance, Provenance]
     right_file: str = ""
+    renamed: tuple[RenamedPair, ...] = ()
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
 

@@ -162,6 +162,13 @@ class WhyDetails(PageContent):
         return (*only, *self.result.notes)
 
     @property
+    def renamed(self) -> Table:
+        """What was taken for one although the names differ."""
+        rows = [(pair.kind, pair.left, pair.right, pair.shared) for pair in self.result.renamed]
+        heads = ("kind", "left", "right", "what both share")
+        return Table(heads, rows, words=frozenset({0, 1, 2, 3}))
+
+    @property
     def proofs(self) -> tuple[str, ...]:
         """What the run itself shows of the cause, in sentences."""
         return proofs(self.result)
