@@ -259,8 +259,8 @@ def _advice_where_explained(result: Explanation) -> Advice:
         return "between"
     if engine_as_it_comes(result):
         return "settings"
-    has_changes = any(row.changes for row in result.shares)
-    return "write" if has_changes else "details"
+    largest = next((row for row in result.shares if row.share), None)
+    return "write" if largest is not None and largest.changes else "details"
 
 
 def _next_command(result: Explanation, advice: Advice) -> str:
@@ -275,9 +275,9 @@ def _next_command(result: Explanation, advice: Advice) -> str:
         case "write":
             target = f"fixed{Path(result.right_file).suffix}"
             flags = (*result.command.question, "--write", target)
-        case "refused" | "details" | "written":
+        case "refused" | "details":
             flags = (*result.command.question, "--details")
-        case "":
+        case "written" | "":
             return ""
     return result.command.lines(*flags)
 

@@ -213,9 +213,13 @@ def _with_file(
         for row in explanation.shares
         if row.kind in ("engine", "run")
     ]
+    order = {share.name: number for number, share in enumerate(explanation.shares)}
+    not_written = sorted(
+        (*written.not_written, *further), key=lambda row: order.get(row.cause, len(order))
+    )
     rewritten = replace(
         written,
-        not_written=(*written.not_written, *further),
+        not_written=tuple(not_written),
         gap=gap,
         before=explanation.gap,
         quantity=quantity,
