@@ -212,7 +212,9 @@ def test_a_path_that_is_longer_than_a_line_is_left_out() -> None:
 def test_the_command_has_what_was_asked_of_both_sides() -> None:
     sides = Side("a.xml", options={"timestep": 0.001}), Side("b.xml", "pybullet", "engine")
     run = Request(("walk.py:policy",), sides=sides, every=5, names={"j": "k"}, seed=3)
-    assert typed_command(run).words == (
+    command = typed_command(run)
+    assert command is not None
+    assert command.words == (
         *("statemachine", "compare", "walk.py:policy", "a.xml", "timestep=0.001"),
         *("b.xml@pybullet:engine", "--seed", "3", "--every", "5", "--map", "j=k"),
     )
@@ -221,3 +223,9 @@ def test_the_command_has_what_was_asked_of_both_sides() -> None:
 def test_a_cause_without_a_value_is_told_by_its_name(gains: Explanation) -> None:
     share = Share("extra shape of box", (), None, "geom", share=1.0, alone=1.0, last=1.0)
     assert page(replace(gains, shares=(share,))).title.startswith("Extra shape of box: 100.0 %")
+
+
+def test_what_nobody_can_type_has_no_command(gains: Explanation) -> None:
+    run = Request((lambda model, data: None,), sides=(Side("a.xml"), Side("b.xml")))  # type: ignore[arg-type]
+    assert typed_command(run) is None
+    assert not blocks(page(gains), Code)

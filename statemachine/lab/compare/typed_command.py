@@ -48,13 +48,18 @@ class TypedCommand:
         return "\n".join([*lines, line])
 
 
-def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand:
+def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand | None:
     """Return the command that runs something on two sides, or opens two traces.
+
+    None where a function or a Model was handed over, which nobody can type.
 
     Args:
         run: What is run.
         question: The words that ask what was asked.
     """
+    named = (*run.what, *(side.model for side in run.sides))
+    if not all(isinstance(word, str) for word in named):
+        return None
     words = ["statemachine", "compare", *run.what]
     if run.model:
         words.append(run.model)

@@ -131,7 +131,7 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
         labels = sides[0].label, sides[1].label
         sides, common = with_options(sides, {**asked.options, **run.options})
         if request.write is not None:
-            inputs = [Path(word) for word in run.what]
+            inputs = [Path(word.partition(":")[0]) for word in run.what if isinstance(word, str)]
             check_target(Path(request.write), sides[0].path, sides[1].path, inputs)
         models = load_sides(sides, {}, run.names).models
         recordings = [
