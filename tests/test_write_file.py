@@ -21,7 +21,14 @@ from statemachine.lab.questions.requests.models import ModelsRequest
 from statemachine.lab.questions.requests.models import answer as compare_models
 from statemachine.lab.why.rewriting import RewriteRequest, RewrittenFile, check_target, rewrite
 
+from .support.explained import ALONE, changed
+from .support.explained import ARM as CASES
 from .support.files import written
+
+# What is no attribute of an element that both sides have.
+ELSEWHERE = {
+    *("extra shape", "exclude", "pair", "equality", "tendon", "actuator", "start"),
+}
 
 ARM = """<mujoco model="arm">
   <!-- what a reader wrote -->
@@ -256,6 +263,32 @@ def test_a_place_that_is_counted_from_a_frame_is_refused(rewritten) -> None:
     result, _ = rewritten(framed("0 0.1 -0.3"), framed("0 0.1 -0.4"))
     (refused,) = result.not_written
     assert "<frame>" in refused.reason
+
+
+def test_an_element_beside_a_replicate_is_written_and_one_of_it_refused(rewritten) -> None:
+    text = (
+        '<mujoco><worldbody><replicate count="3" offset="0.3 0 0"><body name="ball" pos="0 0 1">'
+        '<freejoint/><geom size="0.1" friction="0.8"/></body></replicate>'
+        '<body name="arm" pos="0 0 3"><joint damping="{}"/><geom size="0.1" friction="{}"/></body>'
+        "</worldbody></mujoco>"
+    )
+    left = text.format(1, 0.7)
+    right = text.format(2, 0.6).replace('friction="0.8"', 'friction="0.9"')
+    result, _ = rewritten(left, right)
+    assert {(change.attribute, change.new) for change in result.written} == {
+        ("damping", "1"),
+        ("friction", "0.7"),
+    }
+    (refused,) = result.not_written
+    assert "<replicate>" in refused.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n in ALONE if n not in ELSEWHERE])
+def test_every_known_difference_of_an_element_is_written(name, rewritten, tmp_path) -> None:
+    result, target = rewritten(CASES, changed(CASES, ALONE[name]))
+    assert result.not_written == ()
+    assert_compiles_alike(tmp_path / "left.xml", target)
 
 
 def test_an_included_file_with_changes_stands_in_place_of_its_include(rewritten, tmp_path) -> None:

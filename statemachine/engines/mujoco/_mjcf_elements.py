@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from ..description.file_form import NotWrittenError
 from ..description.xml_source import XmlElement, XmlSource
 
@@ -44,7 +46,11 @@ class MjcfElements:
     @cached_property
     def is_listed(self) -> bool:
         """Whether the file has its elements one by one."""
-        return not any(element.tag in _MAKES_ELEMENTS for element in self._source.elements)
+        return not any(self._makes(element) for element in self._source.elements)
+
+    def _makes(self, element: XmlElement) -> bool:
+        """Tell whether an element stands for several that the file does not have one by one."""
+        return element.tag in _MAKES_ELEMENTS
 
     def find(self, kind: str, number: int) -> XmlElement:
         """Return the element of the file with an id of the compiled model.
@@ -58,12 +64,40 @@ class MjcfElements:
         named = [element for element in self._all(kind) if element.name == name and name]
         if len(named) == 1:
             return named[0]
+        on_body = self._on_body(kind, number)
+        if on_body is not None:
+            return on_body
         elements = self._all(kind)
         count = getattr(self._raw, _COUNTS[kind])
         if kind == "pair" or not self.is_listed or len(elements) != count:
             label = name if name else f"{kind} {number}"
-            raise NotWrittenError(f"the file has no element of its own for {label}")
+            maker = next((each.tag for each in self._source.elements if self._makes(each)), "")
+            by = f", which <{maker}> may have made" if maker else ""
+            raise NotWrittenError(f"the file has no element of its own for {label}{by}")
         return elements[number]
+
+    def _on_body(self, kind: str, number: int) -> XmlElement | None:
+        """Return an element by its place on its body; None where the file does not tell it.
+
+        Args:
+            kind: Of the element.
+            number: Its id.
+        """
+        owners = {"joint": "jnt_bodyid", "geom": "geom_bodyid", "site": "site_bodyid"}
+        if kind not in owners:
+            return None
+        bodies = getattr(self._raw, owners[kind])
+        body = int(bodies[number])
+        name = self._raw.body(body).name
+        named = [each for each in self.bodies if each.name == name and name]
+        if body and len(named) != 1:
+            return None
+        inner = [*self._source.children(named[0], THROUGH)] if body else self._of_the_world()
+        if any(self._makes(each) for each in inner):
+            return None
+        elements = [each for each in inner if each.tag in _TAGS[kind]]
+        ids = np.flatnonzero(bodies == body).tolist()
+        return elements[ids.index(number)] if len(elements) == len(ids) else None
 
     def inertial_of(self, body: XmlElement) -> XmlElement | None:
         """Return the `<inertial>` of a body; None without one."""
