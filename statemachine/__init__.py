@@ -64,10 +64,10 @@ _HOMES = {
 }
 _MODULES = {
     "backends": "backends",
-    "compare": "lab.compare",
     "conformance": "conformance",
     "errors": "errors",
     "kinematics": "kinematics",
+    "lab": "lab",
     "models": "models",
     "recordings": "lab.recordings",
     "rotations": "rotations",

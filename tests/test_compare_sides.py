@@ -415,7 +415,7 @@ def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
 )
 def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
     model = sm.load(files / "arm.xml")
-    run = record(model, lambda time, data: [0.3, -0.2], 0.2, start=RunStart(qpos=[0.1, 0.2]))
+    run = record(model, lambda model, data: [0.3, -0.2], 0.2, start=RunStart(qpos=[0.1, 0.2]))
     path = write(run, files / "run.npz")
     sides = Side(str(files / "turned.xml")), Side(str(files / "heavy.xml"))
     run = run_sides(Request((str(path),), sides=sides))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 from functools import partial
@@ -208,6 +209,34 @@ def test_the_notebook_runs_headless(backend: str) -> None:
     assert ["run says" in text for text in shown] == [True] * len(LESSONS)
     assert "✗" not in "".join(shown)
     assert "data:image/svg+xml;base64," in "".join(shown)
+
+
+_COMPARING = ROOT / "notebooks" / "comparing.ipynb"
+
+
+def test_the_notebook_of_questions_is_short_and_has_no_outputs() -> None:
+    notebook = nbformat.read(_COMPARING, as_version=4)
+    nbformat.validate(notebook)
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert 10 <= len(code) <= 14
+    assert not any(cell.outputs for cell in code)
+
+
+@pytest.mark.slow
+def test_the_notebook_of_questions_runs_and_shows_its_answers() -> None:
+    notebook = nbformat.read(_COMPARING, as_version=4)
+    NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
+    outputs = {cell.id: cell.outputs for cell in notebook.cells if cell.cell_type == "code"}
+    printed = outputs["compare"][0]["text"]
+    assert_in(printed, "✗", "shoulder", "lab.why(")
+    for cell in ("html", "why-html", "descriptions"):
+        assert '<div class="statemachine-result">' in outputs[cell][0]["data"]["text/html"]
+    shares = ast.literal_eval(outputs["why"][0]["data"]["text/plain"])
+    assert set(shares) == {"gains of elbow", "mass of fore"}
+    assert sum(shares.values()) == pytest.approx(1.0, abs=0.02)
+    assert "image/png" in outputs["plot"][-1]["data"]
+    assert float(outputs["model"][0]["data"]["text/plain"]) > 1e-3
+    assert "mass matrix" in outputs["one-step"][0]["data"]["text/plain"]
 
 
 def test_a_lesson_in_a_notebook(backend: str) -> None:

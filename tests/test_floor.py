@@ -24,7 +24,7 @@ from statemachine.lab.questions.finding import finding_of, leading
 from statemachine.lab.questions.requests.converge import ConvergeRequest, ConvergeResult
 from statemachine.lab.recordings import Rerun, Trace, record
 from statemachine.lab.why.gap import Ruler
-from statemachine.show.blocks import Code, Page
+from statemachine.show.blocks import Code
 
 from .support.claims import refused
 from .support.compared import page_of as compared_page
@@ -106,6 +106,7 @@ def swapped_pair(folder: Path, seconds: float) -> tuple[Rerun, Rerun]:
     return one, two
 
 
+@pytest.mark.slow
 def test_the_floor_is_the_largest_of_both_sides_and_swapping_them_changes_nothing(
     tmp_path: Path,
 ) -> None:
@@ -234,7 +235,7 @@ def test_a_seed_gives_the_same_runs_again_and_another_gives_others(tmp_path: Pat
 
 
 def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
-    run = Rerun(sm.load("so101"), lambda _: lambda _time, data: None, 0.1)
+    run = Rerun(sm.load("so101"), lambda _: lambda _model, data: None, 0.1)
     for trace in perturbed_runs(run, runs=1, derive=False):
         assert (trace.ctrl == trace.ctrl[0]).all()
         assert 0 < np.abs(trace.ctrl[0]).max() <= ROUNDING
@@ -261,6 +262,7 @@ def test_uncertainties_are_read_in_their_units() -> None:
     refused((BadInputError, "twice", lambda: parse_uncertainty(["1mm", "2cm"])))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_the_command_line_shows_the_floor(here: Cli) -> None:
     asked = ("compare", "hold", "--seconds", "0.4")
@@ -289,6 +291,11 @@ def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Co
     return convergence_of(one, two, seconds)
 
 
+def asked(found: Convergence, what: str) -> ConvergeResult:
+    """The same as a Result, of which a page can be made."""
+    return ConvergeResult(**vars(found), request=ConvergeRequest(Request((what,))))
+
+
 def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Convergence:
     """What becomes of the gap of two Models with finer steps."""
     return convergence(
@@ -297,11 +304,6 @@ def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Convergence:
             record(two.replace(substeps=finer), None, seconds),
         )
     )
-
-
-def page_of(found: Convergence, details: bool = False) -> Page:
-    request = ConvergeRequest(Request(("fall",), model="so101"))
-    return page(ConvergeResult(request, found), details)
 
 
 def test_explicit_against_implicit_damping_is_discretisation(tmp_path: Path) -> None:
@@ -313,7 +315,7 @@ def test_explicit_against_implicit_damping_is_discretisation(tmp_path: Path) -> 
     assert [joint.gaps[k] / joint.gaps[k + 1] for k in (0, 1)] == pytest.approx([2, 2], rel=0.1)
     assert found.vanishes
     assert found.state == "vanishes"
-    assert page_of(found).holds
+    assert page(asked(found, "fall")).holds
 
 
 @pytest.mark.parametrize(
@@ -325,7 +327,7 @@ def test_another_order_of_integration_is_discretisation_and_one_side_twice_no_ga
     found = found_of(tmp_path, {"integrator": left}, {"integrator": right})
     assert {each.verdict for each in (*found.whole, *found.before)} == {verdict}
     assert found.state == {"discretisation": "vanishes", "rounding": "rounding"}[verdict]
-    assert page_of(found).holds
+    assert page(asked(found, "fall")).holds
 
 
 @pytest.mark.parametrize(
@@ -366,16 +368,19 @@ def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path
         with pytest.warns(EngineWarning, match="by 0.524; inside with --keyframe up$"):
             found = convergence_of(one, two, 1.0)
         assert found.whole[0].verdict == verdict
-        assert "Commands come by the step" not in shown(page_of(found, details=True))
-        (code,) = blocks(page_of(found), Code)
+        shown_page = page(asked(found, "fall"))
+        (code,) = blocks(shown_page, Code)
         ends = "--timestep 0.0025 --converge" if found.unclear else "--why --quantity 'joint 0'"
         assert code.lines[0].endswith(ends)
+        everything = shown(page(asked(found, "fall"), details=True))
+        assert "Commands come by the step" not in everything
         assert not found.vanishes
 
 
 def test_unlike_timesteps_ask_for_commands_at_unlike_moments() -> None:
     one, two = (sm.load("so101", timestep=timestep) for timestep in (0.002, 0.004))
-    text = " ".join(shown(page_of(convergence_of(one, two, 0.1), details=True)).split())
+    found = asked(convergence_of(one, two, 0.1), "hold")
+    text = " ".join(shown(page(found, details=True)).split())
     assert "by the step as given, which is 2 ms on the left and 4 ms on the right" in text
     assert "timestep=0.004 behind both" in text
 

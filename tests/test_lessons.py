@@ -50,7 +50,7 @@ from statemachine.show.pictures import Traces
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
 from .support.pages import blocks, lesson_result, with_figures
-from .support.processes import Cli, of_python, without_estimates
+from .support.processes import Cli, of_python
 from .support.requirements import ROOT
 
 _TIMED = {"time", "speed", "worlds", "objects", "questions"}  # print wall times
@@ -724,32 +724,6 @@ def test_a_bar_of_progress_takes_nothing_of_what_is_printed(
             print("hello")
         report(1.0)
     assert printed.getvalue() == "hello\n"
-
-
-class Clock:
-    """Stands for a clock: each look at it is five seconds after the one before."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def monotonic(self) -> float:
-        self.now += 5.0
-        return self.now
-
-
-def test_a_long_wait_is_said_once_where_nobody_sees_a_bar(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(bar, "time", Clock())
-    with bar.progress("questions on mujoco") as report:
-        for done in (0.1, 0.2, 0.3, 0.4):
-            report(done)
-    said = capsys.readouterr().err
-    assert said == "questions on mujoco: may take 50 s\n"
-    # A test that asks for silence does not hear of it, and of all else it does.
-    assert without_estimates("statemachine: a\n" + said + "b: may take long\n") == (
-        "statemachine: a\nb: may take long\n"
-    )
 
 
 def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:

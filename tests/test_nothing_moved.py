@@ -141,7 +141,7 @@ def test_the_line_names_waves_and_the_page_does_not_hold(
 def test_why_has_no_cause_of_no_motion(rotors: tuple[Path, Path]) -> None:
     found = explained("fall", *rotors)
     assert found.shares  # the inertia differs
-    assert found.verdict == GapVerdict("nothing moved", holds=False, divides=False)
+    assert found.verdict == GapVerdict((), "nothing moved", holds=False, divides=False)
     assert not why.page(found).holds
 
 
@@ -172,7 +172,7 @@ def test_a_gap_that_is_there_is_one_whatever_moves(state: str) -> None:
 
 def test_converge_says_nothing_of_a_rest(rotors: tuple[Path, Path]) -> None:
     found = converge.answer(converge.ConvergeRequest(request("fall", *rotors)))
-    assert found.limits.is_still
+    assert found.is_still
     assert not limits(found).holds
 
 
@@ -213,7 +213,7 @@ def test_a_tolerance_as_wide_as_the_motion_is_still_a_comparison(tmp_path: Path)
 def test_a_gap_where_nothing_moved_is_a_difference(tmp_path: Path) -> None:
     """Both rest, in two places: that is no agreement that nobody tested."""
     left = Rerun(model_of(tmp_path, HELD), lambda _: None, 0.2).record()
-    right = Rerun(model_of(tmp_path, HELD), lambda _: lambda _time, _data: (0.3,), 0.2,
+    right = Rerun(model_of(tmp_path, HELD), lambda _: lambda _model, _data: (0.3,), 0.2,
                   qpos=np.array([0.3])).record()  # fmt: skip
     assert compare(left, right).outcome == "differs"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -32,7 +33,7 @@ def _run(model: Model, qvel: tuple[float, ...] = PUSH, seconds: float = SECONDS)
     return Rerun(model, lambda _: _swing, seconds, qvel=velocity).record()
 
 
-def _model(folder: Path, backend: str = "mujoco", **changes: float) -> Model:
+def _model(folder: Path, backend: str = "mujoco", **changes: Any) -> Model:
     return sm.load(written(folder, "robot.xml", mjcf(**changes)), backend)
 
 
@@ -90,7 +91,7 @@ def test_only_what_is_compared_counts(tmp_path):
     assert outcomes_of_run(trace, 0.05)[FELL] is None
 
 
-def _compared(folder: Path, seconds: float = SECONDS, **changes: float) -> Comparison:
+def _compared(folder: Path, seconds: float = SECONDS, **changes: Any) -> Comparison:
     left, right = (_run(_model(folder, **kind), seconds=seconds) for kind in ({}, changes))
     return compare(left, right)
 

@@ -146,8 +146,8 @@ def test_a_mocap_body_leads(tmp_path: Path, tie: str, base: str) -> None:
 def test_a_trace_has_where_mocap_bodies_were(tmp_path: Path) -> None:
     """It is repeated from a file, on the other engine, too, and told as numbers with names."""
 
-    def controller(time: float, data: sm.Data) -> None:
-        data.mocap_pos[0, 2] = 1 + 0.1 * time
+    def controller(_model: sm.Model, data: sm.Data) -> None:
+        data.mocap_pos[0, 2] = 1 + 0.1 * data.time
 
     ours, theirs = both(tmp_path, TREE.format(base=""), TIES["weld"], option("Euler"))
     trace = record(ours, controller, 0.2)

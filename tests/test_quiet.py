@@ -88,7 +88,7 @@ def pushed(text: str, push: Array, seconds: float = 2.0) -> tuple[Array, Array]:
 
 def stepped(folder: Path, text: str, other: str) -> OneStep:
     left = model_of(folder, text, "left.xml")
-    run = Rerun(left, lambda _: lambda _time, _data: (0.3, -0.4, 0.5), 0.4)
+    run = Rerun(left, lambda _: lambda _model, _data: (0.3, -0.4, 0.5), 0.4)
     return one_step(run, model_of(folder, other, "right.xml"))
 
 

@@ -145,7 +145,7 @@ def test_what_a_comparison_is_not_of_is_said(note: str, box: Trace) -> None:
 
 
 def test_time_goes_on() -> None:
-    def back(_time: float, data: sm.Data) -> None:
+    def back(_model: sm.Model, data: sm.Data) -> None:
         data.time = 0.0
 
     refused((TraceError, "time does not go on", lambda: record(sm.load("so101"), back, 0.1)))

@@ -170,8 +170,8 @@ def test_an_engine_that_does_not_tell_leaves_nan() -> None:
 def test_a_controller_sees_time_and_data_and_gives_ctrl(mujoco_arm: sm.Model) -> None:
     seen: list[float] = []
 
-    def controller(time: float, data: sm.Data) -> list[float] | None:
-        seen.append(time)
+    def controller(_model: sm.Model, data: sm.Data) -> list[float] | None:
+        seen.append(data.time)
         return [0.1] * 6 if data.qpos[0] < 0.05 else None
 
     trace = record(mujoco_arm, controller, 0.1)
@@ -193,15 +193,19 @@ def test_a_controller_sees_time_and_data_and_gives_ctrl(mujoco_arm: sm.Model) ->
 def test_what_is_no_ctrl_is_said_with_the_time(arm: sm.Model, gives: Any, says: str) -> None:
     """Also in the last row, after the last step."""
     for at in (0.025, 0.1):
-        late = partial(record, arm, lambda time, _, at=at: gives if time > at - 4e-3 else None, 0.1)
+
+        def late_one(_model: sm.Model, data: sm.Data, at: float = at) -> Any:
+            return gives if data.time > at - 4e-3 else None
+
+        late = partial(record, arm, late_one, 0.1)
         told = str(refused((BadInputError, says, late)))
         assert says == "ctrl" or f"{at:.3f} s" in told
 
 
 def test_a_controller_that_kicks_is_repeated_exactly(scene: sm.Model) -> None:
 
-    def kick(time: float, data: sm.Data) -> None:
-        if abs(time - 0.1) < 1e-6:
+    def kick(_model: sm.Model, data: sm.Data) -> None:
+        if abs(data.time - 0.1) < 1e-6:
             data.qvel[1] = 3.0
 
     trace = record(scene, kick, 0.3)
@@ -229,8 +233,8 @@ def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch
 
 def test_a_run_that_diverges_keeps_its_rows(mujoco_arm: sm.Model, tmp_path: Path) -> None:
 
-    def wild(time: float, data: sm.Data) -> None:
-        if time > 0.05:
+    def wild(_model: sm.Model, data: sm.Data) -> None:
+        if data.time > 0.05:
             data.qvel[:] = 9e9
 
     trace = record(mujoco_arm, wild, 0.5)

@@ -187,7 +187,7 @@ def test_joints_that_an_experiment_does_not_move_are_told(arm: Model) -> None:
 
 def test_finer_splits_what_changed_alike(arm: Model) -> None:
     two = arm.replace(armature=1.5 * arm.dof_armature)
-    parts = shares(explain(WhyRequest(arm, two, HOLD, uncertain=None, finer=True, budget=20)))
+    parts = shares(explain(WhyRequest(arm, two, HOLD, uncertain=None, finer=True)))
     assert (len(parts), sum(parts.values())) == (6, pytest.approx(1.0, abs=0.05))
 
 
@@ -224,8 +224,8 @@ def test_a_cause_that_needs_another_comes_after_it() -> None:
         b = "b" in brought
         return 1.0 - 0.1 * ("a" in brought) - 0.5 * b - 0.4 * (b and "c" in brought)
 
-    for budget in (200, 3):  # all sets, and drawn orders
-        result = shapley(list(weights), value, 1.0, needs={"b": "a", "c": "b"}, budget=budget)
+    for sets in (200, 3):  # all sets, and drawn orders
+        result = shapley(list(weights), value, 1.0, needs={"b": "a", "c": "b"}, sets=sets)
         assert result.share == pytest.approx(weights)
     assert all("a" in brought for brought in asked if {"b", "c"} & brought)
     assert result.alone["b"] is result.last["a"] is None
@@ -247,7 +247,7 @@ def path_of(model: Model, experiment: Scenario, used: int = 0) -> np.ndarray:
             sm.reset(model, data, experiment.keyframe)
         for _ in range(round(experiment.seconds / model.timestep)):
             rows.append(data.qpos.copy())
-            wanted = controller(data.time, data)
+            wanted = controller(model, data)
             if wanted is not None:
                 data.ctrl = wanted
             sm.step(model, data)
@@ -485,9 +485,7 @@ def explanations() -> dict[tuple[str, str], Explanation]:
         experiment = scenario(name)
         one, two = sm.load(experiment.model), quietly(experiment.model, defaults=defaults)
         # What is tested holds of few drawn orders as of many.
-        results[name, defaults] = explain(
-            WhyRequest(one, two, experiment, uncertain=None, budget=40)
-        )
+        results[name, defaults] = explain(WhyRequest(one, two, experiment, uncertain=None))
     return results
 
 
@@ -556,7 +554,7 @@ def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
 def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     one, two = quietly("so101/scene"), quietly("so101/scene", defaults="engine")
     for sides in ((one, two), (two, one)):
-        result = explain(WhyRequest(*sides, HOLD, uncertain=None, budget=20))
+        result = explain(WhyRequest(*sides, HOLD, uncertain=None))
         assert result.gap > 0.1
         assert result.brought == 0.0
 
@@ -596,7 +594,7 @@ def test_files_and_settings_of_an_engine_are_explained_together(
     heavy: Any = arm.replace(mass=1.3 * arm.body_mass)
     heavy.save_binary(tmp_path / "heavy.mjb")
     right = quietly(str(tmp_path / "heavy.mjb"), defaults="engine", trust_binary=True)
-    result = explain(WhyRequest(arm, right, HOLD, uncertain=None, budget=40))
+    result = explain(WhyRequest(arm, right, HOLD, uncertain=None))
     assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
 

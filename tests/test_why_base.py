@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,7 +20,9 @@ from .support.legged import mjcf, written
 
 SECONDS, STEP = 0.3, 0.002
 HOLD = replace(scenario("hold"), seconds=SECONDS)
-LEFT, HEAVIER, SOFTER = {}, {"mass": 7.0}, {"mass": 7.0, "kp": 80.0}
+LEFT: dict[str, Any] = {}
+HEAVIER: dict[str, Any] = {"mass": 7.0}
+SOFTER: dict[str, Any] = {"mass": 7.0, "kp": 80.0}
 
 
 def _why(folder: Path, quantity: str | None = None, what: Scenario = HOLD) -> Explanation:
@@ -28,7 +31,7 @@ def _why(folder: Path, quantity: str | None = None, what: Scenario = HOLD) -> Ex
     return explain(WhyRequest(left, right, what, quantity=quantity, uncertain=None))
 
 
-def _raw(ctrl: Array, **changes: float) -> tuple[Array, Array]:
+def _raw(ctrl: Array, **changes: Any) -> tuple[Array, Array]:
     """Return qpos (n + 1, nq) of a run by plain MuJoCo, and its command (nu,)."""
     raw = mujoco.MjModel.from_xml_string(mjcf(**changes))
     data = mujoco.MjData(raw)
@@ -79,7 +82,7 @@ def test_an_axis_of_the_base_is_explained_as_plain_mujoco_has_it(tmp_path, comma
 def test_a_tracking_error_is_explained_as_plain_mujoco_has_it(tmp_path, command):
     result = _why(tmp_path, "tracking error")
 
-    def error(**changes: float) -> float:
+    def error(**changes: Any) -> float:
         positions, ctrl = _raw(command, **changes)
         return float(np.sqrt(np.mean((ctrl - positions[1:, 7:]) ** 2)))
 
@@ -93,7 +96,7 @@ def test_a_tracking_error_is_explained_as_plain_mujoco_has_it(tmp_path, command)
 def test_a_distance_travelled_is_explained_as_plain_mujoco_has_it(tmp_path, command):
     result = _why(tmp_path, "distance travelled")
 
-    def distance(**changes: float) -> float:
+    def distance(**changes: Any) -> float:
         positions, _ = _raw(command, **changes)
         return float(np.hypot(*(positions[-1, :2] - positions[0, :2])))
 
@@ -114,6 +117,6 @@ def test_who_falls_earlier_is_explained(tmp_path):
 
 
 def test_an_outcome_is_no_quantity_of_a_robot_that_is_fixed(tmp_path):
-    models = [sm.load(written(tmp_path, f"{kp}.xml", mjcf("", kp=kp))) for kp in (90.0, 100.0)]
+    left, right = (sm.load(written(tmp_path, f"{kp}.xml", mjcf("", kp=kp))) for kp in (90.0, 100.0))
     with pytest.raises(UnknownNameError):
-        explain(WhyRequest(*models, HOLD, quantity="fell", uncertain=None))
+        explain(WhyRequest(left, right, HOLD, quantity="fell", uncertain=None))

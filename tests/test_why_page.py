@@ -56,7 +56,7 @@ def many(tmp_path_factory: pytest.TempPathFactory) -> Explanation:
     folder = tmp_path_factory.mktemp("many")
     fall = replace(scenario("fall"), seconds=0.4)
     left, right = chain(12, 0.01), chain(12, 0.012)
-    return explained(folder, left, right, scenario=fall, budget=30, uncertain=None, jobs=1)
+    return explained(folder, left, right, scenario=fall, uncertain=None, jobs=1)
 
 
 def assert_one_screen(result: Explanation) -> None:
@@ -212,9 +212,7 @@ def test_a_path_that_is_longer_than_a_line_is_left_out() -> None:
 def test_the_command_has_what_was_asked_of_both_sides() -> None:
     sides = Side("a.xml", options={"timestep": 0.001}), Side("b.xml", "pybullet", "engine")
     run = Request(("walk.py:policy",), sides=sides, every=5, names={"j": "k"}, seed=3)
-    command = typed_command(run)
-    assert command is not None
-    assert command.words == (
+    assert typed_command(run).words == (
         *("statemachine", "compare", "walk.py:policy", "a.xml", "timestep=0.001"),
         *("b.xml@pybullet:engine", "--seed", "3", "--every", "5", "--map", "j=k"),
     )
@@ -225,7 +223,10 @@ def test_a_cause_without_a_value_is_told_by_its_name(gains: Explanation) -> None
     assert page(replace(gains, shares=(share,))).title.startswith("Extra shape of box: 100.0 %")
 
 
-def test_what_nobody_can_type_has_no_command(gains: Explanation) -> None:
-    run = Request((lambda model, data: None,), sides=(Side("a.xml"), Side("b.xml")))  # type: ignore[arg-type]
-    assert typed_command(run) is None
+def test_what_nobody_can_type_is_a_call_of_python(gains: Explanation) -> None:
+    def swing(model: object, data: object) -> None:
+        """Command nothing."""
+
+    run = Request((swing,), sides=(Side("a.xml"), Side("b.xml")))
+    assert typed_command(run, ("--why",)).lines("--why").startswith("lab.why(")
     assert not blocks(page(gains), Code)

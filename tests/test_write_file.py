@@ -127,10 +127,8 @@ def arrays(path: Path) -> dict[str, Any]:
     )
     options = ("timestep", "gravity", "disableflags", "integrator")
     found = {name: np.array(getattr(model, name), float) for name in names}
-    for kind, name in (
-        ("jnt_limited", "jnt_range"),
-        ("actuator_forcelimited", "actuator_forcerange"),
-    ):
+    ranges = ("jnt_limited", "jnt_range"), ("actuator_forcelimited", "actuator_forcerange")
+    for kind, name in (*ranges, ("jnt_actfrclimited", "jnt_actfrcrange")):
         found[name] *= np.array(getattr(model, kind), float)[:, None]  # else it says nothing
     return found | {name: np.array(getattr(model.opt, name)) for name in options}
 

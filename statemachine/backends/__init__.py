@@ -281,11 +281,10 @@ def load(
         check_takes_read_options(backend, takes, read_options)
         early["read_options"] = read_options
     loaded = loader(path, defaults=defaults, **early)
-    vars(loaded).update(read_options=read_options, defaults=defaults)
+    told = deepcopy(options) if takes_options else {}
+    vars(loaded).update(read_options=read_options, defaults=defaults, options=told)
     if options and not takes_options:
         loaded = loaded.replace(**options)
-    elif options:
-        vars(loaded)["options"] = deepcopy(options)
     if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded

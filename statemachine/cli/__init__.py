@@ -22,6 +22,7 @@ from .commands import COMMANDS, FIRST
 from .common import (
     BAD_INPUT,
     FAULT,
+    INTERRUPTED,
     MISSING,
     NO_OUTPUT,
     PROGRAM,
@@ -122,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         with suppress(KeyboardInterrupt):  # a second one
             print(file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:  # the reader of a pipe left (`| head`)
         _let_go_of_output()
         return 141
@@ -136,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             raise_if_interrupted(error)
         except KeyboardInterrupt:  # while something was imported, which made that fail
-            return 130
+            return INTERRUPTED
         return _report_fault(error)
 
 

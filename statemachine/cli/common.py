@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 PROGRAM = "statemachine"
 # Exit codes: the result says no; bad input; an engine is missing; a fault of this program; nowhere
-# to write. The last two are those of sysexits.h.
-SAYS_NO, BAD_INPUT, MISSING, FAULT, NO_OUTPUT = 1, 2, 3, 70, 74
+# to write (these two are those of sysexits.h); Ctrl-C, as a shell has it.
+SAYS_NO, BAD_INPUT, MISSING, FAULT, NO_OUTPUT, INTERRUPTED = 1, 2, 3, 70, 74, 130
 
 
 def complain(error: Exception | str, code: int) -> int:
@@ -44,7 +44,7 @@ def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
     except KeyboardInterrupt:
         if written is not None and written.exists():
             text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
-            raise SystemExit(complain(text, 130)) from None
+            raise SystemExit(complain(text, INTERRUPTED)) from None
         raise
 
 
@@ -122,15 +122,24 @@ def experiments() -> str:
 class TerminalReporter:
     """A `Reporter` that shows a bar of progress and prints each note, on standard error."""
 
-    def stage(self, what: str) -> AbstractContextManager[Callable[[float], None]]:
+    def stage(
+        self, what: str, runs_at_once: int = 0, takes: float | None = None
+    ) -> AbstractContextManager[Callable[[float], None]]:
         """Show a bar for a stage of the work."""
         from ..show.progress import progress
 
-        return progress(what)
+        return progress(what, runs_at_once, takes)
 
     def note(self, text: str) -> None:
         """Print a note in one line."""
         complain(text, 0)
+
+    def so_far(self, page: Page) -> None:
+        """Print a page on standard error: the result alone is for standard output."""
+        from ..show import terminal
+
+        with redirect_stdout(sys.stderr):
+            terminal.show(page)
 
 
 # Options that several commands have.

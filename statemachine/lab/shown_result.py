@@ -62,7 +62,7 @@ class ShownResult(ABC):
         Args:
             details: As of `page`.
         """
-        from ..show.terminal import text_of
+        from ..show.page_text import text_of
 
         return text_of(self.page(details)).strip("\n")
 
@@ -76,7 +76,11 @@ class ShownResult(ABC):
         return self.text()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.page().title}>"
+        page = self.page()
+        text = page.title
+        if page.headline is not None:
+            text = page.headline.lead
+        return f"<{type(self).__name__}: {text}>"
 
     def _repr_html_(self) -> str:
         """Return the page as a notebook shows it, with everything else folded below."""

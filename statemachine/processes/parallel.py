@@ -15,6 +15,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import (
@@ -42,6 +43,7 @@ _TRACKERS = (
     "joblib.externals.loky.backend.resource_tracker",
 )
 _PAYS = 0.1  # [s] of work that a fork takes over; for less it costs more than it saves
+_LOOK = 0.2  # [s] between two looks at whether all is to end
 _LEAST, _LONGEST = 20.0, 50.0  # [s] without a result, or so many times what one takes
 _work: Sequence[Callable[[], Any]] = ()  # of the forks that are made
 
@@ -212,8 +214,16 @@ def forks_for(number: int, seconds: float, jobs: int | None) -> int:
     return max(1, most)
 
 
+def _nothing() -> None:
+    """Do nothing."""
+
+
 def in_forks(
-    work: Sequence[Callable[[], T]], jobs: int, ended: Callable[[], None], seconds: float = 0.0
+    work: Sequence[Callable[[], T]],
+    jobs: int,
+    ended: Callable[[int, T], None],
+    seconds: float = 0.0,
+    meanwhile: Callable[[], None] = _nothing,
 ) -> list[T | None]:
     """Do pieces of work in forks of this process. An interrupt ends them all.
 
@@ -224,8 +234,9 @@ def in_forks(
     Args:
         work: What to call; what it returns can be pickled, and is not None.
         jobs: How many forks there are at once.
-        ended: Called as each piece of work ends.
+        ended: Called as each piece of work ends well, with its number and what it returned.
         seconds: What one takes here, by the clock: the measure of its limit.
+        meanwhile: Called every moment while forks work; what it raises ends them all.
 
     Returns:
         What each returned; None where two forks have ended in it.
@@ -233,20 +244,27 @@ def in_forks(
     global _work  # noqa: PLW0603  (forks find it here, and nothing is pickled)
     _work = work
     limit = max(_LEAST, _LONGEST * seconds)
-    outcomes = _shared(range(len(work)), jobs, ended, limit)
+    outcomes = _shared(range(len(work)), jobs, ended, limit, meanwhile)
     for number, (error, _) in dict(outcomes).items():
         if isinstance(error, BrokenProcessPool):
-            outcomes |= _shared([number], 1, ended, limit)
+            outcomes |= _shared([number], 1, ended, limit, meanwhile)
     results: list[T | None] = []
     for number, call in enumerate(work):
         error, result = outcomes.get(number, (NotImplementedError(), None))
-        well = error is None or isinstance(error, BrokenProcessPool)
-        results.append(result if well else call())
+        if error is not None and not isinstance(error, BrokenProcessPool):
+            meanwhile()
+            result = call()
+            ended(number, result)
+        results.append(result)
     return results
 
 
 def _shared(
-    numbers: Sequence[int], jobs: int, ended: Callable[[], None], limit: float
+    numbers: Sequence[int],
+    jobs: int,
+    ended: Callable[[int, Any], None],
+    limit: float,
+    meanwhile: Callable[[], None],
 ) -> dict[int, tuple[BaseException | None, Any]]:
     """The error or the result of what forks did, by number; until nothing comes for `limit` [s]."""
     pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), settle)
@@ -261,16 +279,20 @@ def _shared(
         return {}
     forks, waiting = list(pool._processes.values()), set(futures)
     outcomes: dict[int, tuple[BaseException | None, Any]] = {}
+    silent_since = time.monotonic()
     try:
         while waiting:
-            done, waiting = wait(waiting, limit, FIRST_COMPLETED)
-            if not done:
-                break
+            done, waiting = wait(waiting, min(_LOOK, limit), FIRST_COMPLETED)
             for future in done:
-                error = future.exception()
-                outcomes[futures[future]] = error, None if error else future.result()
+                number, error = futures[future], future.exception()
+                outcomes[number] = error, None if error else future.result()
                 if not error:
-                    ended()
+                    ended(number, outcomes[number][1])
+            meanwhile()
+            if done:
+                silent_since = time.monotonic()
+            elif time.monotonic() - silent_since > limit:
+                break
     finally:
         for fork in forks:
             fork.kill()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from .blocks import Page
-from .terminal import text_of
+from .page_text import text_of
 
 LINES = 24  # of a terminal, blank ones included
 COLUMNS = 80

@@ -7,45 +7,96 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from .remaining import LONG, RemainingTime, in_words
+
 _PATIENCE = 0.5  # seconds without a bar
-_TRIED, _LONG = 5.0, 20.0  # seconds after which an estimate is made, and one that is said
 _PACE = 0.1  # seconds between two pictures of it
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Callable[[float], None]]:
-    """A function to call with the fraction done; a bar appears if it takes long.
+def progress(
+    what: str, runs_at_once: int = 0, takes: float | None = None
+) -> Iterator[Callable[[float], None]]:
+    """Give a function to call with the fraction done; a bar appears if it takes long.
 
     Nothing of it stays behind. Where standard error is not a terminal, a line tells a long wait.
+    How long it takes is said only where that is known from runs that were measured.
+
+    Args:
+        what: What is done.
+        runs_at_once: How many runs are made side by side, where each call tells that runs have
+            ended; 0 where it does not.
+        takes: How long it takes, from what was measured before [s]; None where that is not known.
     """
-    if not sys.stderr.isatty():
-        yield _estimate(what)
+    wait = _Wait(runs_at_once, takes)
+    if sys.stderr.isatty():
+        with _bar(what, wait) as report:
+            yield report
         return
+    is_said = False
+
+    def tell(fraction: float) -> None:
+        nonlocal is_said
+        wait.ended(fraction)
+        left = wait.seconds
+        if not is_said and left is not None and left > LONG:
+            is_said = True
+            print(f"{what}: {in_words(left)}", file=sys.stderr, flush=True)
+
+    tell(0.0)
+    yield tell
+
+
+class _Wait:
+    """What is known of how long it still takes."""
+
+    def __init__(self, runs_at_once: int, takes: float | None) -> None:
+        self._measured = RemainingTime(runs_at_once) if runs_at_once else None
+        self._takes, self._began = takes, time.monotonic()
+
+    def ended(self, fraction: float) -> None:
+        """Note what is done by now."""
+        if self._measured is not None:
+            self._measured.ended(fraction)
+
+    @property
+    def seconds(self) -> float | None:
+        """How long it still takes [s]; None where that is not known."""
+        if self._takes is not None:
+            return max(0.0, self._takes - (time.monotonic() - self._began))
+        return None if self._measured is None else self._measured.seconds
+
+
+@contextmanager
+def _bar(what: str, wait: _Wait) -> Iterator[Callable[[float], None]]:
+    """Show a bar on the terminal, with the time that remains where that is known and long."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-    from rich.progress import TimeRemainingColumn as Remaining
 
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         TaskProgressColumn(),
-        Remaining(),
+        TextColumn("{task.fields[left]}"),
         console=Console(stderr=True),
         transient=True,
         auto_refresh=False,  # which would take a thread, beside which no process is forked
         redirect_stdout=False,  # while it starts, a lesson may take what its code prints
     )
-    task = bar.add_task(what, total=1.0)
+    task = bar.add_task(what, total=1.0, left="")
     began = time.monotonic()
     started, drawn = False, 0.0
 
     def report(fraction: float) -> None:
         nonlocal started, drawn
+        wait.ended(fraction)
         now = time.monotonic()
         if not started and now - began > _PATIENCE:
             bar.start()
             started = True
-        bar.update(task, completed=fraction)
+        left = wait.seconds
+        words = "" if left is None or left < LONG else in_words(left)
+        bar.update(task, completed=fraction, left=words)
         if started and now - drawn > _PACE:
             bar.refresh()
             drawn = now
@@ -55,18 +106,3 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
     finally:
         if started:
             bar.stop()
-
-
-def _estimate(what: str) -> Callable[[float], None]:
-    """A function to call with the fraction done, which says once how long it may take in all."""
-    began, takes = time.monotonic(), 0.0
-
-    def report(fraction: float) -> None:
-        nonlocal takes
-        now = time.monotonic() - began
-        if not takes and now > _TRIED and fraction:
-            takes = now / fraction
-            if takes > _LONG:
-                print(f"{what}: may take {takes:.0f} s", file=sys.stderr)
-
-    return report

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-_WIDTH_PIPED = 80
+WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
 
@@ -57,15 +57,8 @@ def show(page: Page, footer: str = "", reader: Audience | None = None) -> None:
         reader: Somebody who answers its questions, and is shown a screenful at a time; the
             rest of the page waits for each answer. Without, questions are left out.
     """
-    printer = _Printer(_terminal, reader.read if reader else _print, reader)
+    printer = Printer(_terminal, reader.read if reader else _print, reader)
     printer.page(page, footer)
-
-
-def text_of(page: Page) -> str:
-    """Return a page as `show` prints it where nobody sits: 80 columns wide, without colours."""
-    parts: list[str] = []
-    _Printer(_piped, parts.append).page(page, "")
-    return "".join(parts)
 
 
 def _print(text: str) -> None:
@@ -82,27 +75,11 @@ def _terminal() -> Console:
         highlight=False, emoji=False, markup=False, color_system=None if legacy else "auto"
     )
     piped = not console.is_terminal
-    console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
+    console.width = WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
     return console
 
 
-def _piped() -> Console:
-    """Return what draws a text for wherever it is printed."""
-    from rich.console import Console
-
-    console = Console(
-        highlight=False,
-        emoji=False,
-        markup=False,
-        color_system=None,
-        force_terminal=False,
-        force_jupyter=False,
-    )
-    console.width = _WIDTH_PIPED
-    return console
-
-
-class _Printer:
+class Printer:
     """Prints the blocks of a page in their order, and keeps what became of predictions."""
 
     def __init__(

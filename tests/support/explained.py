@@ -77,9 +77,9 @@ def _swing(time: float) -> tuple[float, float]:
 def _controller(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
     places = [model.actuator_names.index(name) for name in ("shoulder", "elbow")]
 
-    def controller(time: float, _data: sm.Data) -> list[float]:
+    def controller(_model: sm.Model, data: sm.Data) -> list[float]:
         ctrl = [0.0] * model.nu
-        for place, value in zip(places, _swing(time), strict=True):
+        for place, value in zip(places, _swing(data.time), strict=True):
             ctrl[place] = value
         return ctrl
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from .requirements import ROOT
 
-_ESTIMATE = re.compile(r"^.*: may take \d+ s\n", re.MULTILINE)
+_ESTIMATE = re.compile(r"^.*: about [\d.e+]+ (?:s|min) more\n", re.MULTILINE)
 
 
 def without_estimates(stderr: str) -> str:

@@ -158,12 +158,12 @@ def recording(name: str, rounds: int) -> list[Ratio]:
     bare, watched = sm.make_data(model), sm.make_data(model)
     target = np.array(_FLOOR)
 
-    def controller(_time: float, _data: sm.Data) -> np.ndarray:
+    def controller(_model: sm.Model, _data: sm.Data) -> np.ndarray:
         return target
 
     def loop() -> None:
         for _ in range(_LONG):
-            bare.ctrl[:] = controller(bare.time, bare)
+            bare.ctrl[:] = controller(model, bare)
             sm.step(model, bare)
 
     return interleaved(
@@ -428,7 +428,7 @@ def why_in_forks(name: str, rounds: int) -> list[Ratio]:
     hold = scenario("hold")
 
     def explained(jobs: int) -> None:
-        explain(WhyRequest(left, right, hold, seconds=1.0, budget=20, finer=True, jobs=jobs))
+        explain(WhyRequest(left, right, hold, seconds=1.0, finer=True, jobs=jobs))
 
     return interleaved(
         partial(explained, 1),

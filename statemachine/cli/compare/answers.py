@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import EndedEarlyError
-from ..common import TerminalReporter, complain, show
+from ..common import INTERRUPTED, TerminalReporter, complain, show
 from .options import check_options
 from .requests import explain_request_of, request_of, typed
 
@@ -101,17 +101,25 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
 
 
 def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
-    """Explain the gap; of runs that end early, say what there is until then, and no cause."""
+    """Explain the gap; of runs that end early, say what there is until then, and no cause.
+
+    Where a Ctrl-C ends it, what is known by then is shown.
+    """
     from ...lab.questions.requests.causes import answer
     from ...lab.questions.requests.gap import CompareRequest
+    from ...lab.why import InterruptedExplanation
     from ...lab.why import page as why
 
+    interrupted = False
     try:
         result = answer(request, TerminalReporter())
+    except InterruptedExplanation as stop:
+        result, interrupted = stop.result, True
     except EndedEarlyError:
         until_then = CompareRequest(request.run, uncertainty=request.uncertainty)
         return _run_compare(options, until_then)
-    return show(why.page(result, options.details), result, options.json)
+    code = show(why.page(result, options.details), result, options.json)
+    return INTERRUPTED if interrupted else code
 
 
 def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
@@ -119,6 +127,8 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     from ...lab.questions import compare_report, comparison
     from ...lab.questions.requests.gap import answer
     from ...lab.questions.run_files import find_renderer, write_page, write_tests
+    from ...lab.why import InterruptedExplanation
+    from ...lab.why import page as why
 
     reporter = TerminalReporter()
     files = _files_of(options)
@@ -130,7 +140,12 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     result = answer(request, reporter)
     page = comparison.page(result, options.details)
     if files.html is not None:
-        whole = compare_report.whole_page(result, asked, typed(options, request.run), reporter)
+        try:
+            whole = compare_report.whole_page(result, asked, typed(options, request.run), reporter)
+        except InterruptedExplanation as stop:
+            complain(f"stopped: {files.html} was not written", 0)
+            show(why.page(stop.result, options.details), stop.result, options.json)
+            return INTERRUPTED
         line = write_page(files.html, result.run.traces, _shown(request.run), whole)
         print(line, file=sys.stderr)
     if files.junit is not None:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterable, Sequence
 
 from ...errors import BadInputError
-from ...typed_numbers import typed_int
+from ...typed_numbers import typed_float, typed_int
 from ..common import (
     PROGRAM,
     SIDES,
@@ -157,10 +157,10 @@ def _add_why(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument("--finer", action="store_true", help="every difference by its entries")
     group.add_argument(
-        "--budget",
-        type=typed_int,
-        metavar="N",
-        help="how many sets of causes may be run where they interact (200)",
+        "--time-limit",
+        type=typed_float,
+        metavar="S",
+        help="end the search for causes after so many seconds: what is known by then is shown",
     )
     group.add_argument(
         "--write",
@@ -234,7 +234,7 @@ def check_options(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: One does not.
     """
-    _need(options, ("measure", "finer", "budget", "jobs"), ("why",))
+    _need(options, ("measure", "finer", "time_limit", "jobs"), ("why",))
     _need(options, ("quantity",), ("why", "html"))
     _need(options, ("write",), ("why", "models"))
     _exclude(options, "write", ("html",))

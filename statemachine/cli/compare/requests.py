@@ -86,7 +86,7 @@ def explain_request_of(options: argparse.Namespace, run: Request) -> ExplainRequ
         quantity=options.quantity,
         measure=options.measure or "worst",
         finer=options.finer,
-        budget=200 if options.budget is None else options.budget,
+        time_limit=options.time_limit,
         uncertainty=_uncertainty(options),
         jobs=options.jobs,
         write=options.write,

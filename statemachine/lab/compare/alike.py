@@ -122,7 +122,7 @@ def for_left(trace: Trace, model: Model, request: Request) -> Trace:
         led = {name: trace[name] for name in MOCAP if name in trace}
         return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, led)
     try:
-        file, _ = model_file(header, request.menagerie, request.what[0])
+        file, _ = model_file(header, request.menagerie, request.trace_file(0))
         matched = match_models(load(file), model, request.names)
     except StateMachineError as error:
         raise TraceError(
@@ -199,8 +199,8 @@ def controller_for_right(
         right_start: (nu,) ctrl of the right, for the actuators that have no counterpart.
     """
 
-    def translate(time: float, data: Data) -> Array | None:
-        ctrl = controller(time, data)
+    def translate(model: Model, data: Data) -> Array | None:
+        ctrl = controller(model, data)
         if ctrl is None:
             return None
         return matched.moved("ctrl", np.asarray(ctrl, np.float64), right_start)

@@ -75,6 +75,8 @@ def load_sides(
 
 def _leaves_base_open(side: Side, options: Mapping[str, OptionValue]) -> bool:
     """Tell whether neither a side nor its file says whether its base floats."""
+    if side.loaded is not None:
+        return False
     if "base" in options or "base" in side.options or side.path.suffix.lower() != ".urdf":
         return False
     try:

@@ -157,13 +157,13 @@ def chaos_floor(
     if not sides:
         raise BadInputError("the chaos floor runs a side again, and both are recorded runs")
     work: list[Callable[[], _Departure]] = []
-    for rerun, trace, rows in zip(reruns, (left, right), (common.left, common.right), strict=True):
-        if rerun is not None:
-            draws = [
-                partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
-                for k in range(runs)
-            ]
-            work += [partial(_departure, draw, trace, comparison, rows) for draw in draws]
+    traces, rows = (left, right), (common.left, common.right)
+    for k in range(runs):
+        # The sides in turn, so that what was done says how long the rest takes.
+        for side, rerun in enumerate(reruns):
+            if rerun is not None:
+                draw = partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
+                work.append(partial(_departure, draw, traces[side], comparison, rows[side]))
     gaps = _gaps_of(comparison)
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
     ended = 0
@@ -229,7 +229,7 @@ def _departures(
     progress(done / len(work))
     yield first
 
-    def ran() -> None:
+    def ran(_number: int, _departure: _Departure) -> None:
         nonlocal done
         done += 1
         progress(done / len(work))
@@ -245,9 +245,10 @@ def _departures(
                 raise EngineError("a run for the chaos floor ended its process twice")
             yield departure
         return
-    for call in rest:
-        yield call()
-        ran()
+    for number, call in enumerate(rest):
+        departure = call()
+        yield departure
+        ran(number, departure)
 
 
 def _departure(

@@ -20,7 +20,6 @@ from ...interface import Array
 from ...measures import QUANTITIES, common_moments
 from ...show.blocks import only_on_pages
 from ..recordings import Trace
-from ..runs.drive import Progress, silent
 from .labels import labels_of
 from .motion import SEEN, MotionExtent, motion_of
 from .series import Series, default_tip, series
@@ -188,42 +187,34 @@ class Convergence:
         return "discretisation" if verdicts <= {"rounding", "discretisation"} else "gap"
 
 
-def convergence(
-    run: Callable[[int], tuple[Trace, Trace]],
-    *,
-    progress: Progress = silent,
-) -> Convergence:
+def convergence(run: Callable[[int], tuple[Trace, Trace]]) -> Convergence:
     """Run two sides with their steps as given, halved and quartered; then finer, while unclear.
 
     Args:
         run: Gives the traces of both sides, with rows as far apart as ever and so many times as
             many engine steps between them (`Model.replace(substeps=…)`).
-        progress: Told the fraction that is done.
 
     Raises:
         EndedEarlyError: A run ends before its time.
         TraceError: The sides have too few moments in common.
     """
-    runs = [_run_finer(run, finer, progress) for finer in FINER[:_AT_LEAST]]
+    runs = [_run_finer(run, finer) for finer in FINER[:_AT_LEAST]]
     result = _result(runs)
     for finer in FINER[_AT_LEAST:]:
         if not result.unclear:
             break
-        runs.append(_run_finer(run, finer, progress))
+        runs.append(_run_finer(run, finer))
         result = _result(runs)
     return result
 
 
-def _run_finer(
-    run: Callable[[int], tuple[Trace, Trace]], finer: int, progress: Progress
-) -> tuple[Trace, Trace]:
+def _run_finer(run: Callable[[int], tuple[Trace, Trace]], finer: int) -> tuple[Trace, Trace]:
     """Run both sides with steps so many times finer.
 
     Raises:
         EndedEarlyError: A run ends before its time.
     """
     traces = run(finer)
-    progress(finer / FINER[-1])
     for trace in traces:
         if trace.header.ended:
             raise EndedEarlyError(

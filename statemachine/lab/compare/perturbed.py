@@ -207,8 +207,8 @@ def _nudged(values: Array, draw: np.random.Generator) -> Array:
 def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
     """A controller whose commands differ by rounding, and what is commanded without one."""
 
-    def nudging(time: float, data: Data) -> Array | None:
-        ctrl = None if controller is None else controller(time, data)
+    def nudging(model: Model, data: Data) -> Array | None:
+        ctrl = None if controller is None else controller(model, data)
         return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw)
 
     # Once: a ctrl that stays as it is must not wander.

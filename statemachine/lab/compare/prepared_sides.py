@@ -18,7 +18,6 @@ from ..recordings import (
     Rerun,
     SideStart,
     beginning_with,
-    read,
     start_of,
 )
 from ..runs.drive import check_length, steps_in
@@ -70,7 +69,7 @@ def prepare_sides(request: Request) -> PreparedSides:
     Raises:
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
-    trace = read(request.what[0]) if request.is_traces else None
+    trace = request.traces()[0] if request.is_traces else None
     scenario = recorded_scenario(trace) if trace else request.scenario()
     sides = request.both_sides(scenario.model)
     options = {**scenario.options, **request.options}
@@ -88,9 +87,8 @@ def prepare_sides(request: Request) -> PreparedSides:
         trace = for_left(trace, left, request)
         scenario, seed = recorded_scenario(trace), trace.header.provenance.seed
         left_start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
-        notes.append(
-            f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
-        )
+        played = request.experiment
+        notes.append(f"the ctrl of {played} was played on both sides, from the state it starts in")
     else:
         scenario = scenario.on(left)
         seed = request.seed if scenario.seeded else None

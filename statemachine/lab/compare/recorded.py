@@ -9,7 +9,7 @@ from ...backends import load, parse_backend
 from ...errors import BadInputError, StateMachineError
 from ...interface import Model
 from ...models import AnyPath
-from ..recordings import Header, Trace, commands_of, model_file, read
+from ..recordings import Header, Trace, commands_of, model_file
 from ..runs.scenarios import Scenario
 from .sides import Request, Side
 
@@ -41,7 +41,7 @@ def recorded_sides(
         BadInputError: An option is of a run.
         ModelFileError: The model of a trace is not here.
     """
-    traces = tuple(read(word) for word in request.what)
+    traces = tuple(request.traces())
     refuse_of_run(request)
     sides = request.sides
     if not sides:
@@ -76,7 +76,7 @@ def side_of_trace(request: Request, place: int, trace: Trace) -> Side:
     defaults = "engine" if header.defaults == "engine" else "model"
     if request.model:
         return Side(request.model, header.backend, defaults, options, request.menagerie)
-    file, _ = model_file(header, request.menagerie, request.what[place])
+    file, _ = model_file(header, request.menagerie, request.trace_file(place))
     return Side(str(file), header.backend, defaults, options)
 
 

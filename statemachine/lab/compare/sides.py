@@ -15,19 +15,23 @@ import numpy as np
 
 from ...backends import BackendChoice, load_to_run, parse_backend
 from ...engines import room
-from ...errors import BadInputError, shown
+from ...errors import BadInputError, TraceError, shown
 from ...installed import DEFAULT, PAIR
 from ...interface import Model
 from ...interface.checks import as_count
 from ...interface.options import OptionValue
+from ...interface.read_options import told
 from ...interface.records import READ_OPTIONS, FreeBase
 from ...measures.text import listed
 from ...models import resolve
+from ..recordings import Trace, read
 from ..recordings.files import SUFFIXES
-from ..runs.controllers import function_scenario, is_function
+from ..runs.controllers import Function, function_place, function_scenario, is_function
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
 from .matching import match_models
+
+What = str | Function | Trace  # that is run on two sides, or played again
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Side:
             balance_inertia, meshes.
         menagerie: A menagerie folder to look the name up in.
         taken: Parts of another side's file that stand in place of its own.
+        loaded: The Model that all of the above is of, where somebody loaded it, and perhaps changed
+            it since; None where it is still to be loaded.
     """
 
     model: str
@@ -50,6 +56,17 @@ class Side:
     options: Mapping[str, OptionValue] = field(default_factory=dict)
     menagerie: str | None = None
     taken: TakenParts | None = None
+    loaded: Model | None = field(default=None, repr=False, metadata={"json": False})
+
+    @classmethod
+    def of_model(cls, model: Model) -> Side:
+        """Return a side that is a Model as it is."""
+        options = {**told(model.read_options), **model.options}
+        return cls(str(model.path), model.backend, model.defaults, options, loaded=model)
+
+    def to_be_loaded(self) -> Side:
+        """Return the same side without the Model that was loaded of it."""
+        return replace(self, loaded=None)
 
     def chosen_backend(self) -> BackendChoice:
         """Return the engine and its defaults, as one types them behind --backend."""
@@ -58,6 +75,8 @@ class Side:
     @property
     def path(self) -> Path:
         """Its file; raises as `models.resolve` does."""
+        if self.loaded is not None:
+            return self.loaded.path
         return resolve(self.model, self.menagerie)
 
     @property
@@ -79,6 +98,8 @@ class Side:
         wanted: dict[str, OptionValue | FreeBase] = {**options, **self.options}
         if base is not None:
             wanted.setdefault("base", base)
+        if self.loaded is not None:
+            return self._from_loaded(self.loaded, wanted)
         load_it = partial(self.chosen_backend().load_to_run, self.model, menagerie=self.menagerie)
         if self.taken is None:
             return load_it(**wanted)
@@ -86,9 +107,22 @@ class Side:
         model = self.taken.given_to(load_it(**read))
         return model.replace(**wanted) if wanted else model
 
+    def _from_loaded(self, model: Model, wanted: dict[str, OptionValue | FreeBase]) -> Model:
+        """Return a loaded Model with the options that it does not have yet."""
+        if self.taken is not None:
+            model = self.taken.given_to(model)  # all else is as its file has it
+        else:
+            wanted = {name: wanted[name] for name in wanted if not _has(model, name, wanted[name])}
+        return model.replace(**wanted) if wanted else model
+
     def taking(self, parts: Sequence[str], of: Side, names: Mapping[str, str]) -> Side:
         """Itself with some parts of another side's file; `names` as of `TakenParts`."""
         return replace(self, taken=TakenParts(tuple(parts), of, names)) if parts else self
+
+
+def _has(model: Model, name: str, value: OptionValue | FreeBase) -> bool:
+    """Tell whether a Model was told a value of an option already."""
+    return name in model.options and np.array_equal(model.options[name], np.asarray(value))
 
 
 @dataclass(frozen=True)
@@ -161,7 +195,8 @@ class Request:
     """What to compare.
 
     Attributes:
-        what: Name of an experiment, FILE.py:FUNCTION, or one or two files of traces.
+        what: One experiment by name, one "FILE.py:FUNCTION" or function (model, data) itself, or
+            one or two traces or their files.
         backends: The two backends, as `parse_backend` reads them; of one trace the one that is
             not its own is taken.
         model: Instead of the experiment's own, or a trace's.
@@ -176,7 +211,7 @@ class Request:
         keyframe: Where it starts; None for the experiment's own, and a FUNCTION's default state.
     """
 
-    what: Sequence[str]
+    what: Sequence[What]
     backends: tuple[str, str] = PAIR
     model: str | None = None
     menagerie: str | None = None
@@ -195,13 +230,26 @@ class Request:
 
     @property
     def is_traces(self) -> bool:
-        """Whether files were named, not an experiment."""
-        return any(is_trace(word) for word in self.what)
+        """Whether traces were named, not an experiment."""
+        return any(isinstance(what, Trace) or is_trace(what) for what in self.what)
+
+    def traces(self) -> list[Trace]:
+        """Return the traces, read from their files.
+
+        Raises:
+            TraceError: A file is not a trace.
+        """
+        return [_trace_of(what) for what in self.what]
+
+    def trace_file(self, place: int) -> str | None:
+        """Return the file of a trace, by its place; None of one that was handed over itself."""
+        what = self.what[place]
+        return what if isinstance(what, str) else None
 
     @property
     def words(self) -> list[str]:
         """What is run, and the model if one is said, as one types them, without folders."""
-        words = [Path(word).name for word in self.what]
+        words = [word_of(what) for what in self.what]
         if self.model:
             words.append(_typed(self.model))
         return words
@@ -209,7 +257,13 @@ class Request:
     @property
     def experiment(self) -> str:
         """What is run, in a word: an experiment, a function, or the file of the first trace."""
-        return Path(self.what[0]).name
+        return word_of(self.what[0])
+
+    @property
+    def is_typed(self) -> bool:
+        """Whether all of it can be typed, and nothing is a function, a trace or a Model itself."""
+        words = all(isinstance(what, str) for what in self.what)
+        return words and all(side.loaded is None for side in self.sides)
 
     @property
     def labels(self) -> tuple[str, str]:
@@ -255,10 +309,12 @@ class Request:
                 "compare takes one experiment: it runs on both engines; two traces are files"
             )
         (what,) = self.what
-        if not is_function(what):
-            known = scenario(what)
-            return replace(known, keyframe=self.keyframe or known.keyframe)
-        return function_scenario(what, self.every, self.keyframe)
+        if isinstance(what, Trace):
+            raise BadInputError("a trace is a run that was made: name an experiment or a function")
+        if not isinstance(what, str) or is_function(what):
+            return function_scenario(what, self.every, self.keyframe)
+        known = scenario(what)
+        return replace(known, keyframe=self.keyframe or known.keyframe)
 
 
 def _typed(model: str) -> str:
@@ -266,6 +322,28 @@ def _typed(model: str) -> str:
     return Path(model).name if Path(model).is_file() else model
 
 
-def is_trace(word: str) -> bool:
-    """Whether a word names a trace, by its suffix."""
-    return Path(word).suffix.lower() in SUFFIXES
+def is_trace(what: str | Function) -> bool:
+    """Tell whether a word names a trace, by its suffix; a function does not."""
+    return isinstance(what, str) and Path(what).suffix.lower() in SUFFIXES
+
+
+def word_of(what: What) -> str:
+    """Return what is run, in a word: as one types it without folders; else its name."""
+    if isinstance(what, str):
+        return Path(what).name
+    if isinstance(what, Trace):
+        return what.header.experiment or "a trace"
+    return function_place(what)[1]
+
+
+def _trace_of(what: What) -> Trace:
+    """Return a trace, read from its file if that is named.
+
+    Raises:
+        TraceError: The file is not a trace, or it is a function.
+    """
+    if isinstance(what, Trace):
+        return Trace(replace(what.header, recorded=True), what.columns)
+    if isinstance(what, str):
+        return read(what)
+    raise TraceError(f"{word_of(what)} is a function, and the other is a trace: two traces, or one")

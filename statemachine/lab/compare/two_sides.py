@@ -16,7 +16,6 @@ from ..recordings import (
     Rerun,
     Trace,
     play,
-    read,
     replayed,
     rerun_of,
     shipped,
@@ -145,10 +144,15 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
 def _check_what(request: Request) -> None:
     """Check that what is run is no file that cannot be run, and that there are such backends."""
     what = request.what[0]
-    if what not in SCENARIOS and not is_function(what) and Path(what).is_file():
+    if isinstance(what, str) and _is_other_file(what):
         raise BadInputError(f"{what!r} is not a trace: a trace ends in .npz or .parquet")
     for word in request.backends:
         parse_backend(word)
+
+
+def _is_other_file(word: str) -> bool:
+    """Tell whether a word names a file that is neither an experiment nor a function."""
+    return word not in SCENARIOS and not is_function(word) and Path(word).is_file()
 
 
 def _run_both(
@@ -201,24 +205,27 @@ def _loop(request: Request, left: Trace, right: Trace, matched: Matched | None) 
 
 def _opened(request: Request, progress: Progress) -> SidesRun:
     """Two traces; or one, and what comes of its ctrl on the other engine."""
-    traces = [read(word) for word in request.what]
+    traces = request.traces()
     both = len(traces) == 2
     refuse_of_run(request)
     if both and request.options:
         raise of_a_run(next(iter(request.options)))
     if both:
         return SidesRun(traces[0], traces[1], traces[1])
-    side, what = other_side(request, side_of_trace(request, 0, traces[0])), request.what[0]
-    backend = side.chosen_backend()
+    side = other_side(request, side_of_trace(request, 0, traces[0]))
+    backend, file = side.chosen_backend(), request.trace_file(0)
+    made_by = ""
+    if file is not None:
+        made_by = command(["statemachine", "trace", "play", file, "--backend", str(backend)])
     played = play(
         traces[0],
         side.load(),
-        command=command(["statemachine", "trace", "play", what, "--backend", str(backend)]),
+        command=made_by,
         defaults=side.defaults,
         options=dict(side.options),
         progress=progress,
     )
-    said = f"the ctrl of {what} was played on {backend}, from the state it starts in"
+    said = f"the ctrl of {request.experiment} was played on {backend}, from the state it starts in"
     return SidesRun(traces[0], played, played, said=(said,))
 
 
@@ -247,7 +254,9 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
 
 def _command(request: Request, backend: BackendChoice) -> str:
     """The command that records one side of an experiment; "" where it cannot say that."""
-    if request.sides or request.every > 1 or {*request.options} - {"timestep"}:
+    if request.sides or request.every > 1 or not request.is_typed:
+        return ""
+    if {*request.options} - {"timestep"}:
         return ""
     words = ["statemachine", "trace", "record", *request.words, "--backend", str(backend)]
     folder = "DIR" if request.menagerie else None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ...installed import DEFAULT, PAIR
 from .labels import typed_option
+from .python_call import python_call
 from .sides import Request, Side
 
 _WIDTH = 74  # of a line of a command, which is set in
@@ -20,10 +21,12 @@ class TypedCommand:
     Attributes:
         words: As they are typed, each by itself.
         question: The words that ask what was asked, such as "--why".
+        run: What is asked by a call of Python, where it cannot be typed; None where it can.
     """
 
     words: tuple[str, ...]
     question: tuple[str, ...] = ()
+    run: Request | None = None
 
     def lines(self, *further: str) -> str:
         """Return the command as one types it, continued on further lines where it is long.
@@ -34,6 +37,8 @@ class TypedCommand:
         Args:
             *further: Words that follow: the question, and its options.
         """
+        if self.run is not None:
+            return python_call(self.run, *further)
         typed = [shlex.quote(word) for word in self.words]
         if max(map(len, typed)) > _WIDTH:
             typed = [*typed[:2], "..."]
@@ -48,19 +53,16 @@ class TypedCommand:
         return "\n".join([*lines, line])
 
 
-def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand | None:
+def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand:
     """Return the command that runs something on two sides, or opens two traces.
-
-    None where a function or a Model was handed over, which nobody can type.
 
     Args:
         run: What is run.
         question: The words that ask what was asked.
     """
-    named = (*run.what, *(side.model for side in run.sides))
-    if not all(isinstance(word, str) for word in named):
-        return None
-    words = ["statemachine", "compare", *run.what]
+    if not run.is_typed:
+        return TypedCommand((), tuple(question), run)
+    words = ["statemachine", "compare", *map(str, run.what)]
     if run.model:
         words.append(run.model)
     for side in run.sides:

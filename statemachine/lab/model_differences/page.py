@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ...measures.text import after, capital, command, grouped, reading, rounded, sentence
+from ...measures.text import after, capital, grouped, reading, rounded, sentence
 from ...measures.text import versions_of as versions_text
 from ...show.blocks import Page, Table
 from ...show.first_screen import first_screen
 from ...show.templates import PageContent, render
 from ..compare.matched import RenamedPair
+from ..compare.typed_command import TypedCommand
 from .faults_page import faults_table, reasons_of
 from .records import FileSide, ListedDifference, ModelsComparison, QuantityAgreement
 from .subject_page import (
@@ -187,9 +188,10 @@ class ModelsPage(PageContent):
         """What was taken for one although the names differ, a row for each pair."""
         rows: list[tuple[str, ...]] = []
         for pair in self.result.renamed:
-            rows.append((pair.kind, pair.left, pair.right, pair.shared, pair.suggestion))
-        headers = ("kind", "left", "right", "they share", "says otherwise")
-        return Table(headers, rows, "Taken for one", words=frozenset(range(5)))
+            rows.append((pair.kind, pair.left, pair.right, pair.suggestion))
+        title = "Taken for one by their place; an actuator by its joint"
+        headers = ("kind", "left", "right", "says otherwise")
+        return Table(headers, rows, title, words=frozenset(range(4)))
 
     @property
     def equal(self) -> Table:
@@ -267,7 +269,7 @@ def _next_command(result: ModelsComparison) -> str:
             words.append("balance_inertia=on")
         if any(fault.used is None for fault in faults):
             words.append("meshes=off")
-    return command([*words, "--why"])
+    return TypedCommand(tuple(words)).lines("--why")
 
 
 def _files(result: ModelsComparison) -> tuple[str, str]:

@@ -14,9 +14,9 @@ from ...show.templates import PageContent, render
 from ..compare.convergence import FINER, Convergence, GapLimit, GapState, TouchState
 from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
+from ..compare.typed_command import typed_command
 from .compared_names import name_of
 from .requests.converge import ConvergeResult
-from .typed_command import command_of
 
 _FINER = ("at h", *(f"h/{finer}" for finer in FINER[1:]))
 _WORST_FIRST = ("stays", "in part", "unclear", "discretisation")
@@ -163,7 +163,7 @@ def page(result: ConvergeResult, details: bool = False) -> Page:
         result: What becomes of each gap.
         details: Whether every gap is shown, and those before the first touch.
     """
-    gaps = _worst_first(result.limits.whole)
+    gaps = _worst_first(result.whole)
     if details:
         return _page(result, (), details=True)
     return first_screen(lambda rows: _page(result, gaps[:rows]), len(gaps))
@@ -172,16 +172,15 @@ def page(result: ConvergeResult, details: bool = False) -> Page:
 def _page(result: ConvergeResult, worst: Sequence[GapLimit], details: bool = False) -> Page:
     """Return the page with some of the gaps; with details two tables have all of them."""
     run = result.request.run
-    limits = result.limits
-    next_step = _next_step(limits, run)
-    more = 0 if details else len(_worst_first(limits.whole)) - len(worst)
+    next_step = _next_step(result, run)
+    more = 0 if details else len(_worst_first(result.whole)) - len(worst)
     content = ConvergencePage(
         experiment=run.experiment,
-        limits=limits,
+        limits=result,
         worst=_limits_table(worst, "", finest=1),
         more=more,
         next_step=next_step,
-        next_command=_next_command(next_step, limits, run),
+        next_command=_next_command(next_step, result, run),
         details=details,
     )
     return render(content)
@@ -254,15 +253,16 @@ def _next_command(next_step: NextStep, limits: Convergence, run: Request) -> str
     """Return what to type next; "" for nothing."""
     match next_step:
         case "why" if QUANTITIES[limits.lead.kind].own:
-            return command_of(run, "--why", "--quantity", name_of(limits.lead.name))
+            return typed_command(run).lines("--why", "--quantity", name_of(limits.lead.name))
         case "why":
-            return command_of(run, "--why")
+            return typed_command(run).lines("--why")
         case "smaller steps":
-            return command_of(_with_finer_steps(run, limits.steps), "--converge")
+            return typed_command(_with_finer_steps(run, limits.steps)).lines("--converge")
         case "finer":
-            return command_of(_with_finer_steps(run, limits.steps))
+            return typed_command(_with_finer_steps(run, limits.steps)).lines()
         case "another experiment":
-            return command_of(replace(run, what=(_OTHER_EXPERIMENT,), seconds=None))
+            other = replace(run, what=(_OTHER_EXPERIMENT,), every=1, seconds=None)
+            return typed_command(other).lines()
     return ""
 
 

@@ -102,7 +102,8 @@ def _instead(request: Request, purpose: Purpose, experiment: str) -> NextCommand
 def _asking(request: Request, purpose: Purpose, *question: str) -> NextCommand:
     """Return the command of a comparison with a question behind it."""
     command = typed_command(request)
+    text = command.lines(*question)
+    if not request.is_typed:
+        return NextCommand(purpose, text, text)
     program, name, *_ = command.words
-    return NextCommand(
-        purpose, command.lines(*question), TypedCommand((program, name, "...")).lines(*question)
-    )
+    return NextCommand(purpose, text, TypedCommand((program, name, "...")).lines(*question))

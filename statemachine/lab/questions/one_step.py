@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from ...measures.text import NONE, percent, quantity, sentence
 from ...show.blocks import Page, Table
@@ -12,9 +11,9 @@ from ...show.first_screen import first_screen
 from ...show.templates import PageContent, render
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
+from ..compare.typed_command import typed_command
 from .compared_names import moment
 from .requests.one_step import OneStepResult
-from .typed_command import command_of
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ def page(result: OneStepResult, details: bool = False) -> Page:
         result: What one step gives on each side.
         details: Whether every stage, its tolerance and the moments that stand out are shown.
     """
-    differing = result.steps.differing
+    differing = result.differing
 
     if details:
         return _page(result, (), details=True)
@@ -123,15 +122,17 @@ def page(result: OneStepResult, details: bool = False) -> Page:
 def _page(result: OneStepResult, worst: Sequence[StageGap], details: bool = False) -> Page:
     """Return the page with some of the stages that differ; with details a table has all of them."""
     run = result.request.run
-    question: tuple[str, ...] = () if result.steps.first is None else ("--why",)
+    left, right = run.labels
+    question: tuple[str, ...] = () if result.first is None else ("--why",)
+    more = 0 if details else len(result.differing) - len(worst)
     content = OneStepPage(
-        experiment=Path(run.what[0]).name,
-        left=result.labels[0],
-        right=result.labels[1],
-        steps=result.steps,
+        experiment=run.experiment,
+        left=left,
+        right=right,
+        steps=result,
         worst=_worst_table(worst),
-        more=0 if details else len(result.steps.differing) - len(worst),
-        next_command=command_of(run, *question),
+        more=more,
+        next_command=typed_command(run).lines(*question),
         details=details,
     )
     return render(content)

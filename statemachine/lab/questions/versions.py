@@ -15,10 +15,10 @@ from ...show.templates import PageContent, render
 from ..compare import Agreement
 from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
+from ..compare.typed_command import typed_command
 from .compared_names import name_of
 from .finding import leading
 from .requests.versions import ReleasePair, VersionsResult
-from .typed_command import command_of
 
 VersionsState = Literal["differs", "nothing moved", "agrees"]
 
@@ -205,7 +205,7 @@ def _page(result: VersionsResult, pairs: Sequence[ReleasePair], details: bool = 
     """Return the page with a row for each of some pairs."""
     run = result.request.run
     changed = [pair for pair in _worst_first(result.pairs) if pair.is_changed]
-    commands = [command_of(_on_releases(run, pair), "--why") for pair in changed]
+    commands = [typed_command(_on_releases(run, pair)).lines("--why") for pair in changed]
     hidden = [pair for pair in result.pairs if pair not in pairs]
     more_changed = sum(pair.is_changed for pair in hidden)
     content = VersionsPage(

@@ -21,6 +21,7 @@ from ...interface.checks import HUGE
 from ...interface.options import OptionValue
 from ...interface.read_options import told
 from ...interface.records import Arrays, Defaults
+from ..runs.controllers import check_controller
 from ..runs.drive import Controller, Progress, drive, part_of, silent, steps_in
 from ..runs.provenance import provenance
 from ..runs.robot import is_servo, warn_of_start
@@ -101,7 +102,7 @@ def record(
 
     Args:
         model: On any backend.
-        controller: Called before each step as f(time, data); what it returns is the ctrl
+        controller: Called before each step as f(model, data); what it returns is the ctrl
             (nu,) of that step, None leaves ctrl alone. Without one nobody writes ctrl.
         seconds: Simulated time.
         start: Where to start; the default state where nothing is said.
@@ -115,9 +116,12 @@ def record(
         the rows until then, and `header.ended` says why.
 
     Raises:
-        BadInputError: The controller gave something that is not ctrl, or `seconds` is not a time.
+        BadInputError: The controller takes something else, or gave something that is not ctrl, or
+            `seconds` is not a time.
         EngineError: The repetition did not end in the same bits.
     """
+    if controller is not None:
+        check_controller(controller)
     total = steps_in(model, seconds)
     share = 0.3 if derive else 1.0
     with make_data(model) as data:

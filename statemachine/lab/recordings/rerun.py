@@ -258,10 +258,10 @@ def commands_of(trace: Trace) -> Controller:
     times = trace.time - start - 1e-6 * trace.timestep
     began: list[float] = []
 
-    def controller(time: float, data: Data) -> Array:
+    def controller(_model: Model, data: Data) -> Array:
         if not began:
-            began.append(time)
-        row = int(np.searchsorted(times, time - began[0], side="right")) - 1
+            began.append(data.time)
+        row = int(np.searchsorted(times, data.time - began[0], side="right")) - 1
         row = max(0, min(row, len(commands) - 1))
         for name in led:
             getattr(data, name)[:] = trace[name][row]
@@ -274,9 +274,9 @@ def beginning_with(first: Callable[[Data], Array], controller: Controller) -> Co
     """Return a controller that begins with some ctrl (nu,), where it gives none of its own."""
     begun = False
 
-    def beginning(time: float, data: Data) -> Any:
+    def beginning(model: Model, data: Data) -> Any:
         nonlocal begun
-        ctrl = controller(time, data)
+        ctrl = controller(model, data)
         if ctrl is None and not begun:
             ctrl = first(data)
         begun = True

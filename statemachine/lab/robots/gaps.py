@@ -42,7 +42,7 @@ def commands(model: Model, steps: int, seed: int) -> Array:
 def in_order(orders: Array) -> Controller:
     """The controller that gives each row of `orders` (n, nu) in turn."""
     rows = iter(orders)
-    return lambda _time, _data: next(rows)
+    return lambda _model, _data: next(rows)
 
 
 def keyframe_of(model: Model) -> int | None:

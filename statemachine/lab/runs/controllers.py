@@ -97,9 +97,11 @@ Function = Callable[..., Any]
 _TAKES = ("model", "data")  # by position
 
 
-def is_function(spec: str | Function) -> bool:
+def is_function(spec: object) -> bool:
     """Tell whether something is a function, or a word FILE.py or FILE.py:NAME."""
-    return callable(spec) or Path(_place(spec)[0]).suffix == ".py"
+    if isinstance(spec, str):
+        return Path(_place(spec)[0]).suffix == ".py"
+    return callable(spec)
 
 
 def function_scenario(
@@ -133,14 +135,14 @@ def function_scenario(
 
     imported()  # that it fails is said before anything is loaded
 
-    def controller_of(model: Model, _seed: int) -> Controller:
+    def controller_of(_model: Model, _seed: int) -> Controller:
         function = imported()
         numbers = itertools.count()
 
-        def controller(time: float, data: Data) -> Any:
+        def controller(model: Model, data: Data) -> Any:
             if next(numbers) % every:
                 return None
-            with _errors_of(path, time):
+            with _errors_of(path, name, data.time):
                 ctrl = function(model, data, **given)
                 return None if ctrl is None else as_vector(ctrl, (model.nu,), "ctrl")
 
@@ -218,16 +220,33 @@ def _check_takes(function: Function, name: str, path: Path, parameters: Mapping[
     takes, _ = misfit(function, *_TAKES, **parameters)
     if takes:
         called_with = ", ".join((*_TAKES, *parameters))
+        place = f" of {path.name}" if path.suffix == ".py" else ""
         raise BadInputError(
-            f"{name} of {path.name} takes {takes}, and is called with ({called_with})"
+            f"{name}{place} takes {takes}, and a controller is called with ({called_with}): "
+            f"write def {_def_name(name)}({called_with}), which returns ctrl (nu,) or None"
         )
+
+
+def check_controller(function: Function) -> None:
+    """Check that a function can be called with a Model and a Data.
+
+    Raises:
+        BadInputError: It takes something else; the message shows what to write.
+    """
+    path, name = function_place(function)
+    _check_takes(function, name, path, {})
+
+
+def _def_name(name: str) -> str:
+    """Return the name of a function as one writes it behind def; a lambda has none."""
+    return name if name.isidentifier() else "controller"
 
 
 def _function(path: Path, name: str) -> Function:
     """A function of a file, which is run for it."""
     if path.suffix != ".py" or not path.is_file():
         raise _missing(path)
-    with _errors_of(path):
+    with _errors_of(path, name):
         module = load_module(f"controller_{path.stem}", path)
     function = getattr(module, name, None)
     if not callable(function):
@@ -250,15 +269,22 @@ def _missing(path: Path) -> BadInputError:
 
 
 @contextmanager
-def _errors_of(path: Path, time: float | None = None) -> Iterator[None]:
-    """Run what is in a file, its folder among those of Python; an error is one line about it."""
+def _errors_of(path: Path, name: str, time: float | None = None) -> Iterator[None]:
+    """Run what is in a file, its folder among those of Python; an error is one line about it.
+
+    Args:
+        path: The file; what was written into a notebook has none that is there.
+        name: Of the function.
+        time: When it is called [s]; None where the file is only run.
+    """
     folder = str(path.parent.absolute())
     sys.path.insert(0, folder)  # as when the file is run
     try:
         yield
     except (Exception, SystemExit) as error:
         place, line, _ = line_of(error, path.absolute())
-        where = place.name + (f", line {line}" if line else "")
+        where = place.name if place.is_file() else name
+        where += f", line {line}" if line else ""
         when = "" if time is None else f", at {time:.3f} s"
         raise BadInputError(f"{where}{when}: {said(error)}") from error
     finally:

@@ -12,7 +12,7 @@ from ...errors import BadInputError, DivergedError
 from ...interface import Data, Model, make_data, step
 
 Progress = Callable[[float], None]  # told the fraction that is done
-Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it
+Controller = Callable[[Model, Data], Any]  # (model, data) -> ctrl (nu,), or None to leave it
 
 
 def silent(_fraction: float) -> None:
@@ -76,7 +76,8 @@ def drive(
     Args:
         model: The Model of the Data.
         data: Advanced in place.
-        controller: Asked for ctrl (nu,) before each step; None where nobody writes ctrl.
+        controller: Called before each step as f(model, data), for ctrl (nu,) or None to leave it;
+            None where nobody writes ctrl.
         steps: Number of timesteps.
         once_more: Whether the controller is asked after the last step, too.
 
@@ -93,7 +94,7 @@ def drive(
     for k in range(steps + once_more):
         now = data.time
         if controller is not None:
-            wanted = controller(now, data)
+            wanted = controller(model, data)
             if wanted is not None:
                 # The fast way for what is an array already; the other one checks.
                 if wanted.__class__ is plain and wanted.dtype is real and wanted.shape == shape:

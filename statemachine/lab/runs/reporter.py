@@ -5,20 +5,37 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from .drive import Progress, silent
+
+if TYPE_CHECKING:
+    from ...show.blocks import Page
 
 
 class Reporter(Protocol):
     """Somebody who is told how an answer gets on; what computes it prints nothing itself."""
 
-    def stage(self, what: str) -> AbstractContextManager[Progress]:
-        """Begin a stage of the work, and give what is told the fraction of it that is done."""
+    def stage(
+        self, what: str, runs_at_once: int = 0, takes: float | None = None
+    ) -> AbstractContextManager[Progress]:
+        """Begin a stage of the work, and give what is told the fraction of it that is done.
+
+        Args:
+            what: What is done.
+            runs_at_once: How many runs are made side by side, at most, where each fraction is told
+                as runs end: only then can be measured how long the rest takes. 0 where it is told
+                of something else.
+            takes: How long it takes, from what was measured before [s]; None if that is not known.
+        """
         ...
 
     def note(self, text: str) -> None:
         """Take a line that a reader should know beside the result."""
+        ...
+
+    def so_far(self, page: Page) -> None:
+        """Take a page of what is known while the work goes on; the result comes later."""
         ...
 
 
@@ -26,13 +43,18 @@ class QuietReporter:
     """A Reporter that shows no progress; a note becomes a warning of Python."""
 
     @contextmanager
-    def stage(self, what: str) -> Iterator[Progress]:
+    def stage(
+        self, what: str, runs_at_once: int = 0, takes: float | None = None
+    ) -> Iterator[Progress]:
         """Begin a stage of which nothing is shown."""
         yield silent
 
     def note(self, text: str) -> None:
         """Warn of it."""
         warnings.warn(text, UserWarning, stacklevel=3)
+
+    def so_far(self, page: Page) -> None:
+        """Show nothing."""
 
 
 QUIET = QuietReporter()

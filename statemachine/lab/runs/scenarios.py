@@ -88,7 +88,7 @@ def fitting(model: Model) -> tuple[str, ...]:
 
 def _constant(ctrl: Array | None) -> Controller:
     """One command from the beginning on; None where nobody writes ctrl."""
-    return lambda _time, _data: ctrl
+    return lambda _model, _data: ctrl
 
 
 def _need_box(model: Model) -> None:
@@ -113,8 +113,9 @@ def _waves(model: Model, seed: int) -> Controller:
     """Every actuator follows a sum of three sines within the middle of its range."""
     middle, size, frequency, phase = waves(model, seed)
 
-    def controller(time: float, _data: Data) -> Array:
+    def controller(_model: Model, data: Data) -> Array:
         # From where it stands: the waves grow in over half a second.
+        time = data.time
         sines: Array = (size * np.sin(2 * np.pi * frequency * time + phase)).sum(axis=0)
         return middle + min(1.0, 2 * time) * sines
 

@@ -109,7 +109,7 @@ def run_sweep(
         if retry_failed:
             remove_failed(folder)
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
-        missing, ran = len(ready) - len(known), 0
+        ran, cost, whole = 0, 0.0, _cost_of_missing(ready, known)
         kinds = Counter(known.values())
         writer = RowWriter(folder, ready.design.factors, ready.provenance())
         workers = max(1, sum(client.nthreads().values())) if client else jobs
@@ -125,7 +125,8 @@ def run_sweep(
                         writer.add(rows)
                         kinds.update(outcome_of(row) for row in rows)
                         ran += len(rows)
-                        progress(ran / max(1, missing))
+                        cost += sum(_cost_of_cell(ready, row["backend"]) for row in rows)
+                        progress(cost / whole)
             finally:
                 writer.flush()
     return _summary(ready, folder, kinds, ran, time.monotonic() - began)
@@ -186,14 +187,27 @@ def _summary(
     )
 
 
+def _cost_of_cell(ready: PreparedSweep, backend: str) -> float:
+    """Return roughly what a cell takes on a backend, by the clock [s]."""
+    return max(1e-6, ready.cost.get(parse_backend(backend).name, _BATCH))
+
+
+def _cost_of_missing(ready: PreparedSweep, known: Mapping[str, str]) -> float:
+    """Return roughly what all cells take that are not known, one after the other [s]."""
+    cost = 0.0
+    for backend in ready.backends:
+        cells = sum(cell.id not in known for cell in ready.cells(backend))
+        cost += cells * _cost_of_cell(ready, backend)
+    return cost
+
+
 def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Iterator[Batch]:
     """Yield what is missing, in tasks of about a second, from all backends in turn."""
     missing = len(ready) - len(known)
     most = max(1, math.ceil(missing / (_TASKS * jobs * len(ready.backends))))
 
     def of(backend: str) -> Iterator[Batch]:
-        cost = ready.cost.get(parse_backend(backend).name, _BATCH)  # of a cell [s]
-        size = min(_MOST, max(1, int(_BATCH / max(1e-6, cost))), most)
+        size = min(_MOST, max(1, int(_BATCH / _cost_of_cell(ready, backend))), most)
         cells = (cell for cell in ready.cells(backend) if cell.id not in known)
         while batch := list(itertools.islice(cells, size)):
             yield batch

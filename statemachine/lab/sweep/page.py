@@ -12,6 +12,7 @@ from . import SweepSummary
 from .analysis import ExtremeCell, MainEffect, SweepEffects
 from .design import Value
 from .main_effects import LevelMean
+from .results import SweepReportResult, SweepResult
 
 _ROWS = 6  # parameters on the first screen
 _DECIMALS = 2  # of a share
@@ -227,3 +228,13 @@ def _value(sweep: SweepEffects, parameter: str, value: Value) -> str:
     if parameter in sweep.scaled:
         return f"{value:.4g}x"
     return f"{value:.4g} {sweep.units.get(parameter, '')}".strip()
+
+
+def result_page(result: SweepResult, details: bool = False) -> Page:
+    """Return the page of a sweep that ran; there are no further details."""
+    return summary_page(result.summary)
+
+
+def report_page(result: SweepReportResult, details: bool = False) -> Page:
+    """Return the page of what moves a quantity; there are no further details."""
+    return page(result.effects)

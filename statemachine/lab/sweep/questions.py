@@ -173,7 +173,7 @@ def _run(
     """Run what is missing of a sweep in a folder."""
     for line in ready.said:
         reporter.note(line)
-    with reporter.stage(f"{len(ready)} cells") as progress:
+    with reporter.stage(f"{len(ready)} cells", checked_jobs(request.jobs)) as progress:
         return run_sweep(
             ready,
             folder,

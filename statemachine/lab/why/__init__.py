@@ -8,23 +8,28 @@
 - `setup`: how each side is run with some causes equalized; `order`: as a function of the user's
   sees it; `trials`: the runs, each made once
 - `gap`: what runs are measured by, and what touches first; `explained_gap`: the one to divide
-- `shapley`: shares of a gap among causes; `locate`: where the rest comes from
+- `search`: the stages, in the order in which a reader wants their results, until a `deadline`;
+  `assembly`: the answer from what is known so far
+- `game`: the gap with each set of causes equalized; `shapley`: shares of a gap among causes, by the
+  arithmetic in `shares`; `locate`: where the rest comes from
 - `verdict`: what is answered, and whether that answers the question
 """
 
 from __future__ import annotations
 
 from .explain import explain
-from .explanation import Explanation, Share
+from .explanation import Explanation, FailedSet, InterruptedExplanation, Share
 from .request import WhyRequest
-from .shapley import ADDS_UP
+from .shares import ADDS_UP
 from .verdict import UNEXPLAINED, GapVerdict
 
 __all__ = [
     "ADDS_UP",
     "UNEXPLAINED",
     "Explanation",
+    "FailedSet",
     "GapVerdict",
+    "InterruptedExplanation",
     "Share",
     "WhyRequest",
     "explain",

@@ -109,6 +109,14 @@ class AnswerSentence(PageContent):
     place_words: str
 
     @property
+    def first_failure(self) -> str:
+        """Why the first cause whose share cannot be had could not be equalized; "" of none."""
+        for row in self.result.shares:
+            if row.failure is not None:
+                return row.failure.failure.reason
+        return ""
+
+    @property
     def has_gap(self) -> bool:
         """Whether there is any gap."""
         return self.result.gap > 0

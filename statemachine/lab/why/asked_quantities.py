@@ -28,6 +28,8 @@ def kinds_asked(
         until: What of them counts [s from the start].
         floats: Whether the base of both floats.
     """
+    if words is None:
+        return {}
     if words in AXES and floats:
         return {words: "base"}
     if words in OUTCOMES and all(words in outcomes_of_run(run, until) for run in runs):

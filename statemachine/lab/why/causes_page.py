@@ -11,9 +11,9 @@ from ...show.blocks import Block
 from ...show.templates import PageContent, render_blocks
 from ..compare.chaos import CLEAR
 from .answer_page import amount, refused
-from .explanation import Explanation, Share
+from .explanation import Explanation, FailedSet, Share
 from .locate import Localisation
-from .shapley import ADDS_UP
+from .shares import ADDS_UP
 from .table_page import able, is_beyond, is_noisy, tables, without_effect
 
 _SINGULAR = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
@@ -129,9 +129,9 @@ class CausesPart(PageContent):
         return tuple(refused(self.result))
 
     @property
-    def first_impossible(self) -> tuple[str, ...]:
-        """A set of causes that could not be run; empty where all could."""
-        return self.result.impossible[0] if self.result.impossible else ()
+    def first_impossible(self) -> FailedSet | None:
+        """The smallest set of causes that could not be run; None where all could."""
+        return self.result.impossible[0] if self.result.impossible else None
 
 
 @dataclass(frozen=True)

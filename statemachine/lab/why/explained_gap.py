@@ -65,10 +65,10 @@ def named_quantity(trials: Trials, words: str | None) -> str | None:
 def explained_gap(
     trials: Trials, request: WhyRequest, quantity: str | None, first: Mapping[str, Deviation]
 ) -> ExplainedGap:
-    """Return the gap that is explained, with its chaos floor.
+    """Return the gap that is explained, with its chaos floor; no run is made for it.
 
     Args:
-        trials: The runs.
+        trials: The runs, the perturbed ones among them, as far as they were made.
         request: The question.
         quantity: The one that is asked for; None if none is.
         first: The gap in each quantity, as the sides come.
@@ -76,7 +76,7 @@ def explained_gap(
     measure = request.measure
     floors: Mapping[str, float] = {}
     if request.uncertain is not None:
-        floors = trials.floor(request.uncertain, measure)
+        floors = trials.floor(measure)
     if quantity is None:
         quantity = _quantity(trials, first, floors, measure, request.left)
     return ExplainedGap(

@@ -20,7 +20,24 @@ from .gap import FirstTouch, Measure
 from .locate import Localisation
 from .rewriting import RewrittenFile
 from .shapley import Method
+from .shares import Range
+from .trials import RunFailure
 from .verdict import CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
+
+EndedBy = Literal["", "time limit", "interrupt"]
+
+
+@dataclass(frozen=True)
+class FailedSet:
+    """A set of causes that could not be run.
+
+    Attributes:
+        equalized: Names of the causes that were equalized, sorted; all others were as they come.
+        failure: What became of it: the side, how far that came, and why it ended there.
+    """
+
+    equalized: tuple[str, ...]
+    failure: RunFailure
 
 
 @dataclass(frozen=True)
@@ -34,11 +51,19 @@ class Share:
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
-            cannot be equalized, or no set of causes with it could be run.
+            cannot be equalized, where no set of causes with it could be run, and where it is not
+            known yet.
         error: Standard error of the share; 0 where it is not an estimate.
-        alone: The part that it takes away as the only one; None where that could not be run.
-        last: The part that it takes away after all others; None where that could not be run.
-        note: Why there is no share, or what else is to be said.
+        range: Between which parts of the gap the share lies, as far as is known. Of an exact share
+            both are that; of an estimate they are two standard errors to either side. Where the
+            share is not known yet they are the least and the largest of what the cause takes away
+            alone, last, and in the orders that were run whole. None where nothing is known.
+        alone: The part that it takes away as the only one; None where that could not be run, or
+            was not run yet.
+        last: The part that it takes away after all others that can be equalized; None as `alone`.
+        note: Why there is no share, and never will be, or what else is to be said.
+        failure: Where no set with it could be run, or none with all others: the smallest of these
+            sets, and why. Else None.
         chosen: Of an integrator the side that can choose, "left" or "right", and the one to choose;
             else None.
         changes: What of the right's file undoes it, attribute by attribute; empty where that is not
@@ -52,12 +77,28 @@ class Share:
     kind: str
     share: float | None = None
     error: float = 0.0
+    range: Range | None = None
     alone: float | None = None
     last: float | None = None
     note: str = ""
+    failure: FailedSet | None = None
     chosen: tuple[Literal["left", "right"], str] | None = None
     changes: tuple[AttributeChange, ...] = ()
     not_written: str = ""
+
+    @property
+    def effects(self) -> Range | None:
+        """The least and the largest of what it takes away alone and last; None if not known."""
+        effects = [effect for effect in (self.alone, self.last) if effect is not None]
+        return (min(effects), max(effects)) if effects else None
+
+    @property
+    def weight(self) -> float:
+        """The size by which causes are ranked: of the share, or of the mean of alone and last."""
+        if self.share is not None:
+            return abs(self.share)
+        effects = [effect for effect in (self.alone, self.last) if effect is not None]
+        return abs(sum(effects)) / len(effects) if effects else 0.0
 
 
 @dataclass(frozen=True)
@@ -75,10 +116,17 @@ class Explanation:
         first: The gap in each quantity, as the sides come.
         gap: The one that is explained, in `unit`.
         shares: The causes in files, options, commands and settings of an engine, the largest share
-            first. The shares add up to `explained`.
-        method: How the shares were computed.
+            first, or the largest `weight` where shares are not known yet. Where all are known they
+            add up to `explained`.
+        ended_by: What ended the search before it was complete, "time limit" or "interrupt"; "" if
+            nothing did. Then every share is exact, or as precise as the sets that are run unless
+            a time limit is given make it: `range` says how precise. Where it was ended, what is
+            not known yet is None, and `runs`, `took` and `draws` are of what was made.
+        method: How the shares were computed; "alone and last" where each cause was equalized alone,
+            and last, and no share is known yet; "not ranked" where the search was ended before.
         orders: How many orders were drawn for that.
-        brought: The gap with all causes equalized, in `unit`; None if that could not be run.
+        brought: The gap with all causes equalized that can be, in `unit`; None if that could not
+            be run, or was not run yet.
         found_in: What the rest is found in by leaving features out on both sides.
         explained: The part of the gap that goes where settings are equalized.
         located: The part that goes only where something is left out on both sides: it says
@@ -93,7 +141,8 @@ class Explanation:
             both with the model's.
         redundant: Causes of which each one alone takes away nine tenths of the gap or more, and the
             last of them less than a tenth.
-        impossible: Sets of causes that could not be run.
+        impossible: Sets of causes that could not be run, each with its reason: the smaller sets
+            first. Shares are means over the orders that come by none of them.
         unmatched: What only one side has: joints, actuators, by side.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
         notes: What a reader should know, in sentences.
@@ -124,6 +173,7 @@ class Explanation:
     first: Mapping[str, Deviation]
     gap: float
     shares: tuple[Share, ...]
+    ended_by: EndedBy
     method: Method
     orders: int
     brought: float | None
@@ -137,7 +187,7 @@ class Explanation:
     draws: int
     one_engine: bool
     redundant: tuple[str, ...]
-    impossible: tuple[tuple[str, ...], ...]
+    impossible: tuple[FailedSet, ...]
     unmatched: tuple[Only, Only]
     missing: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
@@ -157,6 +207,20 @@ class Explanation:
     rewritten: RewrittenFile | None = None
 
     @property
+    def is_complete(self) -> bool:
+        """Whether the search came to its end."""
+        return not (self.ended_by or self.method in ("not ranked", "alone and last"))
+
+    @property
+    def ranking(self) -> tuple[Share, ...]:
+        """The causes of which it is known what they take away alone or last, the largest first.
+
+        That is known before any share: see `Share.effects`.
+        """
+        ranked = [row for row in self.shares if row.effects is not None]
+        return tuple(sorted(ranked, key=_mean_effect, reverse=True))
+
+    @property
     def verdict(self) -> GapVerdict:
         """What the gap comes from, and whether that answers the question."""
         state = gap_state(self.gap, self.negligible, self.tolerance, self.floor)
@@ -172,6 +236,9 @@ class Explanation:
             cause=self._largest_cause(),
             places=self._places(),
             moved=self.motion.moved,
+            is_complete=self.is_complete,
+            method=self.method,
+            unavailable=tuple(row.name for row in self.shares if row.failure is not None),
         )
         return verdict_of(facts)
 
@@ -193,3 +260,22 @@ class Explanation:
             LocatedPart(place.share, place.is_still, is_switch=place.name in causes)
             for place in self.found_in
         )
+
+
+def _mean_effect(row: Share) -> float:
+    """Return the size of what a cause takes away, in the mean of alone and last."""
+    effects = [effect for effect in (row.alone, row.last) if effect is not None]
+    return abs(sum(effects)) / max(1, len(effects))
+
+
+class InterruptedExplanation(KeyboardInterrupt):
+    """A Ctrl-C ended a search for causes: `result` is what was known by then.
+
+    Attributes:
+        result: The explanation, which is not complete.
+    """
+
+    def __init__(self, result: Explanation) -> None:
+        """Keep what is known."""
+        super().__init__("the search for causes was interrupted: result has what is known")
+        self.result = result

@@ -6,7 +6,7 @@ where it takes away more than half of what was left.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -81,28 +81,32 @@ class Remainder:
         return moved < _STILL * self.trials.extent(self.quantity)
 
 
-def locate(remainder: Remainder) -> tuple[Localisation, ...]:
+def locate(remainder: Remainder) -> Iterator[Localisation]:
     """Leave features out on both sides, each on top of those that count.
 
     The integrator comes first, of the sides that have several, and is tried again once something is
     left out: what differs by it may be hidden by what was left. Where only one side has several it
     is a setting, which need not take away half if nothing else does either.
 
-    Returns:
-        The parts of the gap, in the order in which they were found.
+    Yields:
+        The parts of the gap, as they are found.
     """
-    return _located(remainder, _LEAST) or _located(remainder, _LEAST_SET)
+    is_found = False
+    for part in _located(remainder, _LEAST):
+        is_found = True
+        yield part
+    if not is_found:
+        yield from _located(remainder, _LEAST_SET)
 
 
-def _located(remainder: Remainder, least: float) -> tuple[Localisation, ...]:
-    """Leave features out.
+def _located(remainder: Remainder, least: float) -> Iterator[Localisation]:
+    """Leave features out, and yield the parts of the gap that go.
 
     Args:
         remainder: What is left of the gap.
         least: What a setting of one side has to take away of what was left.
     """
     trials = remainder.trials
-    found: list[Localisation] = []
     without, integrator = frozenset[str](), ""
     left, enough = remainder.left, max(_NOTHING * remainder.gap, remainder.bound)
     for feature in _choices(trials):
@@ -117,14 +121,11 @@ def _located(remainder: Remainder, least: float) -> tuple[Localisation, ...]:
         without, integrator = more, best
         share = (left - rest) / remainder.gap
         if feature is None:
-            found.append(_by_integrator(remainder, best, without, share, rest, is_setting))
+            yield _by_integrator(remainder, best, without, share, rest, is_setting)
         else:
             still = remainder.is_still(without)
-            found.append(
-                Localisation(feature.name, feature.without, None, share, None, rest, still)
-            )
+            yield Localisation(feature.name, feature.without, None, share, None, rest, still)
         left = rest
-    return tuple(found)
 
 
 def _choices(trials: Trials) -> list[Feature | None]:

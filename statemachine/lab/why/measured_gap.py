@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from ...interface import Model
 from ..compare.matching import match_models
+from .deadline import Deadline
 from .gap import Measure, size_of
 from .request import WhyRequest
 from .setup import NONE
@@ -28,9 +29,5 @@ def measured_gap(
         scenario = scenario.on(request.left)
     again = replace(request, right=right, scenario=scenario, quantity=quantity)
     matched = match_models(again.left, right, again.names)
-    gaps = Trials(again, matched, _ignore).gaps(NONE)
+    gaps = Trials(again, matched, Deadline(None)).gaps(NONE)
     return size_of(gaps[quantity], measure) if quantity in gaps else None
-
-
-def _ignore() -> None:
-    """Count no runs."""

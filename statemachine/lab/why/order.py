@@ -105,10 +105,10 @@ def seen_in_order_of_left(
     data = room(DEFAULT).data_in_other_order(shown, _elements(shown, matched, mocap_in_order))
     data.ctrl[:] = starts[0]
 
-    def translate(time: float, source: Data) -> Array | None:
+    def translate(_right: Model, source: Data) -> Array | None:
         data.show(source)
         before = np.array(data.ctrl)
-        wanted = controller(time, data)
+        wanted = controller(shown, data)
         data.give_back()
         if wanted is not None:
             data.ctrl[:] = np.asarray(wanted, np.float64)
@@ -130,8 +130,8 @@ def sorted_by_number(
         start: (nu,) ctrl of the right, which what nobody commands keeps.
     """
 
-    def translate(time: float, data: Data) -> Array | None:
-        ctrl = controller(time, data)
+    def translate(model: Model, data: Data) -> Array | None:
+        ctrl = controller(model, data)
         if ctrl is None:
             return None
         return _by_number(np.asarray(ctrl, np.float64), slots, start)

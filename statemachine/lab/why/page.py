@@ -26,10 +26,10 @@ from .rewritten_page import rewritten_blocks
 from .table_page import summary_table
 from .verdict import UNEXPLAINED
 
-Conclusion = Literal["wider", "divided", "no gap", "refused", "chance", "nothing moved"]
+Conclusion = Literal["wider", "divided", "stopped", "no gap", "refused", "chance", "nothing moved"]
 Advice = Literal[
     "settings", "write", "refused", "both", "engines", "between", "files", "chance", "details",
-    "written", "",
+    "written", "go on", "",
 ]  # fmt: skip
 
 
@@ -66,8 +66,8 @@ class WhyPage(PageContent):
 
     @property
     def divides(self) -> bool:
-        """Whether the gap was divided among causes."""
-        return self.result.verdict.divides
+        """Whether it is known what of the gap stays with all causes equalized."""
+        return self.result.verdict.divides and self.conclusion != "stopped"
 
     @property
     def nothing_differs(self) -> bool:
@@ -225,6 +225,8 @@ def _conclusion(result: Explanation) -> Conclusion:
     match result.verdict.answer:
         case "hidden":
             return "wider"
+        case "stopped":
+            return "stopped"
         case "nothing moved":
             return "nothing moved"
         case "rounding" | "alike" | "within":
@@ -242,6 +244,8 @@ def _advice(result: Explanation) -> Advice:
         return "written"
     if verdict.answer == "nothing moved":
         return ""
+    if result.ended_by and verdict.divides:
+        return "go on"
     if not verdict.divides:
         return "details" if verdict.answer in ("rounding", "alike", "within") else "chance"
     if verdict.holds:
@@ -277,6 +281,8 @@ def _next_command(result: Explanation, advice: Advice) -> str:
             flags = (*result.command.question, "--write", target)
         case "refused" | "details":
             flags = (*result.command.question, "--details")
+        case "go on":
+            flags = result.command.question
         case "written" | "":
             return ""
     return result.command.lines(*flags)

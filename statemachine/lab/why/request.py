@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ...errors import BadInputError
 from ...interface import Model
 from ...processes import checked_jobs
+from ...release_names import engine_of
+from ..compare.labels import files_apart
 from ..compare.perturbed import EXACT, Uncertainty
 from ..recordings import Trace
 from ..runs.scenarios import Scenario
@@ -31,8 +34,10 @@ class WhyRequest:
             relative to the tip, else the joints, or what differs most where these agree.
         measure: Which figure of it.
         finer: Every difference by its single entries, however many there are.
-        budget: How many sets of causes may be run: all of them where there are no more, else as
-            far as orders are drawn.
+        time_limit: After how long the search ends, by the clock [s]: what is known by then is the
+            answer. None for as long as it takes until each share is exact, or estimated from some
+            200 sets of causes; with a limit estimates are refined until it is over, or their
+            standard errors are below a hundredth of the gap.
         labels: What the sides are called; None for their files and engines.
         uncertain: What is not known of the start, for the chaos floor; None for no floor.
         jobs: How many processes make the runs; None for one a processor where that pays, and
@@ -40,7 +45,7 @@ class WhyRequest:
             figures are the same.
 
     Raises:
-        BadInputError: `jobs` is less than 1.
+        BadInputError: `jobs` is less than 1, or the time limit is no time above 0.
     """
 
     left: Model
@@ -53,13 +58,15 @@ class WhyRequest:
     quantity: str | None = None
     measure: Measure = "worst"
     finer: bool = False
-    budget: int = 200
+    time_limit: float | None = None
     labels: tuple[str, str] | None = None
     uncertain: Uncertainty | None = EXACT
     jobs: int | None = None
 
     def __post_init__(self) -> None:
         checked_jobs(self.jobs)
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise BadInputError(f"a time limit is a time above 0 s; got {self.time_limit:g}")
 
     @property
     def duration(self) -> float:
@@ -67,6 +74,27 @@ class WhyRequest:
         return self.scenario.seconds if self.seconds is None else self.seconds
 
     @property
+    def side_labels(self) -> tuple[str, str]:
+        """What the sides are called: by default their files and engines.
+
+        Two files of one name have the folders by which they differ.
+        """
+        if self.labels is not None:
+            return self.labels
+        left_file, right_file = files_apart(self.left.path.parts, self.right.path.parts)
+        return _label(left_file, self.left), _label(right_file, self.right)
+
+    @property
     def are_compiled(self) -> bool:
         """Whether both sides have a compiled model, by which they can be matched and edited."""
         return self.left.compiled is not None and self.right.compiled is not None
+
+
+def settings_of(model: Model) -> str:
+    """Return whose settings a Model has: "model", or "engine" for an engine as it comes."""
+    return getattr(model, "defaults", "model")
+
+
+def _label(file: str, model: Model) -> str:
+    label = f"{file} on {engine_of(model.backend)} {model.engine_version}"
+    return f"{label}, engine defaults" if settings_of(model) == "engine" else label

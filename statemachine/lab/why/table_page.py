@@ -46,17 +46,20 @@ def summary_table(result: Explanation, most: int) -> Table:
     acting = [row for row in able(result) if has_effect(row) or not result.verdict.divides]
     parts: list[tuple[Row, float]] = []
     for row in acting:
-        parts.append((_summary_of_cause(result, row), row.share or 0.0))
+        parts.append((_summary_of_cause(result, row), row.share if row.share else row.weight))
     for place in result.found_in:
         parts.append((_summary_of_place(place), place.share))
     parts.sort(key=lambda pair: -abs(pair[1]))
     shown = [row for row, _ in parts[:most]]
     more = len(able(result)) + len(result.found_in) - len(shown)
     if more:
-        share = result.explained + result.located - sum(part for _, part in parts[:most])
-        shown.append(_row_of_rest(more, share if result.verdict.divides else None))
+        share = None
+        if result.verdict.divides and result.is_complete:
+            share = result.explained + result.located - sum(part for _, part in parts[:most])
+        shown.append(_row_of_rest(more, share))
     heads = _SUMMARY_HEADS
-    if all(row[4] == NONE for row in shown):  # nothing stands in the file
+    # Where nothing stands in the file; and ranges need the room.
+    if not result.is_complete or all(row[4] == NONE for row in shown):
         heads, shown = heads[:4], [row[:4] for row in shown]
     return Table(heads, shown, words=frozenset({0, 1, 2, 4}))
 
@@ -167,8 +170,14 @@ def _rows_of_cause(result: Explanation, row: Share) -> list[Row]:
 def _parts(result: Explanation, row: Share) -> Row:
     """Return the part of a cause, and what it takes away alone and last."""
     noise = result.floor / result.gap if result.verdict.divides else 0.0
-    if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
+    if (
+        row.share is not None and abs(row.share) < noise and noise > _SMALL
+    ):  # no part is claimed inside the floor
         return TableCell(f"< {percent(noise)}", share=row.share), NONE, NONE
+    if row.share is None and row.range is not None:
+        least, largest = row.range
+        part = TableCell(f"{100 * least:.0f} to {100 * largest:.0f} %", share=None)
+        return part, percent(row.alone), percent(row.last)
     explains = percent(row.share)
     if row.error and math.isfinite(row.error):
         explains += f" ± {percent(row.error)}"

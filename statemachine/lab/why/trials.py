@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from ..compare import perturbed
 from ..compare.matching import Matched
 from ..compare.perturbed import Uncertainty, perturbed_run
 from ..recordings import Rerun, Trace
+from .deadline import Deadline
 from .gap import Curves, FirstTouch, Measure, Ruler, first_touch
 from .request import WhyRequest
 from .setup import NONE, RunKey, Setup
@@ -39,11 +41,28 @@ class Trial:
         curves: The run by the ruler; None if it could not be made, or did not reach the end.
         reason: Why not.
         was_begun: Whether the run was begun.
+        time: How far it came [s]; None if it was not begun, or its process ended.
     """
 
     curves: Curves | None
     reason: str
     was_begun: bool = True
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class RunFailure:
+    """A run that could not be made, or did not reach the end.
+
+    Attributes:
+        side: Of which side.
+        time: How far it came [s]; None if it was not begun, or its process ended.
+        reason: Why it ended there, in words.
+    """
+
+    side: Literal["left", "right"]
+    time: float | None
+    reason: str
 
 
 class Trials:
@@ -54,29 +73,35 @@ class Trials:
         traces: Both runs as they come, with what the engines derive.
         ruler: What all runs are measured by.
         ended: Why the last run that did not reach the end did not.
+        ran: Called after each run.
     """
 
-    def __init__(self, request: WhyRequest, matched: Matched, ran: Callable[[], None]) -> None:
+    def __init__(self, request: WhyRequest, matched: Matched, deadline: Deadline) -> None:
         """Run both sides as they come.
 
         Args:
             request: The question; its scenario is as it is on the left.
             matched: What of the left is what of the right.
-            ran: Called after each run.
+            deadline: When runs are to end.
+
+        Raises:
+            TimeIsUp: No time is left.
         """
         self.setup = Setup(request, matched)
-        self._jobs, self._ran = request.jobs, ran
+        self.ran: Callable[[], None] = lambda: None
+        self._jobs, self._deadline = request.jobs, deadline
         traces: list[Trace] = []
         began = time.perf_counter()
         for run in _AS_THEY_COME:
-            traces.append(self.setup.rerun(run, self.setup.models[run.side]).record())
-            ran()
+            rerun = self.setup.rerun(run, self.setup.models[run.side])
+            traces.append(rerun.record(progress=deadline.check))
         # What is derived is read from a second run: so four were made.
         self._took = (time.perf_counter() - began) / 4
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(matched, traces[0], traces[1], request.quantity)
         self.ended, self._repeated = "", 0
         self._trials: dict[RunKey, Trial] = {}
+        self._perturbed: dict[tuple[int, int], Curves | None] = {}  # by side and number
         for run, trace in zip(_AS_THEY_COME, traces, strict=True):
             self._trials[run] = self._measured(run.side, self.setup.models[run.side], trace)
             self.ended = self.ended or trace.header.ended
@@ -114,6 +139,31 @@ class Trials:
         left, right = (self._curves(run) for run in runs)
         return self.ruler.gaps(left, right) if left and right else {}
 
+    def is_run(self, equalized: frozenset[str]) -> bool:
+        """Tell whether both runs with some causes equalized were made already."""
+        return all(run in self._trials for run in self.setup.runs_of(equalized))
+
+    def missing(self, sets: Iterable[frozenset[str]]) -> int:
+        """Return how many runs are still to be made for some sets of causes."""
+        runs = {run for equalized in sets for run in self.setup.runs_of(equalized)}
+        return sum(run not in self._trials for run in runs)
+
+    def at_once(self, runs: float) -> int:
+        """Return how many of so many runs are made side by side, at most."""
+        return self._forks_for(max(1, round(runs)))
+
+    def failure(self, equalized: frozenset[str]) -> RunFailure | None:
+        """Return why the gap with some causes equalized is not known, of a set that was run.
+
+        None where both sides reached the end.
+        """
+        for run in self.setup.runs_of(equalized):
+            trial = self._trials[run]
+            if trial.curves is None:
+                side: Literal["left", "right"] = "right" if run.side else "left"
+                return RunFailure(side, trial.time, trial.reason)
+        return None
+
     def extent(self, quantity: str, without: frozenset[str] = NONE) -> float:
         """Return how far the left moves from where it starts, with or without some features."""
         curves = self._curves(RunKey(0, NONE, without))
@@ -124,14 +174,24 @@ class Trials:
         return float(self.ruler.distances(quantity, curves, start).max())
 
     def ahead(self, wanted: Iterable[frozenset[str]]) -> None:
-        """Make the runs now that `gaps` of some sets of causes will want, several at once."""
+        """Make the runs now that `gaps` of some sets of causes will want, several at once.
+
+        Raises:
+            TimeIsUp: No time is left; what was run by then is known.
+        """
         runs = dict.fromkeys(run for subset in wanted for run in self.setup.runs_of(subset))
         new = [run for run in runs if run not in self._trials]
         jobs = self._forks_for(len(new))
         if jobs > 1:
+
+            def ended(number: int, trial: Trial) -> None:
+                self._trials[new[number]] = trial
+                self.ran()
+
             work = [partial(self._trial, run) for run in new]
-            for run, trial in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
-                self._trials[run] = Trial(None, _LOST) if trial is None else trial
+            in_forks(work, jobs, ended, self._took, self._deadline.check)
+            for run in new:
+                self._trials.setdefault(run, Trial(None, _LOST))
 
     def _forks_for(self, number: int) -> int:
         """Return how many forks are to share some runs.
@@ -145,8 +205,9 @@ class Trials:
     def _curves(self, run: RunKey) -> Curves | None:
         """Return a run; None, with a reason in `ended`, if it did not reach the end."""
         if run not in self._trials:
+            self._deadline.check()
             self._trials[run] = self._trial(run)
-            self._ran()
+            self.ran()
         trial = self._trials[run]
         if trial.curves is None:
             self.ended = trial.reason or self.ended
@@ -158,14 +219,18 @@ class Trials:
         try:
             model = self.setup.model(run)
             was_begun = True
-            trace = self.setup.rerun(run, model).record(derive=False)
+            rerun = self.setup.rerun(run, model)
+            trace = rerun.record(derive=False, progress=self._deadline.check)
             return self._measured(run.side, model, trace)
-        except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
+        except DivergedError as error:
+            return Trial(None, str(error), was_begun, error.time)
+        except (EngineError, ModelError, UnsupportedError) as error:
             return Trial(None, str(error), was_begun)
 
     def _measured(self, side: int, model: Model, trace: Trace) -> Trial:
         curves = self.ruler.curves(trace, self._posed(model), side)
-        return Trial(curves, trace.header.ended or "it left every bound")
+        time = float(trace.time[-1] - trace.time[0])
+        return Trial(curves, trace.header.ended or "it left every bound", time=time)
 
     def _posed(self, model: Model) -> Model:
         """Return a Model of the same bodies by which poses are computed.
@@ -185,61 +250,79 @@ class Trials:
         """
         first, again = self._trials[RunKey(0)].curves, self._trial(RunKey(0)).curves
         self._repeated = 1
-        self._ran()
+        self.ran()
         if first is None or again is None:
             return False
         return all(np.array_equal(values, again[name]) for name, values in first.items())
 
-    def floor(self, uncertain: Uncertainty, measure: Measure) -> dict[str, float]:
-        """Compute the chaos floor of each quantity, in its unit.
+    def perturb(self, uncertain: Uncertainty) -> None:
+        """Make the perturbed runs of both sides, for the chaos floor.
 
         Args:
             uncertain: What is not known of the start.
-            measure: Which figure of a gap; the largest of all perturbed runs of both sides counts.
 
         Raises:
             EngineError: A process ended before its run was done, twice.
+            TimeIsUp: No time is left; what was run by then is known.
         """
         models = self.setup.models
         reruns = [self.setup.rerun(run, models[run.side]) for run in _AS_THEY_COME]
         posed = [self._posed(model) for model in models]  # a model is loaded once a side
-        work = [
-            partial(self._perturbed, side, k, reruns[side], posed[side], uncertain)
-            for side in (0, 1)
-            for k in range(perturbed.RUNS)
-        ]
-        curves = self._all_of(work)
-        left, right = (self._trials[run].curves for run in _AS_THEY_COME)
-        assert left is not None
-        assert right is not None
-        left_floor = self.ruler.floor(left, curves[: perturbed.RUNS], measure)
-        right_floor = self.ruler.floor(right, curves[perturbed.RUNS :], measure)
-        return {name: max(left_floor[name], right_floor[name]) for name in self.ruler.units}
+        numbers = [(side, k) for k in range(perturbed.RUNS) for side in (0, 1)]
 
-    def _perturbed(
+        def ended(number: int, curves: tuple[Curves | None]) -> None:
+            (self._perturbed[numbers[number]],) = curves
+            self.ran()
+
+        work = [
+            partial(self._run_perturbed, side, k, reruns[side], posed[side], uncertain)
+            for side, k in numbers
+        ]
+        jobs = self._forks_for(len(work))
+        if jobs > 1:
+            in_forks(work, jobs, ended, self._took, self._deadline.check)
+        else:
+            for number, call in enumerate(work):
+                self._deadline.check()
+                ended(number, call())
+        if len(self._perturbed) < len(numbers):
+            raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
+
+    @property
+    def perturbed_runs(self) -> int:
+        """How many perturbed runs a chaos floor takes, of both sides."""
+        return 2 * perturbed.RUNS
+
+    @property
+    def draws(self) -> int:
+        """How many perturbed runs were made of each side."""
+        sides = [side for side, _ in self._perturbed]
+        return min(sides.count(0), sides.count(1))
+
+    def floor(self, measure: Measure) -> dict[str, float]:
+        """Return the chaos floor of each quantity, in its unit, from the perturbed runs.
+
+        Args:
+            measure: Which figure of a gap; the largest of all perturbed runs of both sides counts.
+        """
+        floors: list[dict[str, float]] = []
+        for side, run in enumerate(_AS_THEY_COME):
+            curves = self._trials[run].curves
+            assert curves is not None
+            draws = [self._perturbed[side, k] for k in range(self.draws)]
+            floors.append(self.ruler.floor(curves, draws, measure))
+        return {name: max(floors[0][name], floors[1][name]) for name in self.ruler.units}
+
+    def _run_perturbed(
         self, side: int, k: int, rerun: Rerun, posed: Model, uncertain: Uncertainty
     ) -> tuple[Curves | None]:
         """Make one perturbed run; in a tuple, since what comes from a fork is not None."""
-        trace = perturbed_run(rerun, k, seed=self.setup.seed, uncertain=uncertain, derive=False)
+        trace = perturbed_run(
+            rerun,
+            k,
+            seed=self.setup.seed,
+            uncertain=uncertain,
+            derive=False,
+            progress=self._deadline.check,
+        )
         return (self.ruler.curves(trace, posed, side),)
-
-    def _all_of(self, work: list[partial[tuple[Curves | None]]]) -> list[Curves | None]:
-        """Make perturbed runs, in forks where that pays.
-
-        Raises:
-            EngineError: A process ended before its run was done, twice.
-        """
-        jobs = self._forks_for(len(work))
-        if jobs > 1:
-            outcomes = in_forks(work, jobs, self._ran, self._took)
-        else:
-            outcomes = []
-            for call in work:
-                outcomes.append(call())
-                self._ran()
-        curves: list[Curves | None] = []
-        for outcome in outcomes:
-            if outcome is None:
-                raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
-            curves += outcome
-        return curves

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..compare.chaos import against_floor
+from .shapley import Method
 
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 _MASKED = 2.0  # of the gap: a cause that takes away more has others against it
 
 GapState = Literal["rounding", "within", "inside", "cannot be told", "beyond"]
 Answer = Literal[
+    "stopped", "ranked",
     "nothing moved", "rounding", "alike", "within", "inside", "cannot be told",
     "cause", "together", "masked", "hidden",
     "located", "switched", "one engine", "refused", "still", "unexplained",
@@ -87,6 +89,9 @@ class Facts:
         cause: The cause with the largest share; None without one.
         places: What was left out on both sides, each on top of those before.
         moved: Whether a side moves at all.
+        is_complete: Whether nothing ended the search before its end.
+        method: How the shares were computed, as far as they are.
+        unavailable: Causes with which no set could be run, or none with all others.
     """
 
     state: GapState
@@ -99,6 +104,9 @@ class Facts:
     cause: CausePart | None = None
     places: tuple[LocatedPart, ...] = ()
     moved: bool = True
+    is_complete: bool = True
+    method: Method = "all sets"
+    unavailable: tuple[str, ...] = ()
 
     @property
     def place(self) -> LocatedPart | None:
@@ -111,8 +119,13 @@ class GapVerdict:
     """What a gap comes from.
 
     Attributes:
+        unavailable: Causes whose share cannot be had, since no set of causes with one of them could
+            be run, or none with all others: to be said before the answer, which is about the other
+            causes. Empty where all could be run.
         answer: Which answer is given first.
 
+            - "stopped": the search was ended before each cause was equalized alone, and last: there
+              is no answer; "ranked": it was ended after that, before shares were known.
             - "nothing moved": there is no gap, for nothing moves on either side: nothing was
               compared.
             - "rounding": there is no gap, and nothing differs; "alike": there is none, although
@@ -129,10 +142,11 @@ class GapVerdict:
             - "unexplained": none of these.
 
         holds: Whether the question is answered: no more than a twentieth of the gap stays
-            unexplained, or there is none.
+            unexplained, or there is none. False where the search was ended before it was complete.
         divides: Whether the gap was divided among causes.
     """
 
+    unavailable: tuple[str, ...]
     answer: Answer
     holds: bool
     divides: bool = True
@@ -140,21 +154,31 @@ class GapVerdict:
 
 def verdict_of(facts: Facts) -> GapVerdict:
     """Make the verdict on a gap."""
+    answer, holds, divides = _answer_of(facts)
+    return GapVerdict(facts.unavailable, answer, holds and facts.is_complete, divides)
+
+
+def _answer_of(facts: Facts) -> tuple[Answer, bool, bool]:
+    """Return the answer, whether it holds for a search that is complete, and whether it divides."""
     if facts.state == "rounding" and not facts.moved:
-        return GapVerdict("nothing moved", holds=False, divides=False)
+        return "nothing moved", False, False
     if facts.state == "rounding":
         answer: Answer = "alike" if facts.differs else "rounding"
-        return GapVerdict(answer, holds=not facts.refused, divides=False)
+        return answer, not facts.refused, False
     if facts.state == "within":
-        return GapVerdict("within", holds=not facts.refused, divides=False)
+        return "within", not facts.refused, False
     if facts.state in ("inside", "cannot be told"):
-        return GapVerdict(facts.state, holds=False, divides=False)
+        return facts.state, False, False
     if facts.explained < -UNEXPLAINED:
-        return GapVerdict("hidden", holds=False)
+        return "hidden", False, True
+    if facts.method == "not ranked":
+        return "stopped", False, True
+    if facts.method == "alone and last":
+        return "ranked", False, True
     holds = abs(_stays(facts)) <= UNEXPLAINED
     if _is_masked(facts):
-        return GapVerdict("masked", holds)
-    return GapVerdict(_largest(facts), holds)
+        return "masked", holds, True
+    return _largest(facts), holds, True
 
 
 def _stays(facts: Facts) -> float:

@@ -24,7 +24,8 @@ def fragment(page: Page, details: Page) -> str:
     if rest:
         folded = tag("details", tag("summary", "Details"), drawn(rest, level=3))
     origin = tag("p", non_breaking(details.origin), class_="foot")
-    words = (tag("p", page.title, class_="title"), *_finding(page), drawn(page.blocks, level=2))
+    title = tag("p", page.title, class_="title") if page.title else None
+    words = (title, *_finding(page), drawn(page.blocks, level=2))
     # The class is in each rule of it, so that nothing else of the notebook looks otherwise.
     style = tag("style", Html(text_of("show/html/notebook.css")))
     return tag("div", style, *words, folded, origin, class_="statemachine-result")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,12 +25,13 @@ from ...compare.typed_command import typed_command
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 from ...why.explain import explain
-from ...why.explanation import Explanation, Share
+from ...why.explanation import Explanation, InterruptedExplanation, Share
+from ...why.gap import Measure
 from ...why.measured_gap import measured_gap
+from ...why.ranking_page import ranking_page
 from ...why.request import WhyRequest
 from ...why.rewriting import RewriteRequest, check_target, rewrite
 from ...why.share_changes import with_changes
-from ...why.trials import Measure
 
 _PLAYED = "the models were run again, with the recorded starts and commands"
 MEASURES: tuple[Measure, ...] = ("worst", "end", "rms")
@@ -45,7 +47,8 @@ class ExplainRequest:
             `why.explain` chooses.
         measure: Which figure of the gap is explained.
         finer: Whether every difference is divided into its entries.
-        budget: Number of sets of causes that may be run where they interact, at least 1.
+        time_limit: After how long the search ends, by the clock [s], above 0: what is known by then
+            is the answer; None for until all is known.
         uncertainty: How uncertain the start is, for the chaos floor; None for no floor.
         jobs: Number of processes; None for one a processor where that pays.
         write: Where the right's file is written with the left's values; None for nowhere.
@@ -55,7 +58,7 @@ class ExplainRequest:
     quantity: str | None = None
     measure: Measure = "worst"
     finer: bool = False
-    budget: int = 200
+    time_limit: float | None = None
     uncertainty: Uncertainty | None = EXACT
     jobs: int | None = None
     write: AnyPath | None = None
@@ -64,8 +67,10 @@ class ExplainRequest:
         check_name("measure", self.measure, MEASURES)
         if self.write is not None and not (self.run.sides or self.run.is_traces):
             raise BadInputError("--write brings one file to another one: name two sides")
-        if self.budget < 1:
-            raise BadInputError(f"--budget wants a number of runs, at least 1; got {self.budget}")
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise BadInputError(
+                f"--time-limit wants a number of seconds above 0; got {self.time_limit:g}"
+            )
         checked_jobs(self.jobs)
 
 
@@ -84,12 +89,16 @@ class ExplainResult(ShownResult, Explanation):
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each cause: the fields of `Share`.
 
-        "left" and "right" are texts: each quantity that differs with its value on that side. "file"
-        and "line" say where the right side's value stands, None where that is not known.
+        "left" and "right" are texts: each quantity that differs, with its value there. "least"
+        and "most" are the ends of `Share.range`. "file" and "line" say where the right side's value
+        stands, None where that is not known.
         """
         shares, places = self.shares, [share.place for share in self.shares]
         columns: dict[str, Column] = {"cause": [share.name for share in shares]}
         columns |= columns_of(shares, ("kind", "share", "error", "alone", "last"))
+        ranges = [share.range for share in shares]
+        columns["least"] = [None if ends is None else ends[0] for ends in ranges]
+        columns["most"] = [None if ends is None else ends[1] for ends in ranges]
         columns["left"] = [_values_of(share, "left") for share in shares]
         columns["right"] = [_values_of(share, "right") for share in shares]
         columns["file"] = [None if place is None else place.file for place in places]
@@ -120,9 +129,29 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     Raises:
         EndedEarlyError: As they come, a side does not reach the end.
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
+        InterruptedExplanation: Ctrl-C; it holds the ExplainResult of what is known by then.
     """
+    began = time.monotonic()  # loading counts
+    question, sides = _question(request, reporter)
+
+    def so_far(explanation: Explanation) -> None:
+        reporter.so_far(ranking_page(explanation))
+
+    try:
+        explanation = explain(question, reporter, so_far, began)
+    except InterruptedExplanation as stop:
+        raise InterruptedExplanation(_result(request, question, stop.result)) from None
+    result = _result(request, question, explanation)
+    if request.write is None:
+        return result
+    with reporter.stage("why: the file that is written"):
+        return _with_file(result, question, sides, Path(request.write))
+
+
+def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, Sequence[Side]]:
+    """Load both sides, and return the question about them, and the sides."""
     run = request.run
-    with reporter.stage("why") as progress:
+    with reporter.stage("why: loading"):
         if run.is_traces:
             asked, sides, traces = recorded_sides(run)
         else:
@@ -148,46 +177,51 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
             quantity=request.quantity,
             measure=request.measure,
             finer=request.finer,
-            budget=request.budget,
+            time_limit=request.time_limit,
             labels=None if labels[0] == labels[1] else labels,
             uncertain=request.uncertainty,
             jobs=request.jobs,
         )
-        explanation = explain(question, progress)
-        explanation = with_changes(
-            explanation, question.left, question.right, run.names, request.finer
-        )
-        if request.write is not None:
-            explanation = _with_file(explanation, question, sides, Path(request.write))
+    return question, sides
+
+
+def _result(
+    request: ExplainRequest, question: WhyRequest, explanation: Explanation
+) -> ExplainResult:
+    """Return an explanation with what to change, what was typed, and what was asked."""
+    run = request.run
+    explanation = with_changes(explanation, question.left, question.right, run.names, request.finer)
     notes = [*run.taken]
     if run.is_traces:
         notes.append(_PLAYED)
     explanation = replace(
         explanation,
         notes=(*notes, *explanation.notes),
-        command=typed_command(run, _question(request)),
+        command=typed_command(run, _words_of(request)),
     )
     facts = vars(explanation)
     return ExplainResult(**facts, request=request)
 
 
-def _question(request: ExplainRequest) -> list[str]:
+def _words_of(request: ExplainRequest) -> list[str]:
     """Return the words that ask this question."""
     words = ["--why"]
     if request.quantity is not None:
         words += ["--quantity", request.quantity]
     if request.measure != "worst":
         words += ["--measure", request.measure]
-    if request.finer:
+    if request.time_limit is not None:
+        words += ["--time-limit", f"{request.time_limit:g}"]
+    if request.run.is_typed and request.finer:
         words.append("--finer")
-    if request.uncertainty is None:
+    if request.run.is_typed and request.uncertainty is None:
         words.append("--no-chaos")
     return words
 
 
 def _with_file(
-    explanation: Explanation, question: WhyRequest, sides: Sequence[Side], target: Path
-) -> Explanation:
+    explanation: ExplainResult, question: WhyRequest, sides: Sequence[Side], target: Path
+) -> ExplainResult:
     """Write the right's file with the left's values, and run it.
 
     Args:
@@ -202,7 +236,7 @@ def _with_file(
     names = {} if question.names is None else question.names
 
     def load(path: Path) -> Model:
-        right = replace(sides[1], model=str(path))
+        right = replace(sides[1], model=str(path), loaded=None)
         return load_sides((sides[0], right), {}, names).models[1]
 
     written, model = rewrite(RewriteRequest(question.left, question.right, target, load, names))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -42,18 +43,16 @@ class ConvergeRequest:
 
 
 @dataclass(frozen=True, repr=False)
-class ConvergeResult(ShownResult):
-    """What of a gap vanishes with the timestep.
+class ConvergeResult(ShownResult, Convergence):
+    """What becomes of each gap with finer and finer steps, and what was asked.
 
     Attributes:
         request: What was asked.
-        limits: What becomes of the gap of each quantity.
     """
 
     page_function: ClassVar[str] = "questions.convergence:page"
 
-    request: ConvergeRequest = field(metadata={"json": False})
-    limits: Convergence
+    request: ConvergeRequest = field(kw_only=True, metadata={"json": False})
 
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each quantity over the whole run.
@@ -61,13 +60,12 @@ class ConvergeResult(ShownResult):
         "gap_1" is the largest gap with the steps as given, "gap_2" with half of them, and so on
         [unit]; "limit" is what it tends to [unit].
         """
-        limits = self.limits.whole
-        columns: dict[str, Column] = {"quantity": [limit.name for limit in limits]}
-        columns |= columns_of(limits, ("kind", "unit"))
-        runs = len(limits[0].gaps) if limits else 0
+        columns: dict[str, Column] = {"quantity": [limit.name for limit in self.whole]}
+        columns |= columns_of(self.whole, ("kind", "unit"))
+        runs = len(self.whole[0].gaps) if self.whole else 0
         for number, finer in enumerate(FINER[:runs]):
-            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in limits]
-        columns |= columns_of(limits, ("limit", "verdict"))
+            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in self.whole]
+        columns |= columns_of(self.whole, ("limit", "verdict"))
         return columns
 
 
@@ -77,12 +75,31 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> ConvergeResu
     Raises:
         StateMachineError: As `run_sides` does.
     """
+    took: list[float] = []  # by the clock [s]
 
     def run(times: int) -> tuple[Trace, Trace]:
-        return run_sides(request.with_finer_steps(times)).traces
+        what = "converge, steps as given"
+        if times > 1:
+            what = f"converge, steps {times} times finer"
+        began = time.monotonic()
+        with reporter.stage(what, takes=_expected(took)) as progress:
+            traces = run_sides(request.with_finer_steps(times), progress).traces
+        took.append(time.monotonic() - began)
+        return traces
 
-    with reporter.stage("converge") as progress:
-        return ConvergeResult(request, convergence(run, progress=progress))
+    return ConvergeResult(**vars(convergence(run)), request=request)
+
+
+def _expected(took: list[float]) -> float | None:
+    """Estimate how long runs with steps of half the length take [s]; None before two were measured.
+
+    Args:
+        took: How long each of those before took, whose steps were halved each time [s]. Loading
+            takes the same each time, and is no part of what grows.
+    """
+    if len(took) < 2:
+        return None
+    return took[-1] + 2.0 * max(0.0, took[-1] - took[-2])
 
 
 def _substeps(options: Mapping[str, OptionValue], usual: int) -> int:

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from ....errors import BadInputError, check_name
 from ....measures import QUANTITIES
+from ....processes import checked_jobs
 from ...compare.agreement import Comparison, compare
 from ...compare.chaos import ChaosFloor, chaos_floor
 from ...compare.instead import Instead, instead_of
@@ -173,7 +174,7 @@ def _floor(
         if request.uncertainty != EXACT:
             raise BadInputError("--uncertainty runs both sides again, and both are recorded runs")
         return None
-    with reporter.stage("chaos floor") as progress:
+    with reporter.stage("chaos floor", runs_at_once=checked_jobs(None)) as progress:
         return chaos_floor(
             comparison,
             run.reruns,

@@ -12,12 +12,6 @@ from ...compare.sides import Request
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 
-# Of `StageGap`, as columns of a table.
-_COLUMNS = (
-    *("stage", "unit", "worst", "at", "where", "tolerance", "beyond", "first", "leads", "scale"),
-    *("null", "told", "reason"),
-)
-
 
 @dataclass(frozen=True)
 class OneStepRequest:
@@ -33,6 +27,29 @@ class OneStepRequest:
         check_runs(self.run, "--one-step")
 
 
+_COLUMNS = (
+    *("stage", "unit", "worst", "at", "where", "tolerance", "beyond", "first", "leads", "scale"),
+    *("null", "told", "reason"),
+)
+
+
+@dataclass(frozen=True, repr=False)
+class OneStepResult(ShownResult, OneStep):
+    """What one step gives on each side, and what was asked.
+
+    Attributes:
+        request: What was asked.
+    """
+
+    page_function: ClassVar[str] = "questions.one_step:page"
+
+    request: OneStepRequest = field(kw_only=True, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Column]:
+        """Return a row for each stage of a step: the fields of `StageGap`."""
+        return columns_of(self.stages, _COLUMNS)
+
+
 def check_runs(run: Request, flag: str) -> None:
     """Check that both sides can be run.
 
@@ -45,35 +62,13 @@ def check_runs(run: Request, flag: str) -> None:
         )
 
 
-@dataclass(frozen=True, repr=False)
-class OneStepResult(ShownResult):
-    """What one step gives on each side.
-
-    Attributes:
-        request: What was asked.
-        labels: What the left and the right are called.
-        steps: The gap of each stage of a step.
-    """
-
-    page_function: ClassVar[str] = "questions.one_step:page"
-
-    request: OneStepRequest = field(metadata={"json": False})
-    labels: tuple[str, str]
-    steps: OneStep
-
-    def to_dict(self) -> dict[str, Column]:
-        """Return a row for each stage of a step: the fields of `StageGap`."""
-        return columns_of(self.steps.stages, _COLUMNS)
-
-
 def answer(request: OneStepRequest, reporter: Reporter = QUIET) -> OneStepResult:
     """Compare one step of both sides from each recorded state of the left one.
 
     Raises:
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
-    run = request.run
-    left, right = prepare_sides(run).reruns
+    left, right = prepare_sides(request.run).reruns
     with reporter.stage("one step") as progress:
-        steps = one_step(left, right.model, names=run.names, progress=progress)
-    return OneStepResult(request, run.labels, steps)
+        steps = one_step(left, right.model, names=request.run.names, progress=progress)
+    return OneStepResult(**vars(steps), request=request)

@@ -1,0 +1,273 @@
+"""The answer to why two sides differ, from what a search has found so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...engines import room
+from ...engines.records import DifferingQuantity, ModelDifference
+from ...interface import JointType, Model
+from ...measures.text import milliseconds
+from ...release_names import engine_of
+from ..compare.instead import instead_of
+from ..compare.matching import Matched, missing_parts
+from ..compare.motion import SEEN, MotionExtent, motion_of
+from ..recordings import Trace
+from ..runs.provenance import provenance
+from .causes import Cause, readable_of
+from .explained_gap import ExplainedGap
+from .explanation import Explanation, FailedSet, Share
+from .locate import Localisation
+from .request import WhyRequest, settings_of
+from .run_differences import orders_of
+from .search import Search
+from .shapley import Division
+from .trials import Trials
+from .verdict import UNEXPLAINED
+from .written import WrittenCause, as_written
+
+_REDUNDANT = 0.1  # of the gap: so much a cause may leave that makes others needless
+_STILL = 1e-3  # [rad or m] over a whole run
+_PERIODS = (
+    "commands come by the step, which is {left} on the left and {right} on the right: what comes "
+    "of that counts as timestep"
+)
+_NOT_RUN = "no set of causes with it could be run"
+_NOT_WITH_OTHERS = "it could not be equalized together with the others"
+
+
+def explanation_of(search: Search) -> Explanation:
+    """Return what is known; no run is made for it.
+
+    Args:
+        search: At least the gap of which is known.
+    """
+    request, trials, gap = search.request, search.trials, search.gap
+    assert gap is not None
+    assert search.attribution is not None
+    left, right, matched = request.left, request.right, trials.setup.matched
+    division, brought, found = search.attribution.division(), search.brought, search.located
+    motion = _motion(trials, matched)
+    shares, impossible = _shares(search, division)
+    explained, located, unexplained = _parts(gap, brought, found)
+    return Explanation(
+        experiment=request.scenario.name,
+        says=request.scenario.says,
+        seconds=request.duration,
+        labels=request.side_labels,
+        quantity=gap.quantity,
+        unit=trials.ruler.units[gap.quantity],
+        measure=gap.measure,
+        first=gap.first,
+        gap=gap.size,
+        shares=shares,
+        ended_by=search.ended_by,
+        method=division.method,
+        orders=division.orders,
+        brought=brought,
+        found_in=tuple(part for part in found if not part.side),
+        explained=explained,
+        located=located,
+        unexplained=unexplained,
+        negligible=gap.negligible,
+        tolerance=gap.tolerance,
+        floor=gap.floor,
+        draws=trials.draws,
+        one_engine=_is_one_engine(left, right),
+        redundant=_redundant(shares) if explained > UNEXPLAINED else (),
+        impossible=impossible,
+        unmatched=matched.only,
+        missing=_missing(request),
+        notes=_notes(matched, left, right),
+        unread=_unread(matched, request, gap),
+        still=_still(search.causes, left, trials.traces[0]),
+        motion=motion,
+        instead=None if motion.moved else instead_of(left, request.scenario.name, request.seed),
+        touch=trials.touch(gap.quantity) if gap.is_divided else None,
+        moments=len(trials.ruler.time),
+        between=trials.ruler.between,
+        runs=trials.count,
+        took=search.deadline.elapsed,
+        provenance=(provenance(left), provenance(right)),
+        right_file=right.path.name,
+        renamed=matched.renamed,
+    )
+
+
+def _motion(trials: Trials, matched: Matched) -> MotionExtent:
+    """Return how far the joints move that both sides have, as they come."""
+    sides: list[tuple[Trace, list[str]]] = []
+    for side, trace in enumerate(trials.traces):
+        labels = trace.header.joint_labels
+        sides.append((trace, [labels[pair[side]] for pair in matched.joints]))
+    return motion_of(sides, SEEN, float(trials.ruler.time[-1]))
+
+
+def _missing(request: WhyRequest) -> tuple[tuple[str, str], ...]:
+    """Return what one side has nothing of and the other has, as far as it acts in what is run."""
+    parts = missing_parts(request.left, request.right)
+    if request.scenario.options.get("actuation", True):
+        return parts
+    return tuple((side, part) for side, part in parts if part != "actuators")
+
+
+def _shares(search: Search, division: Division) -> tuple[tuple[Share, ...], tuple[FailedSet, ...]]:
+    """Return the causes, the largest share first, and the sets of them that could not be run.
+
+    What was found by a setting of one side is a cause, too.
+
+    Args:
+        search: What is known.
+        division: The parts of the gap of the causes of files, options, commands and settings.
+    """
+    request, causes = search.request, search.causes
+    written = tuple(as_written(request.left.path, request.right.path, causes))
+    names = {cause.name: text.name for cause, text in zip(causes, written, strict=True)}
+    impossible: list[FailedSet] = []
+    for equalized in division.failures:
+        failure = search.trials.failure(equalized)
+        if failure is not None:
+            impossible.append(FailedSet(tuple(sorted(names[c] for c in equalized)), failure))
+    rows = [
+        _share_of_cause(cause, text, division, impossible)
+        for cause, text in zip(causes, written, strict=True)
+    ]
+    for part in search.located:
+        if part.side:
+            rows.append(_share_of_integrator(part))
+    return tuple(sorted(rows, key=lambda row: -row.weight)), tuple(impossible)
+
+
+def _share_of_cause(
+    cause: Cause, written: WrittenCause, division: Division, impossible: Sequence[FailedSet]
+) -> Share:
+    """Return what is known of the part of a cause.
+
+    Args:
+        cause: The cause.
+        written: The same, as the right's file has it.
+        division: The parts of all causes.
+        impossible: The sets that could not be run, the smaller ones first.
+    """
+    row = Share(
+        name=written.name,
+        values=written.values,
+        place=written.place,
+        kind=cause.kind,
+        note=cause.refused,
+    )
+    name = cause.name
+    if name not in division.share:
+        return row
+    row = replace(
+        row,
+        share=division.share[name],
+        error=division.error[name],
+        range=division.range[name],
+        alone=division.alone[name],
+        last=division.last[name],
+    )
+    if not (division.is_over(name) and row.share is None):
+        return row
+    failures = [failed for failed in impossible if written.name in failed.equalized]
+    return replace(
+        row,
+        note=_NOT_RUN if row.alone is None else _NOT_WITH_OTHERS,
+        failure=failures[0] if failures else None,
+    )
+
+
+def _share_of_integrator(part: Localisation) -> Share:
+    """Return the part of an integrator that one side alone can choose, as that of a cause."""
+    assert part.side
+    values: tuple[DifferingQuantity, ...] = ()
+    if part.values:
+        values = (DifferingQuantity(part.name, *part.values),)
+    return Share(
+        name=part.name,
+        values=values,
+        place=None,
+        kind="option",
+        share=part.share,
+        alone=part.alone,
+        last=part.share,
+        chosen=(part.side, part.without),
+    )
+
+
+def _parts(
+    gap: ExplainedGap, brought: float | None, found: Sequence[Localisation]
+) -> tuple[float, float, float]:
+    """Return what is explained, located and unexplained, as parts of the gap."""
+    if not gap.is_divided:
+        return 0.0, 0.0, 0.0
+    if brought is None:
+        return 0.0, 0.0, 1.0
+    by_settings = sum(part.share for part in found if part.side)
+    explained = (gap.size - brought) / gap.size + by_settings
+    located = sum(part.share for part in found if not part.side)
+    stays = found[-1].gap if found else brought
+    return explained, located, stays / gap.size
+
+
+def _redundant(shares: Sequence[Share]) -> tuple[str, ...]:
+    """Return causes of which each explains nearly all alone, and next to nothing after the others.
+
+    There are none where that is so of one only.
+    """
+    names = [
+        row.name
+        for row in shares
+        if row.last is not None
+        and row.alone is not None
+        and row.alone > 1.0 - _REDUNDANT
+        and abs(row.last) < _REDUNDANT
+    ]
+    return tuple(names) if len(names) > 1 else ()
+
+
+def _notes(matched: Matched, left: Model, right: Model) -> tuple[str, ...]:
+    """Return what a reader should know, in sentences."""
+    notes = list(matched.other_notes)
+    for model in (left, right):
+        for what in room(engine_of(model.backend)).ignored(model):
+            if "integrator" not in what:  # which is a cause
+                notes.append(f"{model.backend}: {what}")
+    left_period, right_period = milliseconds(left.timestep, 3), milliseconds(right.timestep, 3)
+    if left_period != right_period:
+        notes.append(_PERIODS.format(left=left_period, right=right_period))
+    return tuple(dict.fromkeys(notes))
+
+
+def _unread(matched: Matched, request: WhyRequest, gap: ExplainedGap) -> tuple[str, ...]:
+    """Return names of differences that only a function would read, where none does."""
+    if not request.are_compiled:
+        return ()
+    is_read = request.scenario.own
+    rows: list[ModelDifference] = []
+    if not (is_read and gap.is_divided):
+        rows += readable_of(matched)
+    if not is_read:
+        rows += orders_of(matched)
+    return tuple(row.title for row in rows)
+
+
+def _still(causes: Sequence[Cause], model: Model, trace: Trace) -> tuple[str, ...]:
+    """Return joints of some causes, hinges and slides, that hardly move in a run."""
+    names = {row.where for cause in causes if cause.kind == "joint" for row in cause.differences}
+    still: list[str] = []
+    joints = zip(model.joint_names, model.jnt_type, model.jnt_qposadr, strict=True)
+    for name, kind, place in joints:
+        is_scalar = kind in (JointType.HINGE, JointType.SLIDE)
+        if name in names and is_scalar and np.ptp(trace.qpos[:, place]) < _STILL:
+            still.append(name)
+    return tuple(still)
+
+
+def _is_one_engine(left: Model, right: Model) -> bool:
+    """Tell whether two sides are computed by one engine and release, with settings of one kind."""
+    sides = [(model.backend, model.engine_version, settings_of(model)) for model in (left, right)]
+    return sides[0] == sides[1]
