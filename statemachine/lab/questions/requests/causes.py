@@ -144,12 +144,12 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     result = _result(request, question, explanation)
     if request.write is None:
         return result
-    with reporter.stage("why: the file that is written"):
+    with reporter.stage("why: writing"):
         return _with_file(result, question, sides, Path(request.write))
 
 
-def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, Sequence[Side]]:
-    """Load both sides, and return the question about them, and the sides."""
+def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, tuple[Side, Side]]:
+    """Load both sides, and return the question about them, and the sides as they were loaded."""
     run = request.run
     with reporter.stage("why: loading"):
         if run.is_traces:
@@ -182,7 +182,7 @@ def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, 
             uncertain=request.uncertainty,
             jobs=request.jobs,
         )
-    return question, sides
+    return question, (sides[0], sides[1])
 
 
 def _result(
@@ -204,14 +204,12 @@ def _result(
 
 
 def _words_of(request: ExplainRequest) -> list[str]:
-    """Return the words that ask this question."""
+    """Return the words that ask this question, without the time that it was given."""
     words = ["--why"]
     if request.quantity is not None:
         words += ["--quantity", request.quantity]
     if request.measure != "worst":
         words += ["--measure", request.measure]
-    if request.time_limit is not None:
-        words += ["--time-limit", f"{request.time_limit:g}"]
     if request.run.is_typed and request.finer:
         words.append("--finer")
     if request.run.is_typed and request.uncertainty is None:

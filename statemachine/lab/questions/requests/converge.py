@@ -87,7 +87,8 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> ConvergeResu
         took.append(time.monotonic() - began)
         return traces
 
-    return ConvergeResult(**vars(convergence(run)), request=request)
+    limits = convergence(run)
+    return ConvergeResult(**vars(limits), request=request)
 
 
 def _expected(took: list[float]) -> float | None:
