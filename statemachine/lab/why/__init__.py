@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from .explain import explain
-from .explanation import Explanation, FailedSet, InterruptedExplanation, Share
+from .explanation import Effect, Explanation, FailedSet, InterruptedExplanation, Share
 from .request import WhyRequest
 from .shares import ADDS_UP
 from .verdict import UNEXPLAINED, GapVerdict
@@ -26,6 +26,7 @@ from .verdict import UNEXPLAINED, GapVerdict
 __all__ = [
     "ADDS_UP",
     "UNEXPLAINED",
+    "Effect",
     "Explanation",
     "FailedSet",
     "GapVerdict",

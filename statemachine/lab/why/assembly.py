@@ -138,7 +138,7 @@ def _shares(search: Search, division: Division) -> tuple[tuple[Share, ...], tupl
     for part in search.located:
         if part.side:
             rows.append(_share_of_integrator(part))
-    return tuple(sorted(rows, key=lambda row: -row.weight)), tuple(impossible)
+    return tuple(sorted(rows, key=lambda row: -row.weight())), tuple(impossible)
 
 
 def _share_of_cause(

@@ -86,19 +86,41 @@ class Share:
     changes: tuple[AttributeChange, ...] = ()
     not_written: str = ""
 
-    @property
-    def effects(self) -> Range | None:
-        """The least and the largest of what it takes away alone and last; None if not known."""
-        effects = [effect for effect in (self.alone, self.last) if effect is not None]
-        return (min(effects), max(effects)) if effects else None
-
-    @property
     def weight(self) -> float:
-        """The size by which causes are ranked: of the share, or of the mean of alone and last."""
+        """Return the size that it is ranked by: of its share, or of the mean of alone and last."""
         if self.share is not None:
             return abs(self.share)
-        effects = [effect for effect in (self.alone, self.last) if effect is not None]
+        return Effect(self.name, self.alone, self.last).size()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a cause takes away of the gap alone, and last: that is known before any share.
+
+    Attributes:
+        name: Of the cause.
+        alone: The part that it takes away as the only one; None where that could not be run, or
+            was not run yet.
+        last: The part that it takes away after all others that can be equalized; None as `alone`.
+    """
+
+    name: str
+    alone: float | None
+    last: float | None
+
+    @property
+    def range(self) -> Range | None:
+        """The least and the largest of both; None where neither is known."""
+        effects = self._known()
+        return (min(effects), max(effects)) if effects else None
+
+    def size(self) -> float:
+        """Return the size of the mean of what is known; 0 where nothing is."""
+        effects = self._known()
         return abs(sum(effects)) / len(effects) if effects else 0.0
+
+    def _known(self) -> list[float]:
+        return [effect for effect in (self.alone, self.last) if effect is not None]
 
 
 @dataclass(frozen=True)
@@ -212,13 +234,11 @@ class Explanation:
         return not (self.ended_by or self.method in ("not ranked", "alone and last"))
 
     @property
-    def ranking(self) -> tuple[Share, ...]:
-        """The causes of which it is known what they take away alone or last, the largest first.
-
-        That is known before any share: see `Share.effects`.
-        """
-        ranked = [row for row in self.shares if row.effects is not None]
-        return tuple(sorted(ranked, key=_mean_effect, reverse=True))
+    def ranking(self) -> tuple[Effect, ...]:
+        """What each cause takes away alone and last, as far as is known, the largest first."""
+        effects = [Effect(row.name, row.alone, row.last) for row in self.shares]
+        known = [effect for effect in effects if effect.range is not None]
+        return tuple(sorted(known, key=Effect.size, reverse=True))
 
     @property
     def verdict(self) -> GapVerdict:
@@ -260,12 +280,6 @@ class Explanation:
             LocatedPart(place.share, place.is_still, is_switch=place.name in causes)
             for place in self.found_in
         )
-
-
-def _mean_effect(row: Share) -> float:
-    """Return the size of what a cause takes away, in the mean of alone and last."""
-    effects = [effect for effect in (row.alone, row.last) if effect is not None]
-    return abs(sum(effects)) / max(1, len(effects))
 
 
 class InterruptedExplanation(KeyboardInterrupt):

@@ -46,7 +46,7 @@ def summary_table(result: Explanation, most: int) -> Table:
     acting = [row for row in able(result) if has_effect(row) or not result.verdict.divides]
     parts: list[tuple[Row, float]] = []
     for row in acting:
-        parts.append((_summary_of_cause(result, row), row.share if row.share else row.weight))
+        parts.append((_summary_of_cause(result, row), row.share if row.share else row.weight()))
     for place in result.found_in:
         parts.append((_summary_of_place(place), place.share))
     parts.sort(key=lambda pair: -abs(pair[1]))

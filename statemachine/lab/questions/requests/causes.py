@@ -129,7 +129,8 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     Raises:
         EndedEarlyError: As they come, a side does not reach the end.
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
-        InterruptedExplanation: Ctrl-C; it holds the ExplainResult of what is known by then.
+        InterruptedExplanation: Ctrl-C; it holds the ExplainResult of what is known by then, and no
+            file was written.
     """
     began = time.monotonic()  # loading counts
     question, sides = _question(request, reporter)
@@ -140,16 +141,16 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     try:
         explanation = explain(question, reporter, so_far, began)
     except InterruptedExplanation as stop:
-        raise InterruptedExplanation(_result(request, question, stop.result)) from None
-    result = _result(request, question, explanation)
-    if request.write is None:
-        return result
-    with reporter.stage("why: writing"):
-        return _with_file(result, question, sides, Path(request.write))
+        explanation = _with_changes(stop.result, question, request)
+        raise InterruptedExplanation(_result(explanation, request)) from None
+    explanation = _with_changes(explanation, question, request)
+    if request.write is not None:
+        explanation = _with_file(explanation, question, sides, Path(request.write))
+    return _result(explanation, request)
 
 
-def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, tuple[Side, Side]]:
-    """Load both sides, and return the question about them, and the sides as they were loaded."""
+def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, Sequence[Side]]:
+    """Load both sides, and return the question about them, and the sides as they are loaded."""
     run = request.run
     with reporter.stage("why: loading"):
         if run.is_traces:
@@ -182,15 +183,20 @@ def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, 
             uncertain=request.uncertainty,
             jobs=request.jobs,
         )
-    return question, (sides[0], sides[1])
+        return question, sides
 
 
-def _result(
-    request: ExplainRequest, question: WhyRequest, explanation: Explanation
-) -> ExplainResult:
-    """Return an explanation with what to change, what was typed, and what was asked."""
+def _with_changes(
+    explanation: Explanation, question: WhyRequest, request: ExplainRequest
+) -> Explanation:
+    """Return an explanation with what to change of the right's file."""
+    names = request.run.names
+    return with_changes(explanation, question.left, question.right, names, request.finer)
+
+
+def _result(explanation: Explanation, request: ExplainRequest) -> ExplainResult:
+    """Return an explanation with what was typed, and what was asked."""
     run = request.run
-    explanation = with_changes(explanation, question.left, question.right, run.names, request.finer)
     notes = [*run.taken]
     if run.is_traces:
         notes.append(_PLAYED)
@@ -218,8 +224,8 @@ def _words_of(request: ExplainRequest) -> list[str]:
 
 
 def _with_file(
-    explanation: ExplainResult, question: WhyRequest, sides: Sequence[Side], target: Path
-) -> ExplainResult:
+    explanation: Explanation, question: WhyRequest, sides: Sequence[Side], target: Path
+) -> Explanation:
     """Write the right's file with the left's values, and run it.
 
     Args:
