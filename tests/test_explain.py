@@ -145,13 +145,13 @@ def test_a_pair_that_is_taken_away_is_as_its_geoms_are_then(other, tmp_path):
 
 # Meshes and height fields that cannot be brought over, and the reason.
 REFUSED = [
-    (mesh(), mesh(corners=30), "another size"),
-    (hills(), hills(points=11), "another size"),
+    (mesh(), mesh(corners=30), "another number of vertices"),
+    (hills(), hills(points=11), "other rows or columns"),
     *(
         (
             balls("m", other, m=SMALL, k={"noise": 2e-3}, n=LARGE),
             balls("n", "n", n=LARGE),
-            "another geom keeps this mesh, or gets a third",
+            "another geom has this mesh, too",
         )
         for other in ("k", "n")
     ),
@@ -161,7 +161,8 @@ REFUSED = [
 @pytest.mark.parametrize(("left", "right", "reason"), REFUSED)
 def test_what_is_not_brought_over_is_refused_with_its_reason(left, right, reason, tmp_path):
     found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
-    assert {each.note.rpartition(" of ")[2] for each in found.shares} == {reason}
+    assert found.shares
+    assert all(reason in share.note for share in found.shares)
     assert not found.verdict.holds
 
 

@@ -50,7 +50,7 @@ _DRAWN_ENDS = ("_rgba", "_matid", "_castshadow")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EditOutcome:
     """What became of an edit.
 
     Attributes:
@@ -86,7 +86,7 @@ def _compiles_alike(text: str) -> bool:
     return all(np.array_equal(getattr(left.opt, n), getattr(right.opt, n)) for n in options)
 
 
-def _outcome(edit: AttributeEdit, folder: Path) -> Outcome:
+def _outcome(edit: AttributeEdit, folder: Path) -> EditOutcome:
     """Return what becomes of an edit; files are written into a folder."""
     right = edit.applied(RICH)
     states = raw_states(right)
@@ -98,7 +98,7 @@ def _outcome(edit: AttributeEdit, folder: Path) -> Outcome:
     listed += [note for note in result.notes if "put elsewhere on the same solid" in note]
     base = _base_states()
     moves = states.shape != base.shape or float(np.abs(states - base).max()) > _ROUNDING
-    return Outcome(edit, moves, _compiles_alike(right), tuple(listed))
+    return EditOutcome(edit, moves, _compiles_alike(right), tuple(listed))
 
 
 def _legal_edits(seed: int) -> Iterator[AttributeEdit]:
@@ -118,10 +118,10 @@ def _edits(seed: int) -> tuple[AttributeEdit, ...]:
     return tuple(islice(_legal_edits(seed), COUNT))
 
 
-_OUTCOMES: dict[tuple[int, int], Outcome] = {}  # by seed and number: two claims are of one run
+_OUTCOMES: dict[tuple[int, int], EditOutcome] = {}  # by seed and number: two claims are of one run
 
 
-def _drawn(seed: int, number: int, folder: Path) -> Outcome:
+def _drawn(seed: int, number: int, folder: Path) -> EditOutcome:
     if (seed, number) not in _OUTCOMES:
         _OUTCOMES[seed, number] = _outcome(_edits(seed)[number], folder)
     return _OUTCOMES[seed, number]

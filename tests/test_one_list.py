@@ -88,7 +88,7 @@ def test_what_is_carried_by_another_part_cannot_be_brought_over(tmp_path):
         left="world",
         right="lower",
         cause="parent of ball",
-        refused="it hangs on another part",
+        refused="it hangs on another part: put its body into the same one in both files",
     )
 
 

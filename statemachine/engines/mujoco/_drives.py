@@ -110,7 +110,7 @@ def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
             edits += row.edits
         yield sides.tell(subject, "actuator", a, values, edits)
     elif ours.controls != theirs.controls:
-        why = "it takes other numbers of ctrl"
+        why = "it takes other numbers of ctrl: give it one kind and one input in both files"
         yield sides.tell(subject, "actuator", a, values, refused=why)
     else:
         difference = sides.tell(subject, "actuator", a, values)
@@ -266,7 +266,9 @@ def _transmission(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         return
     value = DifferingQuantity("drives", ours[1], theirs[1])
     edits = _given_transmission(sides, a, b)
-    why = "" if edits else "it drives another thing, or in another way"
+    why = ""
+    if not edits:
+        why = "what it drives has no counterpart: write the same transmission into both files"
     difference = sides.tell("transmission", "actuator", a, (value,), refused=why)
     yield replace(difference, spec_edits=edits)
 

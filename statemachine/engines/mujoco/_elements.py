@@ -31,6 +31,10 @@ _CONNECT, _WELD, _JOINT, _TENDON = range(4)  # mjtEq
 _KINDS_OF_COUPLING = {_JOINT: "joint", _TENDON: "tendon"}
 _BODY = 1  # mjtObj
 _KEEPS = {_BODY: "body", 3: "joint", 5: "geom", 6: "site", 18: "tendon"}  # mjtObj
+_OTHER_PATH = (
+    "the compiler builds the path of a tendon: write the same joints, sites, geoms and pulleys "
+    "into both files"
+)
 _NEAR = 1e-9  # [m], and of entries of matrices: as a file with ten digits leaves it
 
 
@@ -105,7 +109,9 @@ def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     differ = [k for k, pair in enumerate(zip(ours, theirs, strict=False)) if pair[0] != pair[1]]
     numbers = [k for k in differ if ours[k][:2] == theirs[k][:2] and ours[k][0] in _NUMBERED]
     if len(ours) != len(theirs) or numbers != differ:
-        yield sides.tell("path", "tendon", a, refused="it takes another path")
+        words = _words_of_path(sides.left, a), _words_of_path(sides.right, b)
+        value = DifferingQuantity("path", *words)
+        yield sides.tell("path", "tendon", a, (value,), refused=_OTHER_PATH)
     elif differ:
         start, other = int(sides.left.tendon_adr[a]), int(sides.right.tendon_adr[b])
         values = [DifferingQuantity(f"coef[{k}]", ours[k][2], theirs[k][2]) for k in differ]
@@ -113,6 +119,16 @@ def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
             ("wrap_prm", (other + k,), float(sides.left.wrap_prm[start + k])) for k in differ
         ]
         yield sides.tell("coefficients", "tendon", a, values, edits)
+
+
+def _words_of_path(raw: Any, tendon: int) -> str:
+    """Return what a tendon passes, by the names of joints, sites and geoms."""
+    start = int(raw.tendon_adr[tendon])
+    words: list[str] = []
+    for k in range(start, start + int(raw.tendon_num[tendon])):
+        kind = _WRAPS.get(int(raw.wrap_type[k]))
+        words.append(name_of(raw, kind, int(raw.wrap_objid[k])) if kind else "pulley")
+    return ", ".join(words)
 
 
 def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:

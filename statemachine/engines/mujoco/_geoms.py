@@ -96,7 +96,7 @@ class Geoms:
                 "geom",
                 a,
                 values,
-                refused="one of them is not a primitive, and cannot become the other",
+                refused="one of them is no primitive: give both files the same type of geom",
             )
             return
         if kinds[0] == "hfield":
@@ -148,7 +148,7 @@ class Geoms:
             edits, why = shapes.copied(left, right, int(left.geom_dataid[a]), mesh)
             self._copied.add(mesh)
         else:
-            why = "another geom keeps this mesh, or gets a third"
+            why = "another geom has this mesh, too: give each of them a mesh of its own"
         for pair in together if edits else ():
             edits += (*copies(_BOUNDS, left, *pair), *self._moved(*pair).edits)
         name = few([name_of(left, "geom", geom) for geom, _ in together])

@@ -36,6 +36,15 @@ _WEIGHS = {
     "centre of mass": ("body_ipos",),
     "inertia": ("body_inertia", "body_iquat"),
 }
+# Why something cannot be brought over, and what to do.
+_OTHER_OWNER = "it is on another part: put the site on the same body in both files"
+_OTHER_JOINTS = (
+    "it has other joints: write the same ones into both files, or pair two by --map LEFT=RIGHT"
+)
+_OTHER_PARENT = "it hangs on another part: put its body into the same one in both files"
+_OTHER_ORDER = (
+    "the order of the joints of a body is that of its file: write their lines in the same order"
+)
 _STORED = "its frames lie elsewhere, and the compiler decides how its mass matrix is stored"
 _TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal have of rounding
 
@@ -221,7 +230,7 @@ def places(sides: Sides) -> Iterator[ModelDifference]:
     for a, b in sides.pairs.sites:
         pair = sides.part(int(sides.left.site_bodyid[a]))
         if pair is None or sides.solids[1].head(int(sides.right.site_bodyid[b])) != pair.right:
-            yield sides.tell("owner", "site", a, refused="it is on another part")
+            yield sides.tell("owner", "site", a, refused=_OTHER_OWNER)
             continue
         wanted, theirs = pair.align @ sides.solids[0].on("site", a), sides.solids[1].on("site", b)
         if max(apart(wanted, theirs)) > NEAR:
@@ -238,11 +247,11 @@ def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
     parent = sides.part(int(left.body_parentid[pair.left]))
     if numbers != (len(joints), len(joints)):
         values = (DifferingQuantity("joints", *numbers),)
-        yield sides.tell("joints", "body", pair.left, values, refused="it has other joints")
+        yield sides.tell("joints", "body", pair.left, values, refused=_OTHER_JOINTS)
         return
     yield from _order(sides, pair, joints)
     if pair.moved or parent is None:
-        yield sides.tell("parent", "body", pair.left, refused="it hangs on another part")
+        yield sides.tell("parent", "body", pair.left, refused=_OTHER_PARENT)
         return
     for a, b in joints:
         yield from _axis(sides, pair, a, b)
@@ -283,8 +292,7 @@ def _order(
         values.append(DifferingQuantity(second, here, reverse))
     if values:
         subject = ORDER_OF_JOINTS + ", ".join(dict.fromkeys(names))
-        why = "a joint cannot be put before another one of its body in a compiled model"
-        yield sides.tell(subject, "body", pair.left, values, refused=why)
+        yield sides.tell(subject, "body", pair.left, values, refused=_OTHER_ORDER)
 
 
 def _commute(raw: Any, a: int, b: int) -> bool:

@@ -84,8 +84,7 @@ def copied(left: Any, right: Any, ours: int, theirs: int) -> tuple[tuple[Edit, .
     for name, part in here.items():
         values, old = np.array(getattr(left, name)[part]), getattr(right, name)[there[name]]
         if len(values) != len(old):
-            what = "has a convex hull" if name == "mesh_graph" else "is a mesh"
-            return (), f"it {what} of another size"
+            return (), "its mesh has another number of vertices or faces: give both files one mesh"
         if name.endswith("adr") and len(values):  # in another array, where it begins elsewhere
             values += old[0] - values[0]
         edits.append((name, (there[name],), values))
@@ -159,7 +158,7 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     (ours, grid, here), (theirs, other, there) = _field(left, a), _field(right, b)
     if grid != other:
         words = (f"{rows} x {columns}" for rows, columns in (grid, other))
-        why = "it is a height field of another size"
+        why = "its height field has other rows or columns: give both files one height field"
         yield sides.tell("heights", "geom", a, (DifferingQuantity("points", *words),), refused=why)
         return
     data = left.hfield_data[here], right.hfield_data[there]
@@ -174,7 +173,9 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     ]
     edits += copies(("geom_size", "geom_rbound", "geom_aabb"), left, a, b)
     users = (right.geom_type == right.geom_type[b]) & (right.geom_dataid == theirs)
-    why = "another geom has this height field, too" if users.sum() > 1 else ""
+    why = ""
+    if users.sum() > 1:
+        why = "another geom has this height field, too: give each of them one of its own"
     value = DifferingQuantity("farthest point", 0.0, float(far), "m")
     yield sides.tell("heights", "geom", a, (value,), () if why else edits, refused=why)
 

@@ -12,6 +12,7 @@ from ...engines.description.match import Matching, Pair
 from ...engines.description.records import OF_A_SLIDE, SCALAR, CollisionShape, RobotJoint
 from ...engines.description.shapes import likest
 from ...engines.description.urdf import Declared
+from ...rotations import HERE
 from ..compare.matching import MatchedTrees
 from .quantities import unit_of_free_joint
 from .records import SUBJECTS, PoseGap, QuantityAgreement
@@ -120,15 +121,8 @@ def _of_pair(
     if above is not None:
         off_frame = pair.right.place.inverse @ above.align @ pair.left.place @ pair.align.inverse
         yield _Compared("places", "m", a.name, float(np.linalg.norm(off_frame.pos)), reach)
-        turn = math.atan2(*_turn(off_frame.mat))
-        yield _Compared("places", "rad", a.name, turn, math.pi)
+        yield _Compared("places", "rad", a.name, off_frame.angle(HERE), math.pi)
     yield from _of_joint(a, b, declared)
-
-
-def _turn(mat: np.ndarray) -> tuple[float, float]:
-    """Return sine and cosine of the angle of a rotation matrix (3, 3)."""
-    sine = mat[[2, 0, 1], [1, 2, 0]] - mat[[1, 2, 0], [2, 0, 1]]
-    return float(np.linalg.norm(sine)) / 2, (float(np.trace(mat)) - 1) / 2
 
 
 def _of_joint(

@@ -10,14 +10,22 @@ from ...engines.description.reading import ModelReading
 from ...engines.records import ORDER_OF_JOINTS, TURNED, DifferingQuantity, ModelDifference
 from ...interface import JointType
 from ..compare.matching import Matched
-from ..why.causes import differences_of
-from .effects import Effects, Meaning, ServoParts
+from ..why.causes import OTHER_JOINT, differences_of
+from .effects import Effects, Meaning
 from .listing import CompiledCause, Listing
 from .locating import ElementIds, Locator
 from .meanings import Meanings
 from .quantities import of_free_joint, split_solref
 from .records import Value
 
+# What a geom, and a flex, has of how it touches.
+_CONTACT = dict.fromkeys(
+    (
+        *("friction", "friction dimensions", "softness", "priority", "margin", "filter"),
+        *("adhesion", "moving surface", "self-collision"),
+    ),
+    "contact",
+)
 # What a difference of an element of each kind is a matter of, by its subject.
 _SUBJECTS: dict[str, dict[str, str]] = {
     "body": {
@@ -47,27 +55,14 @@ _SUBJECTS: dict[str, dict[str, str]] = {
         "heights": "shapes",
         "extra shape": "shapes",
         "place": "shapes",
-        "friction": "contact",
-        "friction dimensions": "contact",
-        "softness": "contact",
-        "priority": "contact",
-        "margin": "contact",
-        "filter": "contact",
-        "adhesion": "contact",
-        "moving surface": "contact",
+        **_CONTACT,
     },
     "flex": {
         "radius": "shapes",
         "rest shape": "shapes",
         "mesh": "shapes",
         "extra flex": "structure",
-        "friction": "contact",
-        "friction dimensions": "contact",
-        "softness": "contact",
-        "priority": "contact",
-        "margin": "contact",
-        "filter": "contact",
-        "self-collision": "contact",
+        **_CONTACT,
     },
     "site": {"place": "tool frame", "owner": "tool frame"},
     "equality": {"extra equality": "structure"},
@@ -83,8 +78,6 @@ _UNSAID = {
 _EQUALITY_OF_JOINTS = 2  # mjtEq
 # What says the largest force of a joint.
 _EFFORTS = (("joint", "force limit"), ("actuator", "force range"))
-# What each gain of a servo decides.
-_PARTS_OF_SERVO: dict[str, ServoParts] = {"kp": "sag", "kv": "ratio"}
 
 
 class CompiledDifferences:
@@ -137,9 +130,7 @@ class CompiledDifferences:
             if left.kind == right.kind or left.name not in lonely:
                 continue
             names |= {left.name, right.name}
-            cause = CompiledCause(
-                f"extra joint of {left.name}", "a joint cannot be added or taken away"
-            )
+            cause = CompiledCause(f"extra joint of {left.name}", OTHER_JOINT)
             element = self._locator.find("joint", left.name)
             kinds = (left.kind, right.kind)
             self._listing.enter("places", element, "type", kinds, Meaning(1.0), "", cause)

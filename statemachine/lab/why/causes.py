@@ -19,6 +19,10 @@ from ..compare.matching import Matched
 from ..runs.floating import Bases, base_of
 
 _NOT_COMPILED_ANEW = "its file is binary: it cannot be compiled anew"
+OTHER_JOINT = (
+    "a joint cannot be added or taken away: write it into both files, or pair it with another one "
+    "by --map LEFT=RIGHT"
+)
 EXTRA_ACTUATOR = "extra actuator"
 # The subjects that the mass of a geom changes in its body.
 MASS_SUBJECTS = frozenset({"mass", "centre of mass", "inertia"})
@@ -137,7 +141,7 @@ def _extra_joint(name: str, left: str | None, right: str | None) -> ModelDiffere
         kind="joint",
         where=name,
         values=(DifferingQuantity("joint", left, right),),
-        refused="a joint cannot be added or taken away",
+        refused=OTHER_JOINT,
     )
 
 
