@@ -37,7 +37,7 @@ PAGES = {"../CONTRIBUTING.md": "contributing", "../models/so101/README.md": "so1
 
 
 def _make_pages(_app) -> None:
-    from statemachine.course.site import make_comparisons, make_path, make_reference
+    from tools.docs_pages import make_comparisons, make_path, make_reference
 
     backends = os.environ.get("STATEMACHINE_DOCS_BACKENDS", "").split(",")
     make_path(HERE / "path", [name for name in backends if name] or None)

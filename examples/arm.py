@@ -5,6 +5,7 @@ An observation ends with the way to the target (3,) [m], and begins with the arm
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import statemachine as sm
+from statemachine.errors import StateMachineError
 from statemachine.gym import RobotVectorEnv, make_vec
 
 Array = NDArray[np.float64]
@@ -125,12 +127,23 @@ def play(envs: RobotVectorEnv, policy: Policy, seed: int) -> Episodes:
 
 def show(
     name: str,
-    backend: str,
     task: Callable[[str], dict[str, Any]],
     policies: Callable[[sm.Model], dict[str, Policy]],
 ) -> None:
-    """Play 16 episodes of a task with each of its policies, and print a line of them."""
-    envs = make_vec(num_envs=16, **task(backend))
-    for kind, policy in policies(envs.model).items():
-        print(f"{name} on {backend}, {kind}: {play(envs, policy, seed=0)}")
-    envs.close()
+    """Play 16 episodes of a task with each of its policies, and print a line of them.
+
+    Args:
+        name: Of the task.
+        task: Returns the arguments of `make_vec` on a backend, which is that of the command line.
+        policies: Returns the policies for a model, by name.
+    """
+    parser = argparse.ArgumentParser(description=f"Play 16 episodes of the task: {name}.")
+    parser.add_argument("backend", nargs="?", default="mujoco", help="the engine (mujoco)")
+    backend = parser.parse_args().backend
+    try:
+        envs = make_vec(num_envs=16, **task(backend))
+        for kind, policy in policies(envs.model).items():
+            print(f"{name} on {backend}, {kind}: {play(envs, policy, seed=0)}")
+        envs.close()
+    except StateMachineError as error:  # a backend that is not there, or not known
+        parser.error(str(error))

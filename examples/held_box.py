@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
@@ -104,4 +103,4 @@ def policies(model: sm.Model) -> dict[str, Policy]:
 
 
 if __name__ == "__main__":
-    show("held box", sys.argv[1] if len(sys.argv) > 1 else "mujoco", task, policies)
+    show("held box", task, policies)

@@ -19,12 +19,12 @@ from statemachine.course import notebook as md
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.session import page_of_lesson, take
 from statemachine.course.notebook import _opening, build, lesson
-from statemachine.course.site import make_path
 from statemachine.errors import BadInputError
 from statemachine.show import terminal
 from statemachine.show.blocks import Heading, Page, Printed, Question, Table, Text
 from statemachine.show.charts import drawn
 from statemachine.show.pictures import Pipeline, Slots, Traces
+from tools.docs_pages import make_path
 
 from .support.claims import assert_in, refused
 from .support.pages import blocks
@@ -167,7 +167,7 @@ def test_a_page_that_is_the_same_is_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "statemachine.course.site.LESSONS", {name: LESSONS[name] for name in ("state", "write")}
+        "tools.docs_pages.LESSONS", {name: LESSONS[name] for name in ("state", "write")}
     )
     first = make_path(tmp_path, say=lambda _: None)
     assert all("pybullet" in path.read_text("utf-8") for path in first)  # every engine here

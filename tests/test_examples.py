@@ -41,6 +41,33 @@ def test_an_example_prints_a_line_of_each_policy(name: str, engine: str) -> None
         assert chance.endswith(rest)
 
 
+WITHOUT_GYMNASIUM = """
+import importlib.util, runpy, sys
+find_spec = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *more: (
+    None if name == "gymnasium" else find_spec(name, *more)
+)
+sys.argv = ["{name}", "--help"]
+runpy.run_module("examples.{name}", run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_without_its_extra_says_which_in_one_line(name: str) -> None:
+    done = of_python("-c", WITHOUT_GYMNASIUM.format(name=name), code=1)
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert "statemachine-sim[gym]" in done.stderr
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_has_a_help_and_refuses_an_unknown_engine_in_words(name: str) -> None:
+    assert "backend" in of_python("-m", f"examples.{name}", "--help", code=0).stdout
+    error = of_python("-m", f"examples.{name}", "mujcoo", code=2).stderr
+    assert "Did you mean 'mujoco'" in error
+    assert "Traceback" not in error
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXAMPLES)
 @pytest.mark.usefixtures("pinocchio")

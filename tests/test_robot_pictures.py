@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shlex
+from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
@@ -13,7 +14,6 @@ import pytest
 import statemachine as sm
 from statemachine import cli
 from statemachine.course import notebook as md
-from statemachine.course import site
 from statemachine.course.lessons import LESSONS, PATH
 from statemachine.course.lessons.pictures import PICTURES, with_picture
 from statemachine.course.quiz import Reader
@@ -22,6 +22,7 @@ from statemachine.lab.questions import film
 from statemachine.show import terminal
 from statemachine.show.blocks import Page, Printed, Question, Text
 from statemachine.show.pictures import RobotPicture
+from tools import docs_pages
 
 from .support.claims import assert_has, assert_in
 from .support.rendering import rendering_environment
@@ -82,13 +83,13 @@ def test_it_stands_after_what_the_code_printed() -> None:
 
 
 def test_without_a_renderer_a_page_has_the_words(
-    tmp_path: object, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         film, "renderer_here", Mock(side_effect=MissingEngineError("nothing draws"))
     )
     page = Page("t", "o", [_picture()])
-    text = site._write(tmp_path, "page", page, "x").read_text()  # pyright: ignore
+    text = docs_pages.write_page(tmp_path, "page", page, "x").read_text()
     assert_in(text, "the words", "*the title* Live: `statemachine view`")
     assert "![" not in text
 

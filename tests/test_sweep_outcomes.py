@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,13 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import statemachine as sm
 from statemachine.cli import main
 from statemachine.errors import BadInputError
 from statemachine.lab.sweep import Sweep, prepared
 from statemachine.lab.sweep.analysis import MainEffect, SweepEffects
 from statemachine.lab.sweep.main_effects import LevelMean
-from statemachine.lab.sweep.outcomes import base_joint
 from statemachine.lab.sweep.page import page
 from statemachine.lab.sweep.questions import (
     SweepEffectsRequest,
@@ -25,6 +25,7 @@ from statemachine.lab.sweep.questions import (
     answer_effects,
 )
 from statemachine.lab.sweep.worker import run_batch
+from statemachine.show.first_screen import COLUMNS, LINES, lines_of
 
 from .support.files import written
 from .support.pages import shown
@@ -177,9 +178,21 @@ def test_the_tracking_error_is_that_of_raw_mujoco(tmp_path: Path) -> None:
     assert row["tracking_error"] > 0.01
 
 
-def test_a_free_box_in_the_scene_of_an_arm_is_no_base(tmp_path: Path) -> None:
-    assert base_joint(sm.load("so101/scene_box")) is None
-    assert base_joint(sm.load(written(tmp_path / "cart.xml", CART))) == 0
+def test_a_free_box_in_the_scene_of_an_arm_is_no_base() -> None:
+    (row,) = rows_of(Sweep("hold", (), ("mujoco",), model="so101/scene_box", seconds=0.05))
+    assert [row[name] for name in ("base", "distance", "fell")] == [None] * 3
+    assert row["tracking_error"] > 0
+
+
+def test_the_tracking_errors_of_hinges_and_of_slides_are_two(tmp_path: Path) -> None:
+    slide = MAST.replace('name="arm" axis="0 1 0"', 'name="arm" type="slide" axis="0 0 1"')
+    function = f"{written(tmp_path / 'still.py', STILL)}:still"
+    sweep = Sweep(function, (), ("mujoco",), seconds=0.1)
+    for content, column in ((MAST, "tracking_error"), (slide, "slide_tracking_error")):
+        model = str(written(tmp_path / "mast.xml", content))
+        (row,) = rows_of(replace(sweep, model=model))
+        known = [name for name in ("tracking_error", "slide_tracking_error") if row[name]]
+        assert known == [column]
 
 
 @pytest.mark.parametrize("quantity", ["fell", "distance", "base z", "tracking_error"])
@@ -205,8 +218,9 @@ def report_of(*shares: float | None, error: float | None = None, **others: Any) 
     levels = (LevelMean(0.5, -1.0), LevelMean(2.0, 3.0))
     cell = ExtremeCell(1.25, tuple(1.0 for _ in names), 0)
     facts: dict[str, Any] = {
-        "what": "walk.py:policy", "model": ("robot.xml",), "folder": "", "command": "statemachine",
-        "command_with_errors": "statemachine sweep walk.py:policy robot.xml --seeds 3",
+        "what": "walk.py:policy", "model": ("robot.xml",), "folder": "",
+        "command": f"statemachine sweep walk.py:policy robot.xml {'--vary some=1,2 ' * len(names)}",
+        "more_runs": "--seeds 3",
         "versions": {"mujoco": "4"}, "backends": ("mujoco",), "quantity": "base x", "unit": "m",
         "parameters": tuple(names), "units": {}, "scaled": (), "seeds": 1, "samples": 0,
         "effects": tuple(
@@ -241,7 +255,7 @@ def test_the_verdict_names_one_parameter_only_where_one_leads(
     assert report_of(*shares, error=error).verdict == verdict
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [1, 2, 12, 60])
 @pytest.mark.parametrize("verdict", ["one", "tied", "together", "none"])
 def test_the_first_screen_is_one_of_24_lines(count: int, verdict: str) -> None:
     leads = {"one": 0.9, "tied": 0.5, "together": 0.1, "none": None}[verdict]
@@ -259,8 +273,8 @@ def test_the_first_screen_is_one_of_24_lines(count: int, verdict: str) -> None:
         model=tuple(f"a_robot_with_a_long_name_{k}.xml" for k in range(count)),
     )
     lines = shown(page(report)).splitlines()
-    assert len(lines) <= 24
-    assert max(map(len, lines)) <= 80
+    assert lines_of(page(report)) <= LINES
+    assert max(len(line) for line in lines if not line.startswith("    ")) <= COLUMNS
     assert len(shown(page(report, details=True)).splitlines()) > len(lines)
 
 
@@ -353,7 +367,8 @@ def test_the_gain_moves_the_trot_of_a_go2_more_than_friction_does(tmp_path: Path
         function, ("friction=0.4,0.8,1.2", "gain=0.5,1,2"), ("mujoco",), model=str(file),
         seconds=3.0, keyframe="home",
     )  # fmt: skip
-    report = answer_effects(SweepEffectsRequest(SweepRequest(sweep, None), "base x")).report
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # of feet in the floor
+        report = answer_effects(SweepEffectsRequest(SweepRequest(sweep, None), "base x")).report
     runs = [raw_trot(file, names["torques"], *each, 1500) for each in product(frictions, gains)]
     friction, gain = shares_of(np.reshape(runs, (3, 3)))
     shares = {effect.parameter: effect.share for effect in report.effects}

@@ -278,11 +278,12 @@ def test_a_report_is_of_the_gap_between_two_engines(tmp_path: Path) -> None:
         "x moves the gap of sample_tip most: it alone explains 89.7 % of its variance.",
         "single runs give 0 mm to 6.00 mm",
         "x 0.90 – 0.500 mm at 0 4.50 mm at 4",
-        "2 cells failed with DivergedError; 2 settings left out of the shares",
+        "2 cells without a result; 2 settings left out of the shares",
     )
     assert_in(
         text_of(answer, details=True),
         "largest 6.00 mm x = 4 and y = 1x 1",
+        "Without a result: DivergedError: 2.",
         "left out as a whole: x = 3",
         "it takes three seeds",
     )

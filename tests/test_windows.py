@@ -69,7 +69,6 @@ _NOT_PRINTED = (
     "show/html/",
     "lab/questions/stage/",
     "course/notebook.py",
-    "course/site.py",
 )
 
 

@@ -110,8 +110,8 @@ def sweep_report(
 
     Args:
         folder: Of the dataset; or a SweepReportRequest, which says all that is asked.
-        quantity: A column of the dataset, or one number of it, such as "energy" or "tip[2]"; None
-            for "sample_tip" of two engines, "tip[2]" of one.
+        quantity: A column of the dataset, or one number of it, such as "base x" or "energy"; None
+            for that of a floating base, or else of the usual site.
         backends: One engine of the dataset, or two for the gap between them; empty for all.
 
     Raises:

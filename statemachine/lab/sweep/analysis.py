@@ -100,8 +100,8 @@ class SweepEffects:
         model: The names of the models' files, without their folders.
         folder: Of the dataset; "" for one that is not kept.
         command: What is typed to run the sweep, with the report of this quantity.
-        command_with_errors: What is typed to have the shares with their errors; "" where they
-            have them, or there are none.
+        more_runs: What is typed behind it to have the shares with their errors, as "--seeds 3"; ""
+            where they have them, or there are none.
         versions: Of what the dataset was made with.
         backends: The engine; or the two engines that the gap is between.
         quantity: A column of the dataset, or one number of it.
@@ -129,7 +129,7 @@ class SweepEffects:
     model: tuple[str, ...]
     folder: str
     command: str
-    command_with_errors: str
+    more_runs: str
     versions: Mapping[str, str]
     backends: tuple[str, ...]
     quantity: str
@@ -277,7 +277,7 @@ def effects(
         model=tuple(_last_part(name) for name in manifest["files"]),
         folder=str(folder),
         command=command,
-        command_with_errors=_typed_with_errors(command, design, seeds, shares),
+        more_runs=_typed_with_errors(design, shares),
         versions=_versions(manifest, sides),
         backends=sides,
         quantity=str(asked),
@@ -335,14 +335,9 @@ def _cell_at(values: Array, settings: Sequence[tuple[Value, ...]], number: int) 
 
 def without_folder(report: SweepEffects) -> SweepEffects:
     """Return a report of a dataset that is not kept: no command names its folder."""
-    named = f" --out {quoted(report.folder)}"
-    larger = report.command_with_errors.replace(named, "").replace(" --extend", "")
-    return replace(
-        report,
-        folder="",
-        command=report.command.replace(named, ""),
-        command_with_errors=larger,
-    )
+    command = report.command.replace(f" --out {quoted(report.folder)}", "")
+    more_runs = report.more_runs.replace(" --extend", "")
+    return replace(report, folder="", command=command, more_runs=more_runs)
 
 
 def _typed_report(
@@ -358,13 +353,11 @@ def _typed_report(
     return " ".join([run, *engines, "--report", f"--quantity {quoted(str(quantity))}"])
 
 
-def _typed_with_errors(command: str, design: Design, seeds: int, shares: MainEffects) -> str:
-    """Return the command of a larger sweep, of which the shares have errors; "" for none."""
+def _typed_with_errors(design: Design, shares: MainEffects) -> str:
+    """Return what is typed behind a sweep's command so that shares have errors; "" for none."""
     if shares.why_none or any(error is not None for error in shares.errors.values()):
         return ""
-    if design.sampled:
-        return command.replace(f"--samples {design.samples}", "--samples 64") + " --extend"
-    return command.replace(f" --seeds {seeds}", "") + " --seeds 3 --extend"
+    return "--samples 64 --extend" if design.sampled else "--seeds 3 --extend"
 
 
 def _last_part(name: str) -> str:

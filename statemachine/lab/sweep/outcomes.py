@@ -6,36 +6,58 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...interface import Array, Data, JointType, Model
+from ...interface import Array, Data, Ints, JointType, Model
 from ...interface.sites import usual_site
 from ...rotations import matrix_from_quat
-from ..runs.robot import is_servo, trees_of_actuators
+from ..runs.floating import free_joint_of_robot
+from ..runs.robot import is_servo
 
+# Columns of the dataset, and the joints whose servos each is of.
+_TRACKED = {"tracking_error": JointType.HINGE, "slide_tracking_error": JointType.SLIDE}
 _LOWEST = 1 / 3  # of its height at the start: a base below it has fallen
-
-
-def base_joint(model: Model) -> int | None:
-    """Return the number of the free joint of a robot's base; None where it is fixed.
-
-    A free body that carries none of what actuators drive, as a box in a scene, is no base.
-    """
-    robot = trees_of_actuators(model)
-    for joint in range(model.njnt):
-        if model.jnt_type[joint] == JointType.FREE and int(model.jnt_bodyid[joint]) in robot:
-            return joint
-    return None
 
 
 def unavailable_columns(models: Sequence[Model]) -> tuple[str, ...]:
     """Return the columns of the dataset that no run on any of some models has."""
     columns: list[str] = []
-    if all(base_joint(model) is None for model in models):
+    if all(free_joint_of_robot(model) is None for model in models):
         columns += ["base", "distance", "fell"]
-    if not any(bool(is_servo(model).any()) for model in models):
-        columns.append("tracking_error")
+    for name, kind in _TRACKED.items():
+        if not any(len(_servos_of(model, kind)) for model in models):
+            columns.append(name)
     if all(usual_site(model.site_names, model.moving_sites) is None for model in models):
         columns += ["tip", "sample_tip"]
     return tuple(columns)
+
+
+def _servos_of(model: Model, kind: JointType) -> Ints:
+    """Return the numbers (n,) of the position servos on joints of a kind."""
+    joints = np.append(model.jnt_type, -1)[model.actuator_jntid]  # -1: it drives no joint
+    return np.flatnonzero(is_servo(model) & (joints == kind))
+
+
+class _Tracking:
+    """The gap of joints of a kind and the targets of their servos, over the steps of a run."""
+
+    def __init__(self, model: Model, kind: JointType) -> None:
+        self.servos = _servos_of(model, kind)
+        self._places = model.jnt_qposadr[model.actuator_jntid[self.servos]]
+        self._gears = model.actuator_gear[self.servos]
+        self._squares, self._steps = 0.0, 0
+
+    def look(self, data: Data) -> None:
+        """Look at the state after a step."""
+        # Of a servo ctrl is the target of its joint times the gear.
+        apart = data.ctrl[self.servos] / self._gears - data.qpos[self._places]
+        self._squares += float(apart @ apart) / len(apart)
+        self._steps += 1
+
+    @property
+    def error(self) -> float | None:
+        """Root mean square over steps and servos [rad or m]; None without either."""
+        if not self._steps:
+            return None
+        return float(np.sqrt(self._squares / self._steps))
 
 
 class Outcomes:
@@ -48,7 +70,7 @@ class Outcomes:
             model: What is run.
             qpos: (nq,) of the start.
         """
-        joint = base_joint(model)
+        joint = free_joint_of_robot(model)
         self._address = None if joint is None else int(model.jnt_qposadr[joint])
         self._start = np.zeros(7)
         self._up = np.zeros(3)
@@ -56,11 +78,8 @@ class Outcomes:
             self._start = qpos[self._address : self._address + 7].copy()
             # The direction of the base's own axes that points up where the run starts.
             self._up = matrix_from_quat(self._start[3:])[2].copy()
-        servos = np.flatnonzero(is_servo(model))
-        joints = model.actuator_jntid[servos]
-        self._servos, self._positions = servos, model.jnt_qposadr[joints]
-        self._gears = model.actuator_gear[servos]
-        self._squares, self._looks = 0.0, 0
+        self._tracking = {name: _Tracking(model, kind) for name, kind in _TRACKED.items()}
+        self._acting = [each for each in self._tracking.values() if len(each.servos)]
         self._is_fallen = False
 
     def look(self, data: Data) -> None:
@@ -69,15 +88,13 @@ class Outcomes:
         if self._address is not None and not self._is_fallen:
             pose = qpos[self._address : self._address + 7]
             self._is_fallen = self._lies(pose)
-        if len(self._servos):
-            # Of a servo ctrl is the target of its joint times the gear.
-            apart = data.ctrl[self._servos] / self._gears - qpos[self._positions]
-            self._squares += float(apart @ apart) / len(apart)
-            self._looks += 1
+        for tracking in self._acting:
+            tracking.look(data)
 
     def _lies(self, pose: Array) -> bool:
         """Tell whether a base at a pose (7,) has fallen: it is too low, or turned over."""
-        if pose[2] < _LOWEST * self._start[2]:
+        height = self._start[2]  # below the origin there is no third of it
+        if height > 0 and pose[2] < _LOWEST * height:
             return True
         up = matrix_from_quat(pose[3:])[2]
         return bool(up @ self._up < 0)
@@ -88,7 +105,7 @@ class Outcomes:
             "base": self.base(qpos),
             "distance": self.distance(qpos),
             "fell": self.fell,
-            "tracking_error": self.tracking_error,
+            **{name: tracking.error for name, tracking in self._tracking.items()},
         }
 
     def base(self, qpos: Array) -> list[float] | None:
@@ -114,13 +131,3 @@ class Outcomes:
         if self._address is None:
             return None
         return 1.0 if self._is_fallen else 0.0
-
-    @property
-    def tracking_error(self) -> float | None:
-        """Root mean square, over steps and servos, of the gap of joint and target [rad or m].
-
-        None without position servos.
-        """
-        if not self._looks:
-            return None
-        return float(np.sqrt(self._squares / self._looks))

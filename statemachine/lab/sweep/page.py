@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from ...measures.text import NONE, fixed, listed, percent, quantity
 from ...show.blocks import Page, Table
+from ...show.first_screen import first_screen
 from ...show.templates import PageContent, render
 from . import SweepSummary
 from .analysis import ExtremeCell, MainEffect, SweepEffects
@@ -14,8 +16,10 @@ from .design import Value
 from .main_effects import LevelMean
 from .results import SweepReportResult, SweepResult
 
-_ROWS = 6  # parameters on the first screen
+_NextStep = Literal["more runs", "more runs in words", "details", "details in words", ""]
 _DECIMALS = 2  # of a share
+_LONGEST = 230  # characters of a command: three lines of a terminal
+_TOGETHER = "(none alone)"  # the row of what no parameter explains alone
 
 
 @dataclass(frozen=True)
@@ -64,11 +68,6 @@ class SweepReportPage(PageContent):
         return round(max(shares, default=0.0), _DECIMALS) > 0
 
     @property
-    def has_together(self) -> bool:
-        """Whether several parameters have shares, which may do something together."""
-        return len(self.effects.known_effects) > 1
-
-    @property
     def smallest(self) -> str:
         """The smallest value of all runs."""
         return quantity(self.effects.smallest.value, self.effects.unit)
@@ -79,22 +78,41 @@ class SweepReportPage(PageContent):
         return quantity(self.effects.largest.value, self.effects.unit)
 
     @property
-    def command_of_details(self) -> str:
-        """The command that shows all of it."""
-        return f"{self.effects.command} --details"
+    def next_step(self) -> _NextStep:
+        """What to do next: run more where the shares have no errors, else look at the details."""
+        if self.effects.more_runs:
+            return "more runs" if self._fits(self.effects.more_runs) else "more runs in words"
+        if self.details:
+            return ""
+        return "details" if self._fits("--details") else "details in words"
+
+    @property
+    def next_command(self) -> str:
+        """The command to type next; "" where there is none, or it is too long for a screen."""
+        behind = {"more runs": self.effects.more_runs, "details": "--details"}.get(self.next_step)
+        return f"{self.effects.command} {behind}" if behind else ""
+
+    def _fits(self, words: str) -> bool:
+        """Tell whether the command with some words behind it is short enough."""
+        return len(self.effects.command) + len(words) < _LONGEST
 
     @property
     def not_shown(self) -> int:
         """How many parameters are left out of the table."""
-        return len(self.effects.effects) - len(self.shares.rows)
+        shown = sum(1 for row in self.shares.rows if row[0] != _TOGETHER)
+        return len(self.effects.effects) - shown
+
+    @property
+    def lost_count(self) -> int:
+        """How many cells are without a result."""
+        return sum(self.effects.failed.values()) + self.effects.missing
 
     @property
     def lost_cells(self) -> list[str]:
-        """Cells without a result, by the reason."""
-        failed = self.effects.failed.items()
-        lost = [f"{number} cells failed with {kind}" for kind, number in failed]
+        """How many cells are without a result, by the reason."""
+        lost = [f"{kind}: {number}" for kind, number in self.effects.failed.items()]
         if self.effects.missing:
-            lost.append(f"{self.effects.missing} cells have not run")
+            lost.append(f"not run: {self.effects.missing}")
         return lost
 
     @property
@@ -128,15 +146,15 @@ def page(sweep: SweepEffects, details: bool = False) -> Page:
         sweep: What moves the quantity.
         details: Whether all of it is shown, and not the first screen alone.
     """
-    rows = len(sweep.effects) if details else _ROWS
-    content = SweepReportPage(
-        effects=sweep,
-        details=details,
-        shares=_shares(sweep, rows),
-        extremes=_extremes(sweep),
-        levels=tuple(_levels(sweep, effect) for effect in sweep.effects if effect.levels),
-    )
-    return render(content)
+    extremes = _extremes(sweep)
+    levels = tuple(_levels(sweep, effect) for effect in sweep.effects if effect.levels)
+
+    def with_rows(rows: int) -> Page:
+        shares = _shares(sweep, rows)
+        return render(SweepReportPage(sweep, details, shares, extremes, levels))
+
+    count = len(sweep.effects)
+    return with_rows(count) if details else first_screen(with_rows, count)
 
 
 def summary_page(summary: SweepSummary) -> Page:
@@ -156,7 +174,7 @@ def _shares(sweep: SweepEffects, rows: int) -> Table:
     def highest(effect: MainEffect) -> str:
         return _level(sweep, effect, effect.highest)
 
-    return Table.of(
+    table = Table.of(
         sweep.effects[:rows],
         {
             "parameter": lambda effect: effect.parameter,
@@ -166,6 +184,10 @@ def _shares(sweep: SweepEffects, rows: int) -> Table:
             "highest mean": highest,
         },
     )
+    if len(sweep.known_effects) < 2 or rows == 1:
+        return table
+    remainder = (_TOGETHER, _share(sweep.together), "", "", "")
+    return replace(table, rows=[*table.rows, remainder])
 
 
 def _extremes(sweep: SweepEffects) -> Table:
@@ -236,5 +258,5 @@ def result_page(result: SweepResult, details: bool = False) -> Page:
 
 
 def report_page(result: SweepReportResult, details: bool = False) -> Page:
-    """Return the page of what moves a quantity; there are no further details."""
-    return page(result.effects)
+    """Return the page of what moves a quantity."""
+    return page(result.effects, details)

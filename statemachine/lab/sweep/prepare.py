@@ -17,8 +17,8 @@ from ...backends.starts import overlap_warning, places_in
 from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import require_extra
 from ...interface import Model, make_data
-from ...interface.checks import as_switch
 from ...interface.options import OptionValue, checked_options
+from ...interface.read_options import checked_read_option
 from ...interface.records import AS_WRITTEN, READ_OPTIONS
 from ...models import resolve
 from ..compare.perturbed import EXACT, parse_uncertainty
@@ -193,7 +193,7 @@ def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
     def check(model: Model) -> None:
         for value in values:
             if vary.name in READ_OPTIONS:
-                as_switch(value, vary.name)
+                checked_read_option(vary.name, value)
             elif vary.kind == "option":
                 checked_options(model, options_at(model, [(vary, value)]))
             elif vary.kind == "state":

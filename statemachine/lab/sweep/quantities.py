@@ -37,7 +37,8 @@ NEEDED_FOR = {
     "base": "a floating base",
     "distance": "a floating base",
     "fell": "a floating base",
-    "tracking_error": "position servos",
+    "tracking_error": "position servos of hinges",
+    "slide_tracking_error": "position servos of slides",
     "tip": "a site",
     "sample_tip": "a site",
 }

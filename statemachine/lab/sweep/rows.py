@@ -86,9 +86,11 @@ COLUMNS = (
     Column(
         "tracking_error",
         "double",
-        "rad or m",
-        "root mean square, over steps and position servos, of joint minus ctrl; none without",
+        "rad",
+        "root mean square, over steps and position servos of hinges, of joint minus target; none "
+        "without",
     ),
+    Column("slide_tracking_error", "double", "m", "the same of the position servos of slides"),
     Column("max_qvel", "double", "rad/s or m/s", "the largest size of a velocity in any step"),
     Column("energy_start", "double", "J", "kinetic and potential energy at the start"),
     Column("energy", "double", "J", "the same at the end"),

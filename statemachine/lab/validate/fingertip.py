@@ -85,7 +85,6 @@ def certify(
     versions = {WITNESS: known.version}
     result = FingertipResult(
         tips=tuple(gaps),
-        site_asked=site,
         left_out=left_out,
         relative_to=parts.relative_to,
         renamed_joints=renamed_joints,
@@ -97,7 +96,7 @@ def certify(
         prepared=known.prepared,
         provenance=provenance(model, seed, **versions),
     )
-    return replace(result, repairs=_repairs(model))
+    return replace(result, site_asked=site, repairs=_repairs(model))
 
 
 def _repairs(model: Model) -> tuple[Repair, ...]:

@@ -117,8 +117,6 @@ class FingertipResult:
 
     Attributes:
         tips: The gap of each site or body that was compared, the worst first.
-        site_asked: The site or body that was asked for; None where none was. Then the tips are
-            the site gripperframe, or else every body that joints move and that carries no other.
         left_out: Sites or bodies that the witness's file does not have.
         relative_to: Body that all places are relative to, on both sides; None where they are those
             in the world. Two files need not put a robot at one place of the world, and in one of
@@ -132,13 +130,14 @@ class FingertipResult:
         reason: Why it is not an own reading; "" if it is.
         prepared: What was done to the file's text before Pinocchio read it.
         provenance: What it was computed with, the seed of the poses included.
+        site_asked: The site or body that was asked for; None where none was. Then the tips are
+            the site gripperframe, or else every body that joints move and that carries no other.
         repairs: Inertias of the file that were balanced, masses that bodies got which have none,
             and meshes that were left out, so that the engine reads it; they have no part in places.
         refusal: Why the engine refuses the file as it is; "" where it does not.
     """
 
     tips: tuple[TipGap, ...]
-    site_asked: str | None
     left_out: tuple[str, ...]
     relative_to: CommonBody | None
     renamed_joints: tuple[RenamedJoint, ...]
@@ -149,6 +148,7 @@ class FingertipResult:
     reason: str
     prepared: tuple[str, ...]
     provenance: Provenance
+    site_asked: str | None = None
     repairs: tuple[Repair, ...] = ()
     refusal: str = ""
 

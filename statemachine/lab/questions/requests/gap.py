@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import ClassVar
 
 from ....errors import BadInputError, check_name
+from ....interface import Model
 from ....measures import QUANTITIES
 from ....processes import checked_jobs
 from ...compare.agreement import Comparison, compare
@@ -20,6 +21,7 @@ from ...compare.two_sides import SidesRun, run_sides
 from ...compare.witnessed import WitnessResult, witness
 from ...runs.controllers import is_function
 from ...runs.reporter import QUIET, Reporter
+from ...runs.scenarios import SCENARIOS
 from ...shown_result import Column, ShownResult, columns_of
 from ..finding import Finding, finding_of
 
@@ -159,9 +161,25 @@ def _instead(request: Request, run: SidesRun, comparison: Comparison) -> Instead
     if request.is_traces or rerun is None:
         model = recorded_model(run.left.header, request.menagerie)
     else:
-        # As it is loaded, without the options of the experiment, such as that it has no servos.
-        model = request.both_sides(str(rerun.model.path))[0].load()
+        model = _without_experiment(rerun.model, asked, request)
     return None if model is None else instead_of(model, asked, request.seed)
+
+
+def _without_experiment(model: Model, asked: str, request: Request) -> Model:
+    """Return the left's model without what an experiment switches off, such as its servos.
+
+    Args:
+        model: As the experiment ran on it.
+        asked: The experiment.
+        request: Of the run; what it says itself stays as it is.
+    """
+    if asked not in SCENARIOS:
+        return model
+    said = dict(request.options)
+    if request.sides:
+        said |= request.sides[0].options
+    switched = [name for name in SCENARIOS[asked].options if name not in said]
+    return model.replace(**dict.fromkeys(switched, True)) if switched else model
 
 
 def _floor(

@@ -1,4 +1,7 @@
-"""Pages of the documentation that are made from runs: path, conventions, comparisons."""
+"""Pages of the documentation that are made from runs: path, conventions, comparisons.
+
+`docs/conf.py` makes them.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +10,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..atomic_files import replace_bytes
-from ..backends import backend_names, load
-from ..errors import MissingEngineError
-from ..installed import available
-from ..lab.compare import Request
-from ..lab.probes.conventions import page as conventions
-from ..lab.probes.conventions import probe, run_phrases
-from ..lab.questions import comparison
-from ..lab.questions.comparison import origin_of, title_of
-from ..lab.questions.film import drawn_picture
-from ..lab.questions.requests.gap import CompareRequest, answer
-from ..lab.runs.scenarios import scenario
-from ..lab.why import WhyRequest, explain
-from ..lab.why import page as why
-from ..measures.text import reading
-from ..show.blocks import Page, Text
-from ..show.pictures import Picture, RobotPicture, Traces
-from .lessons import LESSONS, Lesson
-from .lessons.pictures import with_picture
-from .lessons.session import page_of_lesson, take
-from .notebook import markdown
+from statemachine.atomic_files import replace_bytes
+from statemachine.backends import backend_names, load
+from statemachine.course.lessons import LESSONS, Lesson
+from statemachine.course.lessons.pictures import with_picture
+from statemachine.course.lessons.session import page_of_lesson, take
+from statemachine.course.notebook import markdown
+from statemachine.errors import MissingEngineError
+from statemachine.installed import available
+from statemachine.lab.compare import Request
+from statemachine.lab.probes.conventions import page as conventions
+from statemachine.lab.probes.conventions import probe, run_phrases
+from statemachine.lab.questions import comparison
+from statemachine.lab.questions.comparison import origin_of, title_of
+from statemachine.lab.questions.film import drawn_picture
+from statemachine.lab.questions.requests.gap import CompareRequest, answer
+from statemachine.lab.runs.scenarios import scenario
+from statemachine.lab.why import WhyRequest, explain
+from statemachine.lab.why import page as why
+from statemachine.measures.text import reading
+from statemachine.show.blocks import Page, Text
+from statemachine.show.pictures import Picture, RobotPicture, Traces
 
 
 def make_path(
@@ -50,7 +53,7 @@ def make_path(
         say(f"running the lesson {lesson.name} ...")
         page = _lesson_page(lesson, names)
         typed = f"statemachine lesson {lesson.name}"
-        written.append(_write(folder, f"{number:02}-{lesson.name}", page, typed))
+        written.append(write_page(folder, f"{number:02}-{lesson.name}", page, typed))
     return written
 
 
@@ -104,11 +107,11 @@ def make_comparisons(folder: Path) -> list[Path]:
         }
         apart = Traces("How far apart", "time [s]", "difference [°]", curves, log=True)
         page = replace(page, blocks=[apart, *page.blocks])
-        written.append(_write(folder, name, page, f"statemachine compare {name}"))
+        written.append(write_page(folder, name, page, f"statemachine compare {name}"))
         if not (left.header.recorded or right.header.recorded):
             page = _why_as_they_come(name, (left.header.backend, right.header.backend))
             typed = f"statemachine compare {name} --backend mujoco --backend pybullet:engine --why"
-            written.append(_write(folder, f"{name}-why", page, typed))
+            written.append(write_page(folder, f"{name}-why", page, typed))
     return written
 
 
@@ -125,8 +128,15 @@ def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     )
 
 
-def _write(folder: Path, name: str, page: Page, typed: str) -> Path:
-    """Write a page and its pictures; what is already the same is left alone."""
+def write_page(folder: Path, name: str, page: Page, typed: str) -> Path:
+    """Write a page and its pictures, and return its file; what is already the same is left alone.
+
+    Args:
+        folder: Where they go.
+        name: Of the file, without its suffix.
+        page: The page.
+        typed: The command that shows it in a terminal.
+    """
     numbers = itertools.count(1)
 
     def picture(block: Picture) -> str:
