@@ -88,10 +88,12 @@ def test_of_a_urdf_that_pybullet_would_let_float_it_is_said_that_it_is_fixed(fil
     sides = _side(files[1]), _side(files[1], "pybullet", "engine")
     prepared = prepare_sides(_request(*sides))
     assert prepared.bases.right == "fixed"
-    (note,) = [note for note in prepared.notes if "base=free" in note]
-    assert "loader" in note
+    assert prepared.bases.floating_loader == "right"
+    assert [note for note in prepared.notes if "base=free" in note]
     told = prepare_sides(_request(sides[0], _side(files[1], "pybullet", "engine", base="fixed")))
-    assert not [note for note in told.notes if "base=free" in note]
+    assert not told.bases.floating_loader
+    beside_an_mjcf = prepare_sides(_request(_side(files[0]), sides[1]))
+    assert not beside_an_mjcf.bases.floating_loader
 
 
 def test_a_free_base_against_a_fixed_one_differs_whatever_else_agrees(files):

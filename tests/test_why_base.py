@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -20,20 +19,23 @@ from .support.legged import mjcf, written
 
 SECONDS, STEP = 0.3, 0.002
 HOLD = replace(scenario("hold"), seconds=SECONDS)
-LEFT: dict[str, Any] = {}
-HEAVIER: dict[str, Any] = {"mass": 7.0}
-SOFTER: dict[str, Any] = {"mass": 7.0, "kp": 80.0}
+LEFT, SOFTER, RIGHT = (100.0, 6.0), (80.0, 6.0), (80.0, 7.0)  # kp and mass of the trunk
+
+
+def _text(robot: tuple[float, float]) -> str:
+    kp, mass = robot
+    return mjcf(kp=kp, mass=mass)
 
 
 def _why(folder: Path, quantity: str | None = None, what: Scenario = HOLD) -> Explanation:
-    left = sm.load(written(folder, "left.xml", mjcf(**LEFT)))
-    right = sm.load(written(folder, "right.xml", mjcf(**SOFTER)))
+    left = sm.load(written(folder, "left.xml", _text(LEFT)))
+    right = sm.load(written(folder, "right.xml", _text(RIGHT)))
     return explain(WhyRequest(left, right, what, quantity=quantity, uncertain=None))
 
 
-def _raw(ctrl: Array, **changes: Any) -> tuple[Array, Array]:
+def _raw(ctrl: Array, robot: tuple[float, float]) -> tuple[Array, Array]:
     """Return qpos (n + 1, nq) of a run by plain MuJoCo, and its command (nu,)."""
-    raw = mujoco.MjModel.from_xml_string(mjcf(**changes))
+    raw = mujoco.MjModel.from_xml_string(_text(robot))
     data = mujoco.MjData(raw)
     data.ctrl[:] = ctrl
     positions = [data.qpos.copy()]
@@ -56,7 +58,7 @@ def command(tmp_path_factory):
 def test_the_base_is_measured_unless_another_quantity_is_asked_for(tmp_path, command):
     result = _why(tmp_path)
     assert result.quantity in ("base", "base, rotation")
-    left, right = (_raw(command, **kind)[0] for kind in (LEFT, SOFTER))
+    left, right = (_raw(command, robot)[0] for robot in (LEFT, RIGHT))
     gap = np.linalg.norm(left[:, :3] - right[:, :3], axis=1).max()
     assert result.first["base"].worst == pytest.approx(gap, rel=1e-6)
 
@@ -69,9 +71,7 @@ def _share_alone(result: Explanation, subject: str) -> float | None:
 @pytest.mark.parametrize(("quantity", "axis"), [("base x", 0), ("base z", 2)])
 def test_an_axis_of_the_base_is_explained_as_plain_mujoco_has_it(tmp_path, command, quantity, axis):
     result = _why(tmp_path, quantity)
-    left, mass_alone, right = (
-        _raw(command, **kind)[0][:, axis] for kind in (LEFT, {"kp": 80.0}, SOFTER)
-    )
+    left, mass_alone, right = (_raw(command, robot)[0][:, axis] for robot in (LEFT, SOFTER, RIGHT))
     gap = np.abs(left - right).max()
     assert result.quantity == quantity
     assert result.gap == pytest.approx(gap, rel=1e-6)
@@ -82,25 +82,25 @@ def test_an_axis_of_the_base_is_explained_as_plain_mujoco_has_it(tmp_path, comma
 def test_a_tracking_error_is_explained_as_plain_mujoco_has_it(tmp_path, command):
     result = _why(tmp_path, "tracking error")
 
-    def error(**changes: Any) -> float:
-        positions, ctrl = _raw(command, **changes)
+    def error(robot: tuple[float, float]) -> float:
+        positions, ctrl = _raw(command, robot)
         return float(np.sqrt(np.mean((ctrl - positions[1:, 7:]) ** 2)))
 
-    gap = abs(error() - error(**SOFTER))
+    gap = abs(error(LEFT) - error(RIGHT))
     assert result.unit == "rad"
     assert result.gap == pytest.approx(gap, rel=1e-6)
-    share = 1 - abs(error() - error(kp=80.0)) / gap
+    share = 1 - abs(error(LEFT) - error(SOFTER)) / gap
     assert _share_alone(result, "mass") == pytest.approx(share, abs=1e-6)
 
 
 def test_a_distance_travelled_is_explained_as_plain_mujoco_has_it(tmp_path, command):
     result = _why(tmp_path, "distance travelled")
 
-    def distance(**changes: Any) -> float:
-        positions, _ = _raw(command, **changes)
+    def distance(robot: tuple[float, float]) -> float:
+        positions, _ = _raw(command, robot)
         return float(np.hypot(*(positions[-1, :2] - positions[0, :2])))
 
-    assert result.gap == pytest.approx(abs(distance() - distance(**SOFTER)), rel=1e-6)
+    assert result.gap == pytest.approx(abs(distance(LEFT) - distance(RIGHT)), rel=1e-6)
 
 
 def test_who_falls_earlier_is_explained(tmp_path):
@@ -117,6 +117,6 @@ def test_who_falls_earlier_is_explained(tmp_path):
 
 
 def test_an_outcome_is_no_quantity_of_a_robot_that_is_fixed(tmp_path):
-    left, right = (sm.load(written(tmp_path, f"{kp}.xml", mjcf("", kp=kp))) for kp in (90.0, 100.0))
+    models = [sm.load(written(tmp_path, f"{kp}.xml", mjcf("", kp=kp))) for kp in (90.0, 100.0)]
     with pytest.raises(UnknownNameError):
-        explain(WhyRequest(left, right, HOLD, quantity="fell", uncertain=None))
+        explain(WhyRequest(models[0], models[1], HOLD, quantity="fell", uncertain=None))

@@ -22,7 +22,7 @@ from ..errors import BadInputError, EngineWarning, MissingEngineError, check_nam
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..interface.checks import as_switch
-from ..interface.records import AS_WRITTEN, Base, Defaults, FreeBase, ReadOptions
+from ..interface.records import AS_WRITTEN, Base, Defaults
 from ..model_files import checked_path
 from ..models import AnyPath
 from ..release_names import is_release, version_of
@@ -48,6 +48,7 @@ __all__ = [
 
 
 if TYPE_CHECKING:
+    from ..interface.free_base import FreeBase
     from .hidden_data import HiddenData as HiddenData
     from .hidden_data import HiddenModel as HiddenModel
     from .hidden_world import HiddenWorld as HiddenWorld
@@ -271,13 +272,14 @@ def load(
     if backend in ENGINES:
         require(backend)
     loader = _loader_at(place, backend)
-    read_options = _checked_read_options(balance_inertia, meshes, base)
     takes = inspect.signature(loader).parameters
     takes_options = "options" in takes
     early: dict[str, Any] = {"options": options} if options and takes_options else {}
-    if read_options != AS_WRITTEN:
-        from ..interface.read_options import check_takes_read_options
+    read_options, least_mass = AS_WRITTEN, _FOR_PLACES.get()
+    if least_mass or (balance_inertia, meshes, base) != (False, True, None):
+        from ..interface.read_options import check_takes_read_options, checked_read_options
 
+        read_options = checked_read_options(balance_inertia, meshes, base, least_mass)
         check_takes_read_options(backend, takes, read_options)
         early["read_options"] = read_options
     loaded = loader(path, defaults=defaults, **early)
@@ -288,27 +290,6 @@ def load(
     if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
-
-
-def _checked_read_options(
-    balance_inertia: bool, meshes: bool, base: Base | FreeBase | None
-) -> ReadOptions:
-    """Return how a file is read, as `load` was told.
-
-    Raises:
-        UnknownNameError: There is no such base.
-        BadInputError: A switch is neither True nor False, or a free base starts nowhere.
-    """
-    read_options = ReadOptions(
-        balance_inertia=as_switch(balance_inertia, "balance_inertia"),
-        meshes=as_switch(meshes, "meshes"),
-        least_mass=_FOR_PLACES.get(),
-    )
-    if base is None:
-        return read_options
-    from ..interface.read_options import with_base
-
-    return with_base(read_options, base)
 
 
 def _of_usual_start(model: Model) -> str:

@@ -27,7 +27,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..interface.records import AS_WRITTEN, FreeBase, ReadOptions
+from ..interface.free_base import FreeBase
+from ..interface.records import AS_WRITTEN, ReadOptions
 from ..models import mesh_file, what_is_there
 from ..rotations import matrix_from_quat
 from .repair_record import LEAST

@@ -94,6 +94,10 @@ class RawEngine(CompiledModels):
         """Say what a run behind the contract has that the engine's own users do not have."""
         return []
 
+    def would_float(self, model: Model) -> bool:
+        """Tell whether the engine's own loader lets a base float that is fixed in a Model."""
+        return False
+
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
         """What can be set between the engine as it comes and the contract; None of any other."""
         return None

@@ -6,6 +6,7 @@ A simulator is a state machine. A `Model` never changes; a `Data` holds all that
 - `records`: what a backend says of itself, and what it hands out
 - `checks`: what is checked of an argument before an engine sees it
 - `options`: what `Model.replace` takes
+- `free_base`: where a base that floats starts
 - `read_options`: which options act only while a file is read
 - `sites`: which site stands for the fingertip
 - `model`: the constants of a simulation

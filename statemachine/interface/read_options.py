@@ -8,7 +8,10 @@ from typing import Any, Protocol
 
 from ..errors import BadInputError, check_name
 from .checks import HasCapabilities, as_switch, as_vector, unsupported, unsupported_by
-from .records import AS_WRITTEN, BASES, READ_OPTIONS, Base, FreeBase, ReadOptions
+from .free_base import FreeBase
+from .records import AS_WRITTEN, READ_OPTIONS, Base, ReadOptions
+
+BASES: tuple[Base, ...] = ("free", "fixed")
 
 
 class WasRead(HasCapabilities, Protocol):
@@ -18,13 +21,23 @@ class WasRead(HasCapabilities, Protocol):
     def read_options(self) -> ReadOptions: ...
 
 
-def with_base(options: ReadOptions, base: Base | FreeBase) -> ReadOptions:
-    """Return options of reading with the base of `load`.
+def checked_read_options(
+    balance_inertia: bool, meshes: bool, base: Base | FreeBase | None, least_mass: bool = False
+) -> ReadOptions:
+    """Return the options of `load` that act while a file is read; `least_mass` is none of a user's.
 
     Raises:
-        UnknownNameError: It is neither "free" nor "fixed" nor a FreeBase.
-        BadInputError: A number of where it starts is not finite, or its quaternion is zero.
+        UnknownNameError: The base is neither "free" nor "fixed" nor a FreeBase.
+        BadInputError: A switch is neither True nor False; a number of where the base starts is not
+            finite, or its quaternion is zero.
     """
+    options = ReadOptions(
+        balance_inertia=as_switch(balance_inertia, "balance_inertia"),
+        meshes=as_switch(meshes, "meshes"),
+        least_mass=least_mass,
+    )
+    if base is None:
+        return options
     if not isinstance(base, FreeBase):
         check_name("base", base, BASES)
         return replace(options, base=base)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import unknown_name
 from ..release_names import engine_of
+
+if TYPE_CHECKING:
+    from .free_base import FreeBase
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -78,19 +81,6 @@ OPTIONS = (
 
 
 @dataclass(frozen=True)
-class FreeBase:
-    """A base that floats, and where it is in the default state: what `load` takes for "free".
-
-    Attributes:
-        pos: (3,) its place in world axes [m].
-        quat: (4,) its rotation, (w, x, y, z).
-    """
-
-    pos: tuple[float, float, float]
-    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
 class ReadOptions:
     """How the file of a Model is read, beside what it says itself: options of `load` alone.
 
@@ -116,7 +106,6 @@ class ReadOptions:
 
 AS_WRITTEN = ReadOptions()
 READ_OPTIONS = ("base", "balance_inertia", "meshes")
-BASES: tuple[Base, ...] = ("free", "fixed")
 
 # The promises of the contract that a capability record speaks of, all of them.
 BEHAVIOURS = (

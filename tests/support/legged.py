@@ -48,7 +48,7 @@ FLOATING = (
 )
 
 
-def mjcf(free_joint: str = "<freejoint/>", kp: float = 100.0, mass: float = 6.0) -> str:
+def mjcf(free_joint: str = "<freejoint/>", *, kp: float = 100.0, mass: float = 6.0) -> str:
     """Return the text of an MJCF of the same robot, with servos, a floor and a keyframe.
 
     Args:

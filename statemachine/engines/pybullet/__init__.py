@@ -60,10 +60,8 @@ class PybulletEngine(RawEngine):
         from ...backends.bullet.file import UrdfFile
         from ...backends.pybullet_backend import PybulletModel
 
-        if not isinstance(model, PybulletModel):
+        if not isinstance(model, PybulletModel) or model.defaults == "engine":
             return []
-        if model.defaults == "engine":
-            return _of_its_loader(model)
         whole = UrdfFile.is_one(model.path)
         pairs = len(model.plan.surfaces.of_one_robot(whole))
         if not pairs:
@@ -73,6 +71,13 @@ class PybulletEngine(RawEngine):
             f"on {model.backend} the links of one robot can touch each other, as in MuJoCo "
             f"({several}); PyBullet's users have that only with URDF_USE_SELF_COLLISION"
         ]
+
+    def would_float(self, model: Model) -> bool:
+        from ...backends.pybullet_backend import PybulletModel
+
+        if not isinstance(model, PybulletModel) or model.plan.file is None:
+            return False  # an MJCF says it, and the URDF that is written of it is loaded so
+        return model.plan.file.may_float and not model.plan.file.floats
 
     def ignored(self, model: Model) -> list[str]:
         from ...backends.bullet.scope import as_targets, ignored
@@ -130,13 +135,3 @@ class PybulletEngine(RawEngine):
         from ...backends import pybullet_backend
 
         return pybullet_backend
-
-
-def _of_its_loader(model: backend.PybulletModel) -> list[str]:
-    """Say that a base is fixed which the engine's own loader lets float, where nobody asked it."""
-    file = model.plan.file
-    if file is None or file.floats or model.read_options.base is not None or not file.may_float:
-        return []
-    return [
-        f"the base of {model.path.name} is fixed; PyBullet's own loader lets it float (base=free)"
-    ]

@@ -22,7 +22,7 @@ from ..runs.floating import Bases, base_of
 from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
 from .motion import LeastMotion, MotionExtent, least_motions, motion_of, with_efforts
-from .outcomes import Outcome, outcomes_of
+from .outcomes import RunOutcome, outcomes_of
 from .quantity_agreement import Agreement, Verdict, first_touch, missed_touch, of_outcome
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
@@ -119,7 +119,7 @@ class Comparison:
     notes: tuple[str, ...]
     motion: MotionExtent
     bases: Bases
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[RunOutcome, ...]
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 

@@ -14,9 +14,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from ...engines import room
 from ...interface import Array, Model, make_data, reset
+from ...interface.free_base import FreeBase
 from ...interface.options import OptionValue
-from ...interface.records import FreeBase
+from ...release_names import engine_of
 from ...rotations import HERE, Placement, matrix_from_quat
 from ..runs.floating import Bases, base_of, free_joint_of_base
 from .matching import match_trees
@@ -55,22 +57,57 @@ def load_sides(
         StateMachineError: As `Side.load`.
     """
     is_open = [_leaves_base_open(side, options) for side in sides]
+    taken_by: Literal["left", "right", ""] = ""
     if is_open[0] is is_open[1]:
         left, right = (side.load(**options) for side in sides)
-        return LoadedSides((left, right), Bases(base_of(left), base_of(right)))
-    taker = is_open.index(True)
-    giver = sides[1 - taker].load(**options)
-    taken_by: Literal["left", "right", ""] = ""
-    if base_of(giver) == "free":
-        taken_by = _SIDES[taker]
-        model = sides[taker].load(base="free", **options)
-        start = _start_of(giver, model, names, is_left=bool(taker))
-        if start is not None:
-            model = sides[taker].load(base=start, **options)
     else:
-        model = sides[taker].load(**options)  # it is fixed, as of every such file
-    models = (giver, model) if taker else (model, giver)
-    return LoadedSides(models, Bases(base_of(models[0]), base_of(models[1]), taken_by))
+        taker = is_open.index(True)
+        giver = sides[1 - taker].load(**options)
+        if base_of(giver) == "free":
+            taken_by = _SIDES[taker]
+            model = _floating(sides[taker], options, giver, names, is_left=not taker)
+        else:
+            model = sides[taker].load(**options)  # it is fixed, as of every such file
+        left, right = (giver, model) if taker else (model, giver)
+    bases = Bases(
+        left=base_of(left),
+        right=base_of(right),
+        taken_by=taken_by,
+        floating_loader=_floating_loader((left, right), is_open),
+    )
+    return LoadedSides((left, right), bases)
+
+
+def _floating_loader(
+    models: tuple[Model, Model], is_open: Sequence[bool]
+) -> Literal["left", "right", ""]:
+    """Return the side whose engine's own loader would let its base float; "" for none."""
+    for name, model, leaves_open in zip(_SIDES, models, is_open, strict=True):
+        if leaves_open and room(engine_of(model.backend)).would_float(model):
+            return name
+    return ""
+
+
+def _floating(
+    side: Side,
+    options: Mapping[str, OptionValue],
+    other: Model,
+    names: Mapping[str, str],
+    *,
+    is_left: bool,
+) -> Model:
+    """Load a side with a base that floats, and starts where that of another Model does.
+
+    Args:
+        side: The side.
+        options: Of what is run.
+        other: The Model of the other side.
+        names: Joints, bodies and sites of the left that go by other names on the right.
+        is_left: Whether the side is the left.
+    """
+    model = side.load(base="free", **options)
+    start = _start_of(other, model, names, is_left=not is_left)
+    return model if start is None else side.load(base=start, **options)
 
 
 def _leaves_base_open(side: Side, options: Mapping[str, OptionValue]) -> bool:

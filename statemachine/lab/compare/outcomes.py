@@ -37,7 +37,7 @@ _LOWEST = 1 / 3  # of its height at the start: a base below it has fallen
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """What came of two runs, as one number of each.
 
     Attributes:
@@ -80,7 +80,7 @@ def outcomes_of(
     right: Trace,
     until: float,
     tolerances: Mapping[str, float] | None = None,
-) -> tuple[Outcome, ...]:
+) -> tuple[RunOutcome, ...]:
     """Return what came of two runs of a robot that floats; nothing of one that is fixed.
 
     Args:
@@ -162,14 +162,14 @@ def _outcome(
     right: float | None,
     until: float,
     tolerances: Mapping[str, float] | None,
-) -> Outcome:
+) -> RunOutcome:
     """Compare one number of two runs."""
     kind = OUTCOMES[name]
     ours, theirs = (until if value is None else value for value in (left, right))
     allowed = tolerance_of(kind, np.array([ours]), np.array([theirs]), 0.0, 0.0, tolerances)
     difference = abs(ours - theirs)
     is_one_alone = (left is None) is not (right is None)
-    return Outcome(
+    return RunOutcome(
         name=name,
         kind=kind,
         unit=QUANTITIES[kind].unit,

@@ -10,7 +10,7 @@ import numpy as np
 from ...measures import QUANTITIES, Tolerance, same_pairs
 from ...measures.text import on
 from ..recordings import Trace
-from .outcomes import Outcome
+from .outcomes import RunOutcome
 from .series import Touch
 
 Verdict = Literal["agrees", "settles", "differs"]
@@ -58,7 +58,7 @@ class Agreement:
         return np.inf if np.isnan(share) else share
 
 
-def of_outcome(outcome: Outcome, until: float, labels: tuple[str, str]) -> Agreement:
+def of_outcome(outcome: RunOutcome, until: float, labels: tuple[str, str]) -> Agreement:
     """Return what came of two runs as a quantity that agrees or differs.
 
     Args:

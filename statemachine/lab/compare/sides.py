@@ -19,9 +19,10 @@ from ...errors import BadInputError, TraceError, shown
 from ...installed import DEFAULT, PAIR
 from ...interface import Model
 from ...interface.checks import as_count
+from ...interface.free_base import FreeBase
 from ...interface.options import OptionValue
 from ...interface.read_options import told
-from ...interface.records import READ_OPTIONS, FreeBase
+from ...interface.records import READ_OPTIONS
 from ...measures.text import listed
 from ...models import resolve
 from ..recordings import Trace, read

@@ -14,7 +14,8 @@ from ...errors import BadInputError, StateMachineError, check_name, shown, unkno
 from ...installed import DEFAULT, PAIR
 from ...interface import OPTIONS
 from ...interface.options import OptionValue
-from ...interface.records import BASES, READ_OPTIONS
+from ...interface.read_options import BASES
+from ...interface.records import READ_OPTIONS
 from ...measures.text import command, listed
 from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float

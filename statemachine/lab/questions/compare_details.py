@@ -263,7 +263,7 @@ def _figure_table(
 
 
 def _largest_or_note(agreement: Agreement) -> str:
-    if agreement.kind == "contact" and agreement.note:
+    if agreement.kind in ("contact", "fall") and agreement.note:
         return agreement.note
     return difference(agreement.max, agreement)
 

@@ -12,6 +12,7 @@ from ...show.first_screen import first_that_fits
 from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison
 from ..compare.matched import Matched
+from ..runs.floating import Bases
 from .compare_details import details_of
 from .compare_verdict import headline_of, sentence_labels
 from .compared_names import long_labels, shortened, traces_of
@@ -84,6 +85,12 @@ class ComparePage(PageContent):
             return None
         left, right = long_labels(comparison)
         return _in_title(left), _in_title(right)
+
+    @property
+    def bases(self) -> Bases:
+        """Whether the base of each side floats, and what of that was taken over."""
+        run = self.result.run
+        return self.result.comparison.bases if run.bases is None else run.bases
 
     @property
     def missing(self) -> list[str]:

@@ -145,8 +145,8 @@ class Finding:
         lead: The quantity that is farthest beyond its tolerance; see `leading`. Where all agree,
             the one that comes nearest to its tolerance.
         is_changing: Whether its difference still changes at the end.
-        noticed: Position of the fingertip, or of a free body: the one that is farthest apart. None
-            where it is the lead, or where there is none.
+        noticed: Position of the fingertip, of the base, or of a free body: the one that is farthest
+            apart. None where it is the lead, or where there is none.
         divergence: When the runs diverge; None where every quantity agrees.
         rounding: What rounding alone makes of the lead.
         open_loop: Whether the runs agree with the commands of the left on both sides; "none" where
@@ -236,8 +236,9 @@ def finding_about(
 def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreement:
     """Return the quantity farthest beyond its tolerance: a coordinate, of which --why speaks.
 
-    Else one of the motion, as the fingertip; else any. What is not a number comes last. Where some
-    gaps may be chance, it is one of those that are beyond the chaos floor.
+    Of a robot that floats it is the pose of the base, where that is beyond its tolerance. Else one
+    of the motion, as the fingertip; else any. What is not a number comes last. Where some gaps may
+    be chance, it is one of those that are beyond the chaos floor.
     """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
     chances: tuple[Chance, ...] = ("beyond", "cannot be told") if floor else ()
@@ -246,9 +247,10 @@ def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreemen
         if clear:
             beyond = clear
             break
+    of_base = [a for a in beyond if QUANTITIES[a.kind].of_base]
     own = [a for a in beyond if QUANTITIES[a.kind].own]
     motion = [a for a in beyond if QUANTITIES[a.kind].moves]
-    for candidates in (own, motion, beyond):
+    for candidates in (of_base, own, motion, beyond):
         if candidates:
             return max(candidates, key=_finite_tolerances)
     return max(comparison.agreements, key=_finite_tolerances)
@@ -316,7 +318,7 @@ def _rounding(lead: Agreement, floor: ChaosFloor | None) -> Rounding:
 
 def _noticed(agreements: Sequence[Agreement], lead: Agreement) -> Agreement | None:
     """Return where one would see the gap: the position that is farthest apart [m]."""
-    positions = [a for a in agreements if a.kind in ("tip", "body") and not np.isnan(a.max)]
+    positions = [a for a in agreements if a.kind in ("tip", "body", "base") and not np.isnan(a.max)]
     farthest = max(positions, key=lambda agreement: agreement.max, default=None)
     return None if farthest == lead else farthest
 

@@ -121,7 +121,7 @@ def _cells(agreement: Agreement | None) -> tuple[str, str]:
     if agreement is None:
         return NONE, NONE
     verdict = TableCell(agreement.verdict, verdict=agreement.verdict)
-    if agreement.kind == "contact" and agreement.note:
+    if agreement.kind in ("contact", "fall") and agreement.note:
         return verdict, agreement.note
     return verdict, quantity(agreement.max, agreement.unit)
 

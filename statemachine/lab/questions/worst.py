@@ -122,7 +122,7 @@ def verdict_cell(agreement: Agreement) -> str:
 
 def largest_cell(agreement: Agreement) -> str:
     """Return the largest difference; of a first touch on one side alone, "never" or "later"."""
-    if agreement.kind == "contact" and agreement.note:
+    if agreement.kind in ("contact", "fall") and agreement.note:
         return agreement.note.partition(" ")[0]
     return difference(agreement.max, agreement)
 

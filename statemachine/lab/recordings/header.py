@@ -73,8 +73,7 @@ class Header:
         geom_bodyid, body_parentid, actuator_jntid, jnt_bodyid, site_bodyid: As in a Model.
         ctrlrange: (nu, 2), infinite where unlimited.
         servo_gear: (nu,) the gear of each position servo on a hinge or a slide, whose ctrl is the
-            target of the joint times the gear; 0 of another actuator. Empty of a trace that was
-            recorded before there was this.
+            target of the joint times the gear; 0 of another actuator.
         energy_by: The engine that computed the energies, or "".
         rewritten: Rows whose state is not what the step before left: the controller wrote it
             (or the engine does not give the same bits twice).

@@ -43,11 +43,21 @@ class Bases:
         right: The same of the right.
         taken_by: The side whose file leaves it open, and that floats since the other does; "" for
             none.
+        floating_loader: The side that nobody told its base, whose base is fixed, and whose engine's
+            own loader would let it float; "" for none.
     """
 
     left: Base | None
     right: Base | None
     taken_by: Literal["left", "right", ""] = ""
+    floating_loader: Literal["left", "right", ""] = ""
+
+    @property
+    def given_by(self) -> Literal["left", "right", ""]:
+        """The side whose base the other takes over; "" for none."""
+        if not self.taken_by:
+            return ""
+        return "right" if self.taken_by == "left" else "left"
 
     @property
     def differ(self) -> bool:
@@ -62,10 +72,14 @@ class Bases:
                 "base=free or base=fixed behind a side makes them alike"
             )
         if self.taken_by:
-            other = "right" if self.taken_by == "left" else "left"
             yield (
-                f"the base of the {self.taken_by} is free, as that of the {other}: its file does "
-                "not say it (base=fixed behind it says otherwise)"
+                f"the base of the {self.taken_by} is free, as that of the {self.given_by}: its "
+                "file does not say it (base=fixed behind it says otherwise)"
+            )
+        if self.floating_loader:
+            yield (
+                f"the base of the {self.floating_loader} is fixed, which the engine's own loader "
+                "lets float (base=free behind it)"
             )
 
 

@@ -28,6 +28,7 @@ from .run_differences import (
     orders_of,
 )
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
+from .stiff_servos import needs_of_limits
 
 NONE = frozenset[str]()
 
@@ -151,7 +152,8 @@ class Setup:
     def needs(self) -> dict[str, str]:
         """Of a cause the one that has to be equalized before it."""
         if not any(self._own_settings):
-            return {}
+            integrators = self.integrator_of(0), self.integrator_of(1)
+            return needs_of_limits(self._causes.values(), self.models[1], integrators)
         known = self._causes.keys()
         return {cause: needed for cause, needed in NEEDS.items() if {cause, needed} <= known}
 

@@ -123,13 +123,16 @@ class CompareResult(ShownResult):
 
     def _figures_of_sides(self) -> dict[str, object]:
         """Return what JSON shows of the sides that were named."""
-        matched = self.run.matched
+        run = self.run
+        open_loop = self.comparison if self.played is None else self.played
+        only = ({}, {}) if run.matched is None else run.matched.only
         return {
             "sides": self.request.run.both_sides(""),
-            "commands": self.run.commands,
-            "open_loop": self.comparison if self.played is None else self.played,
-            "unmatched": self.run.unmatched,
-            "only": ({}, {}) if matched is None else matched.only,
+            "commands": run.commands,
+            "open_loop": open_loop,
+            "unmatched": run.unmatched,
+            "only": only,
+            "bases": run.bases,
         }
 
 
