@@ -18,7 +18,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.lab.why import Explanation
+from statemachine.lab.why import Explanation, trials
 from statemachine.processes.parallel import forks_for, in_forks
 from statemachine.show.as_json import dumps
 
@@ -185,9 +185,7 @@ def test_a_function_is_run_here_unless_asked(
 ) -> None:
     """Its threads would not come along."""
 
-    monkeypatch.setattr(
-        "statemachine.lab.why.trials.in_forks", Mock(side_effect=AssertionError("forked"))
-    )
+    monkeypatch.setattr(trials, "in_forks", Mock(side_effect=AssertionError("forked")))
     monkeypatch.setattr("statemachine.processes.parallel._PAYS", 1e-9)
     found = explained(tmp_path, ARM, _apart(ARM), seconds=0.1, scenario=replace(SWING, own=True))
     assert found.runs > 10

@@ -206,8 +206,8 @@ def test_causes_of_two_models_are_found(light: str) -> None:
 def test_one_step_of_two_models_names_the_stage(light: str) -> None:
     model = sm.load(light)
     result = lab.one_step(model, model.replace(damping=2.0), what=swing, seconds=0.1)
-    assert result.steps.first is not None
-    assert result.steps.first.stage == "passive"
+    assert result.first is not None
+    assert result.first.stage == "passive"
 
 
 # What is run.
@@ -473,3 +473,29 @@ def test_another_suffix_is_refused_with_those_there_are(
     result = lab.compare(light, heavy, what="hold", seconds=0.1, chaos=False)
     with pytest.raises(BadInputError, match=r"\.html.*got 'a\.foo'"):
         lab.write(result, tmp_path / "a.foo")
+
+
+# Sweeps.
+
+
+def test_a_sweep_runs_a_function_with_its_parameters(light: str, tmp_path: Path) -> None:
+    pytest.importorskip("joblib")
+
+    def own(model: sm.Model, data: sm.Data, gain: float = 1.0) -> list[float]:
+        return [0.1 * gain] * model.nu
+
+    result = lab.sweep(
+        own,
+        light,
+        vary={"gain": [1.0, 2.0]},
+        backends=("mujoco",),
+        seconds=0.1,
+        jobs=1,
+        out=tmp_path / "runs",
+    )
+    table = result.to_dict()
+    assert sorted(table["vary.gain"]) == [1.0, 2.0]
+    assert table["error"] == [None, None]
+    assert table["qpos"][0] != table["qpos"][1]
+    assert result.request.sweep.vary == ("gain=1,2",)
+    assert "cells" in str(result)

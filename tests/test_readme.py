@@ -142,7 +142,7 @@ PRINTS = {
         "Derived values of scene_box on mujoco",
         "1 of 1 reads were stale",
     ),
-    "docs/comparing.md": ("False the same ()", "[('gravity', 1.0)]"),
+    "docs/comparing.md": ("lab.why(left, right, what=swing", "['damping of 6 joints'] [1.0]"),
     "docs/gym.md": (
         "mujoco: the pole stays up for 200 of 200 steps",
         "pybullet: the pole stays up for 200 of 200 steps",

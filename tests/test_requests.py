@@ -148,7 +148,9 @@ def test_a_function_of_the_users_is_recorded_as_that_of_a_file(tmp_path: Path) -
 
 
 def test_a_function_that_takes_something_else_is_refused() -> None:
-    with pytest.raises(StateMachineError, match=r"takes \(state\), and is called with"):
+    with pytest.raises(
+        StateMachineError, match=r"takes \(state\), .* is called with \(model, data\)"
+    ):
         answer_record(RecordRequest(lambda state: state, "so101", seconds=0.05))
 
 

@@ -34,7 +34,7 @@ def one_step(
 ) -> OneStepResult:
     """Return which stage of a step differs first, from each state of the left side.
 
-        lab.one_step("a.xml", "b.xml", what="hold").steps.first
+        lab.one_step("a.xml", "b.xml", what="hold").first
 
     Args:
         left: The left side: "FILE", "FILE@ENGINE" or "FILE@ENGINE:engine" with options behind it,
@@ -104,7 +104,7 @@ def converge(
 ) -> ConvergeResult:
     """Return what of a gap vanishes where the steps are halved and quartered.
 
-        lab.converge("a.xml@mujoco", "a.xml@pybullet", what="fall").limits.vanishes
+        lab.converge("a.xml@mujoco", "a.xml@pybullet", what="fall").vanishes
 
     Args:
         left: The left side: "FILE", "FILE@ENGINE" or "FILE@ENGINE:engine" with options behind it,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 
+from ...errors import BadInputError
 from ...models import AnyPath
 from ..runs.controllers import Function
 from ..runs.reporter import QUIET, Reporter
@@ -11,6 +13,7 @@ from ..sweep.questions import SweepReportRequest, SweepRequest
 from ..sweep.request import Sweep
 from ..sweep.results import SweepReportResult, SweepResult, answer, answer_report
 from .arguments import check_alone
+from .kept_functions import file_of_function
 
 Values = str | Sequence[float | str | bool]
 
@@ -49,7 +52,7 @@ def sweep(
     Args:
         what: The name of an experiment; a function f(model, data, …) whose further keyword
             arguments can be varied, or "FILE.py:FUNCTION"; or a SweepRequest, which says all that
-            is asked.
+            is asked. A function of no file, as of a notebook, is kept beside the dataset, by value.
         model: A name or a path; None for the experiment's own.
         out: The folder of the dataset; what it has of the same sweep is not run again.
         vary: Values of what is varied, by its name: a list, or what is typed behind --vary, such as
@@ -79,8 +82,11 @@ def sweep(
     if isinstance(what, SweepRequest):
         check_alone(sweep, locals())
         return answer(what, reporter)
+    if not os.fspath(out):
+        raise BadInputError('name the folder of the dataset, as in out="runs"')
+    function = what if isinstance(what, str) else file_of_function(what, out)
     asked = Sweep(
-        what=what,
+        what=function,
         vary=_words(vary),
         backends=tuple(backends),
         seeds=seeds,

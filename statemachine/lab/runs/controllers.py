@@ -172,8 +172,13 @@ def parameters_of(spec: str) -> tuple[str, ...]:
         BadInputError: There is no such function, or the file fails.
     """
     path, name = _place(spec)
+    return _further(_function(path, name))
+
+
+def _further(function: Function) -> tuple[str, ...]:
+    """Return what a function (model, data, …) takes by keyword."""
     try:
-        given = inspect.signature(_function(path, name)).parameters.values()
+        given = inspect.signature(function).parameters.values()
     except ValueError:  # something of C's without a signature
         return ()
     kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
@@ -225,6 +230,17 @@ def _check_takes(function: Function, name: str, path: Path, parameters: Mapping[
             f"{name}{place} takes {takes}, and a controller is called with ({called_with}): "
             f"write def {_def_name(name)}({called_with}), which returns ctrl (nu,) or None"
         )
+
+
+def check_is_controller(function: Function) -> None:
+    """Check that a function takes a Model and a Data first, whatever further parameters it has.
+
+    Raises:
+        BadInputError: It does not; the message shows what to write.
+    """
+    path, name = function_place(function)
+    named = dict.fromkeys(_further(function))
+    _check_takes(function, name, path, named)
 
 
 def check_controller(function: Function) -> None:
