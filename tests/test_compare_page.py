@@ -14,6 +14,7 @@ import pytest
 from statemachine.lab.compare import Agreement, Comparison, Request, Side, compare
 from statemachine.lab.compare.chaos import Band, Chance, ChaosFloor
 from statemachine.lab.compare.instead import Instead
+from statemachine.lab.compare.outcomes import Outcome
 from statemachine.lab.compare.perturbed import EXACT
 from statemachine.lab.questions.compare_report import ReportParts, report_page
 from statemachine.lab.questions.compared_names import shortened
@@ -419,6 +420,56 @@ def test_after_agreement_comes_an_experiment_that_moves_more(
 ) -> None:
     finding = finding_of(compare(hold[0], hold[0]))
     assert next_command(Request((what,), seconds=3.0), finding, None).purpose == purpose
+
+
+# Of a robot that floats.
+
+
+def fall(left: float | None, right: float | None) -> Outcome:
+    return Outcome("fell", "fall", "s", left, right, 1.0, 0.02, "", "differs")
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "falls"),
+    [
+        ((), "none"),
+        ((fall(None, None),), "neither"),
+        ((fall(0.4, None),), "left alone"),
+        ((fall(None, 0.4),), "right alone"),
+        ((fall(0.3, 0.4),), "both"),
+    ],
+)
+def test_which_sides_fell(
+    hold: tuple[Trace, Trace], outcomes: tuple[Outcome, ...], falls: str
+) -> None:
+    comparison = replace(with_agreements(hold, agreement()), outcomes=outcomes)
+    assert finding_of(comparison).falls == falls
+    lines = shown(page_of(comparison)).splitlines()
+    assert ("fell" in " ".join(lines)) == (falls != "none")
+    assert_one_screen(lines)
+
+
+def test_a_trunk_that_drops_to_the_floor_fell(tmp_path: Path) -> None:
+    """Raw: from 1.2 m it is at a third of that after the square root of 2 * 0.8 / 9.81 s."""
+    high = humanoid(2).replace('pos="0 0 0.11"', 'pos="0 0 1.2"')
+    files = [
+        written(tmp_path / "drops.xml", high),
+        written(tmp_path / "floats.xml", high.replace("<option", '<option gravity="0 0 -0.01"')),
+    ]
+    finding = run("gravity", *files, seconds=0.6).finding
+    assert finding.falls == "left alone"
+    assert finding.fall is not None
+    assert finding.fall.left == pytest.approx(np.sqrt(2 * 0.8 / 9.81), abs=0.011)
+    assert finding.lead.kind == "base"
+
+
+def test_a_base_that_floats_on_one_side_alone_is_said_first(tmp_path: Path) -> None:
+    free = written(tmp_path / "free.xml", humanoid(3))
+    fixed = written(tmp_path / "fixed.xml", humanoid(3).replace('<freejoint name="root"/>', ""))
+    result = run("hold", free, fixed)
+    assert result.finding.bases.differ
+    assert printed(result)[0].startswith("✗ The base of the left is free")
+    assert not result.finding.holds
 
 
 # Names.

@@ -269,7 +269,9 @@ def _largest_or_note(agreement: Agreement) -> str:
 
 
 def _rms_cell(agreement: Agreement) -> str:
-    return NONE if agreement.kind == "contact" else difference(agreement.rms, agreement)
+    if QUANTITIES[agreement.kind].is_outcome:
+        return NONE
+    return difference(agreement.rms, agreement)
 
 
 def _name_cell(agreement: Agreement) -> str:

@@ -42,6 +42,8 @@ def named(agreement: Agreement, width: int = 1000) -> str:
     """Return what a quantity is called within a sentence; the middle of a long name is left out."""
     name, _, part = agreement.name.partition(", ")
     (short,) = shortened([name], width)
+    if agreement.kind == "fall":
+        return "the time of the fall"
     if agreement.kind in ("joint", "slide"):
         return f"joint {short}"
     return f"the {part} of {short}" if part else f"the {short}"

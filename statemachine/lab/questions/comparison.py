@@ -142,7 +142,7 @@ def _with_rows(
     comparison, finding = result.comparison, result.finding
     worst = worst_of(comparison, finding, result.floor, rows)
     table, rest = worst.narrow_table, worst.rest
-    if finding.outcome == "nothing moved":  # there is nothing that a row could say
+    if finding.outcome == "nothing moved" or finding.is_same:  # a row could say nothing
         table, rest = replace(table, rows=[]), VerdictCounts(0, 0, 0)
     following = next_command(result.request.run, finding, result.instead)
     content = ComparePage(

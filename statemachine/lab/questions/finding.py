@@ -15,7 +15,9 @@ from ...measures import QUANTITIES
 from ..compare import Agreement, Comparison
 from ..compare.agreement import ComparisonOutcome
 from ..compare.chaos import Chance, ChaosFloor
+from ..compare.outcomes import FELL, Outcome
 from ..compare.series import at_the_end
+from ..runs.floating import Bases
 from .compared_names import traces_of
 
 _STEADY = 0.1  # share by which a difference may change in the end and be called settled
@@ -27,6 +29,8 @@ DivergenceTime = Literal["start", "step", "first moment", "moment"]
 # What rounding alone makes of a gap: see `Rounding`.
 RoundingVerdict = Literal["not computed", "no bound", "less", "cannot be told", "as much"]
 OpenLoop = Literal["none", "agrees", "differs"]
+# Which sides of a robot that floats fell; "none" of one that is fixed.
+Falls = Literal["none", "neither", "left alone", "right alone", "both"]
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,8 @@ class Finding:
             both got the same commands.
         ended: The runs that ended early.
         missing: What one side has nothing of, and the other has.
+        bases: Whether the base of the robot floats, on each side.
+        fall: When each side fell; None of a robot that is fixed.
     """
 
     outcome: ComparisonOutcome
@@ -166,6 +172,20 @@ class Finding:
     open_loop: OpenLoop
     ended: tuple[EarlyEnd, ...]
     missing: tuple[MissingPart, ...]
+    bases: Bases
+    fall: Outcome | None
+
+    @property
+    def falls(self) -> Falls:
+        """Which sides fell."""
+        if self.fall is None:
+            return "none"
+        left_fell, right_fell = self.fall.left is not None, self.fall.right is not None
+        if left_fell and right_fell:
+            return "both"
+        if left_fell:
+            return "left alone"
+        return "right alone" if right_fell else "neither"
 
     @property
     def holds(self) -> bool:
@@ -197,6 +217,7 @@ def finding_of(
     noticed = _noticed(comparison.agreements, lead)
     divergence, rounding = _divergence(comparison), _rounding(lead, floor)
     ended = tuple(_early_ends(comparison))
+    fall = next((outcome for outcome in comparison.outcomes if outcome.name == FELL), None)
     lacking = tuple(MissingPart(side, part) for side, part in missing)
     return Finding(
         outcome=comparison.outcome,
@@ -210,6 +231,8 @@ def finding_of(
         open_loop=open_loop,
         ended=ended,
         missing=lacking,
+        bases=comparison.bases,
+        fall=fall,
     )
 
 
@@ -234,11 +257,11 @@ def finding_about(
 
 
 def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreement:
-    """Return the quantity farthest beyond its tolerance: a coordinate, of which --why speaks.
+    """Return the quantity farthest beyond its tolerance: of a robot that floats its base.
 
-    Of a robot that floats it is the pose of the base, where that is beyond its tolerance. Else one
-    of the motion, as the fingertip; else any. What is not a number comes last. Where some gaps may
-    be chance, it is one of those that are beyond the chaos floor.
+    Else a coordinate, of which --why speaks; else one of the motion, as the fingertip; else any.
+    What is not a number comes last. Where some gaps may be chance, it is one of those that are
+    beyond the chaos floor.
     """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
     chances: tuple[Chance, ...] = ("beyond", "cannot be told") if floor else ()

@@ -17,10 +17,17 @@ from .finding import Finding
 _OTHER = "waves"  # moves whatever has an actuator
 
 # What the command is for: it tells which difference causes the gap; the same until before a run
-# ended; it gives a side the parts that the other alone has; it tells which stage of one step
+# ended; it gives a side the parts or the base that the other has; it tells which stage of one step
 # differs, which chance cannot hide; it runs something that moves more; there is none to type.
 Purpose = Literal[
-    "why", "why until then", "same parts", "one step", "move more", "move at all", "nothing"
+    "why",
+    "why until then",
+    "same parts",
+    "same base",
+    "one step",
+    "move more",
+    "move at all",
+    "nothing",
 ]
 
 
@@ -54,6 +61,8 @@ def next_command(request: Request, finding: Finding, instead: Instead | None) ->
             return _until_then(request, finding)
         case "agrees":
             return _more(request, finding)
+    if finding.bases.differ:
+        return _same_base(request, finding)
     if finding.missing:
         parts: list[str] = []
         for missing in finding.missing:
@@ -73,6 +82,19 @@ def _moving(request: Request, instead: Instead | None) -> NextCommand:
     if instead is None or not instead.experiment or request.is_traces:
         return NextCommand("nothing")
     return _instead(request, "move at all", instead.experiment)
+
+
+def _same_base(request: Request, finding: Finding) -> NextCommand:
+    """Return the comparison with one base on both sides, where a file leaves its own open."""
+    bases = (finding.bases.right, finding.bases.left)  # each gets that of the other
+    for k, (side, base) in enumerate(zip(request.sides, bases, strict=False)):
+        if base is not None and side.model.lower().endswith(".urdf"):
+            sides = list(request.sides)
+            sides[k] = replace(side, options={**side.options, "base": base})
+            same = replace(request, sides=tuple(sides))
+            text = typed_command(same).lines()
+            return NextCommand("same base", text, text)
+    return NextCommand("nothing")
 
 
 def _until_then(request: Request, finding: Finding) -> NextCommand:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ...measures import QUANTITIES
 from ...measures.text import NONE, quantity
 from ...show.blocks import Table, TableCell
 from ..compare import Agreement, Comparison
@@ -128,8 +129,10 @@ def largest_cell(agreement: Agreement) -> str:
 
 
 def end_cell(agreement: Agreement) -> str:
-    """Return how far apart a quantity is at the end; a first touch is not."""
-    return NONE if agreement.kind == "contact" else difference(agreement.settled, agreement)
+    """Return how far apart a quantity is at the end; one number of a run is not."""
+    if QUANTITIES[agreement.kind].is_outcome:
+        return NONE
+    return difference(agreement.settled, agreement)
 
 
 def difference(value: float, agreement: Agreement) -> str:
