@@ -19,7 +19,7 @@ from statemachine.lab.questions.requests.one_step import OneStepRequest, OneStep
 from statemachine.lab.recordings import Rerun
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
-from statemachine.show.blocks import Code, Page, Table, Verdict
+from statemachine.show.blocks import Code, Page, Table
 
 from .support.claims import assert_has, refused
 from .support.pages import blocks, shown
@@ -78,7 +78,7 @@ def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> Non
 def test_the_verdict_comes_first_and_the_next_command_last(tmp_path: Path) -> None:
     old, new, _ = CHANGES["passive"]
     written = page_of(stepped(tmp_path, LINKS_AND_BALL.replace(old, new, 1)))
-    assert isinstance(written.blocks[0], Verdict)
+    assert written.headline is not None
     assert not written.holds
     (code,) = blocks(written, Code)
     assert written.blocks[-1] is code

@@ -36,6 +36,7 @@ from .blocks import (
     Block,
     Code,
     Heading,
+    Headline,
     Items,
     Markdown,
     Page,
@@ -81,6 +82,14 @@ def render(content: PageContent) -> Page:
         else:
             blocks.append(block)
     return Page(title, origin, blocks)
+
+
+def with_answer(page: Page) -> Page:
+    """Return a page whose first block, a verdict, is its answer: it stands before all else."""
+    first, *others = page.blocks
+    assert isinstance(first, Verdict), "the template begins with a verdict"
+    lead = plain_text(first.text).removesuffix(".")
+    return replace(page, blocks=others, headline=Headline(lead, holds=first.holds))
 
 
 def render_blocks(content: PageContent) -> list[Block]:

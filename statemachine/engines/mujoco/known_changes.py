@@ -32,7 +32,7 @@ _AT_LIMIT = 1e-9  # of the limit
 def known_changes(
     left: Model, right: Model, runs: tuple[RunArrays, RunArrays]
 ) -> list[KnownChange]:
-    """Return the known changes between two releases that concern a run.
+    """Return the known changes between two releases that concern a run of one file.
 
     Args:
         left: A Model of a file, on a release of MuJoCo or on the one that is installed.
@@ -42,7 +42,7 @@ def known_changes(
     Raises:
         EngineError: A release does not run.
     """
-    if left.engine_version == right.engine_version:
+    if left.engine_version == right.engine_version or left.path != right.path:
         return []
     concerned = list(_concerned(left, right, runs))
     if not concerned:
@@ -91,7 +91,7 @@ def _concerned(
         cylinders = _touching(raw, left, touching, (int(box), int(cylinder)))
         if cylinders:
             yield "cylinders in contact", "cylinder on box", cylinders
-    if left.path == right.path and left.path.suffix.lower() == ".urdf":
+    if left.path.suffix.lower() == ".urdf":
         robot = ElementTree.parse(left.path).getroot()
         mimics = [j.get("name", "") for j in robot.iter("joint") if j.find("mimic") is not None]
         if mimics:

@@ -10,6 +10,7 @@ with.
 - `faults`, `only_read`, `visuals`: what was mended; what no engine uses; what is only drawn
 - `meanings`, `effects`, `loads`, `weighed_bodies`: what a difference means for a motion
 - `listing`, `locating`: the list, and the line of each file that an entry stands at
+- `changes`: what of the right's file undoes each difference
 - `agreement`: how well the rest agrees
 """
 

@@ -22,6 +22,7 @@ from ...release_names import engine_of
 from ...rotations import HERE
 from ..compare.matching import Matched, MatchedTrees, match_models, match_trees
 from .agreement import agreements, posed
+from .changes import difference_changes
 from .compiled import CompiledDifferences
 from .declared import enter_declared
 from .effects import Effects
@@ -30,7 +31,7 @@ from .listing import Listing
 from .locating import Locator
 from .only_read import enter_only_read
 from .reading import FileAsked, read_both
-from .records import FileSide, ModelsComparison
+from .records import DifferenceChange, FileSide, ModelsComparison
 from .starts import enter_starts
 from .visuals import enter_visuals
 
@@ -94,6 +95,10 @@ def compare(
     gap, versions = posed(trees, seed), _versions(readings)
     has_actuators = models[0].nu > 0
     labels = sides[0].label, sides[1].label
+    changes: tuple[DifferenceChange, ...] = ()
+    if engines == (None, None):
+        acting = {row.cause for row in differences if row.matters}
+        changes = difference_changes(*models, matched, acting)
     return ModelsComparison(
         left=left_side,
         right=right_side,
@@ -108,6 +113,7 @@ def compare(
         skipped=tuple(skipped),
         labels=labels,
         renamed=matched.renamed,
+        changes=changes,
     )
 
 

@@ -10,9 +10,16 @@ from ...measures.text import after, capital, grouped, reading, rounded, sentence
 from ...measures.text import versions_of as versions_text
 from ...show.blocks import Page, Table
 from ...show.first_screen import first_screen
-from ...show.templates import PageContent, render
+from ...show.templates import PageContent, render, with_answer
 from ..compare.matched import RenamedPair
 from ..compare.typed_command import TypedCommand
+from .changes_page import (
+    ElementChange,
+    UnwrittenGroup,
+    element_changes,
+    refused_groups,
+    unwritten_groups,
+)
 from .faults_page import faults_table, reasons_of
 from .records import FileSide, ListedDifference, ModelsComparison, QuantityAgreement
 from .subject_page import (
@@ -33,6 +40,7 @@ _READ = ("file", "read", "links", "joints", "touching", "drawn", "mass")  # rows
 _SAME_PLACE = 1e-5  # [m] within which links are at one place
 
 ModelsState = Literal["differs", "not all compared", "equal"]
+Hint = Literal["differences", "figures", ""]
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,13 @@ class ModelsPage(PageContent):
         return self.result.renamed
 
     @property
+    def hint(self) -> Hint:
+        """What is said of the details; "" where they are shown."""
+        if self.details:
+            return ""
+        return "differences" if self.result.differences else "figures"
+
+    @property
     def joints(self) -> int:
         """How many joints were moved to compare poses."""
         return self.result.posed.joints
@@ -175,13 +190,16 @@ class ModelsPage(PageContent):
         return record_table(idle, _files(self.result))
 
     @property
-    def refused(self) -> list[str]:
-        """What cannot be given the left's values, each with the reason."""
-        reasons: dict[str, str] = {}
-        for row in self.result.differences:
-            if row.refused:
-                reasons[row.cause] = row.refused
-        return [f"{capital(cause)}: {reason}." for cause, reason in reasons.items()]
+    def elements(self) -> list[ElementChange]:
+        """The elements of the right's file whose attributes undo differences."""
+        return element_changes(self.result.changes)
+
+    @property
+    def unwritten(self) -> list[UnwrittenGroup]:
+        """What no attribute undoes; where there is no file to change, what cannot be equalized."""
+        if self.result.changes:
+            return unwritten_groups(self.result.changes)
+        return refused_groups(self.result.differences)
 
     @property
     def pairs(self) -> Table:
@@ -220,9 +238,14 @@ def page(result: ModelsComparison, details: bool = False) -> Page:
         details: Whether every difference has a row, and what is equal is shown, too.
     """
     if details:
-        return _page(result, (), details=True)
+        return with_answer(whole_page(result))
     groups = weightiest(result)
-    return first_screen(lambda rows: _page(result, groups[:rows]), len(groups))
+    return first_screen(lambda rows: with_answer(_page(result, groups[:rows])), len(groups))
+
+
+def whole_page(result: ModelsComparison) -> Page:
+    """Return the page with everything on it, for a place on a page of something else."""
+    return _page(result, (), details=True)
 
 
 def _page(

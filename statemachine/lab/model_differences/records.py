@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ...engines.description.file_changes import AttributeChange
 from ...engines.description.lines import SourceLine
 from ..compare.matched import RenamedPair
 
@@ -136,6 +137,21 @@ class QuantityAgreement:
 
 
 @dataclass(frozen=True)
+class DifferenceChange:
+    """What of the right's file undoes a difference, or several that are the same change.
+
+    Attributes:
+        cause: The difference of the compiled models, as `..why` names it.
+        attributes: What of the file gets another value; none where nothing of it does.
+        not_written: Why no attribute undoes it; "" where one does.
+    """
+
+    cause: str
+    attributes: tuple[AttributeChange, ...]
+    not_written: str
+
+
+@dataclass(frozen=True)
 class PoseGap:
     """How far apart the same links are where both robots have the same joint positions.
 
@@ -208,6 +224,8 @@ class ModelsComparison:
         skipped: What was not compared, in sentences.
         labels: Both sides as one types them for a run.
         renamed: What was taken for one although the names differ, and nobody said so.
+        changes: What of the right's file undoes each difference that acts on a motion; none where
+            an engine was asked, or the file has no text that can be changed.
     """
 
     left: FileSide
@@ -223,6 +241,7 @@ class ModelsComparison:
     skipped: tuple[str, ...]
     labels: tuple[str, str] = field(metadata={"json": False})
     renamed: tuple[RenamedPair, ...]
+    changes: tuple[DifferenceChange, ...]
 
     @property
     def mass(self) -> tuple[float, float]:

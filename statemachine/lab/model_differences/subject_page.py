@@ -194,7 +194,10 @@ def worst_table(groups: Sequence[AlikeDifferences], files: tuple[str, str]) -> T
         if values[0] == values[1]:
             values = group.left, group.right
         rows.append((group.short_label, *values, _lines(row, files)))
-    return Table(("difference", "left", "right", _LINES), rows, words=frozenset(range(4)))
+    headers = ("difference", "left", "right", _LINES)
+    if not any(row[-1] for row in rows):  # of what an engine has made of a file
+        headers, rows = headers[:-1], [row[:-1] for row in rows]
+    return Table(headers, rows, words=frozenset(range(len(headers))))
 
 
 def subject_table(

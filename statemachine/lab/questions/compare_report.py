@@ -190,7 +190,7 @@ def _models_page(run: Request, traces: Sequence[Trace]) -> Page | None:
         differences = models.compare(
             files[0], files[1], (left, right), rename=run.names, menagerie=run.menagerie
         )
-        return model_diff.page(replace(differences, labels=labels))
+        return model_diff.whole_page(replace(differences, labels=labels))
     except (StateMachineError, OSError):
         return None
 

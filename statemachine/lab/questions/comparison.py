@@ -17,6 +17,7 @@ from .compare_details import details_of
 from .compare_verdict import headline_of, sentence_labels
 from .compared_names import long_labels, shortened, traces_of
 from .finding import VerdictCounts
+from .known_changes_page import ShownChange, known_changes_blocks
 from .next_command import Purpose, next_command
 from .requests.gap import CompareResult
 from .worst import WORST, worst_of
@@ -155,8 +156,15 @@ def _with_rows(
         details=details,
     )
     headline = headline_of(finding, comparison, result.instead)
-    blocks = render_blocks(content)
+    blocks = [*_known_changes(result), *render_blocks(content)]
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
+
+
+def _known_changes(result: CompareResult) -> list[Block]:
+    """Say what is known to have changed between the releases of two sides, as far as it acts."""
+    left, right = (side.run.label for side in (result.comparison.left, result.comparison.right))
+    versions = left.rpartition(" ")[2], right.rpartition(" ")[2]
+    return known_changes_blocks([ShownChange(*versions, change) for change in result.changes])
 
 
 def _in_title(name: str) -> str:

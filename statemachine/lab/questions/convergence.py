@@ -10,7 +10,7 @@ from ...measures import QUANTITIES
 from ...measures.text import grouped, milliseconds, quantity, short_time
 from ...show.blocks import Page, Table
 from ...show.first_screen import first_screen
-from ...show.templates import PageContent, render
+from ...show.templates import PageContent, render, with_answer
 from ..compare.convergence import FINER, Convergence, GapLimit, GapState, TouchState
 from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
@@ -183,7 +183,7 @@ def _page(result: ConvergeResult, worst: Sequence[GapLimit], details: bool = Fal
         next_command=_next_command(next_step, result, run),
         details=details,
     )
-    return render(content)
+    return with_answer(render(content))
 
 
 def _worst_first(limits: Sequence[GapLimit]) -> list[GapLimit]:

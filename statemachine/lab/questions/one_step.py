@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import NONE, percent, quantity, sentence
 from ...show.blocks import Page, Table
 from ...show.first_screen import first_screen
-from ...show.templates import PageContent, render
+from ...show.templates import PageContent, render, with_answer
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
 from ..compare.typed_command import typed_command
@@ -135,7 +135,7 @@ def _page(result: OneStepResult, worst: Sequence[StageGap], details: bool = Fals
         next_command=typed_command(run).lines(*question),
         details=details,
     )
-    return render(content)
+    return with_answer(render(content))
 
 
 def _null_tolerances(gap: StageGap) -> float:

@@ -2,75 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ...engines.records import KnownChange, KnownChangeName
 from ...measures.text import NONE, quantity, sentence, short_time
-from ...show.blocks import Page, Table
-from ...show.first_screen import first_screen
+from ...show.blocks import Block, Page, Table
+from ...show.first_screen import MOST_ROWS, first_that_fits
 from ...show.pictures import Bars
-from ...show.templates import PageContent, render
+from ...show.templates import PageContent, render, with_answer
 from ..compare import Agreement
 from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
 from ..compare.typed_command import typed_command
 from .compared_names import name_of
 from .finding import leading
+from .known_changes_page import ShownChange, known_changes_blocks
 from .requests.versions import ReleasePair, VersionsResult
 
+_MOST_CHANGES = 3  # known ones that one screen has
+
 VersionsState = Literal["differs", "nothing moved", "agrees"]
-
-
-@dataclass(frozen=True)
-class ShownChange:
-    """A known change between two releases, with the names of both.
-
-    Attributes:
-        release: The older one.
-        next: The newer one.
-        change: What its probe shows on both.
-    """
-
-    release: str
-    next: str
-    change: KnownChange
-
-    @property
-    def name(self) -> KnownChangeName:
-        """Which change it is."""
-        return self.change.name
-
-    @property
-    def probe(self) -> str:
-        """What was measured."""
-        return self.change.probe
-
-    @property
-    def left(self) -> float:
-        """What the probe measures on the older one."""
-        return self.change.left
-
-    @property
-    def right(self) -> float:
-        """What the probe measures on the newer one."""
-        return self.change.right
-
-    @property
-    def elements(self) -> tuple[str, ...]:
-        """What of the model it concerns."""
-        return self.change.elements
-
-    @property
-    def more(self) -> str:
-        """The release on which the probe measures more."""
-        return self.release if abs(self.left) > abs(self.right) else self.next
-
-    @property
-    def less(self) -> str:
-        """The release on which the probe measures less."""
-        return self.next if abs(self.left) > abs(self.right) else self.release
 
 
 @dataclass(frozen=True)
@@ -83,6 +35,8 @@ class VersionsPage(PageContent):
         pairs: Table of those that differ most.
         more: How many pairs it does not show.
         more_changed: How many of these differ.
+        known: Known changes, those of the pair that differs most first.
+        more_changes: How many further ones there are.
         commands: What to type next for each pair that differs, the worst first.
         details: Whether everything is shown.
     """
@@ -93,6 +47,8 @@ class VersionsPage(PageContent):
     pairs: Table
     more: int
     more_changed: int
+    known: Sequence[Block]
+    more_changes: int
     commands: list[str]
     details: bool
 
@@ -158,14 +114,6 @@ class VersionsPage(PageContent):
         return ""
 
     @property
-    def changes(self) -> list[ShownChange]:
-        """The known changes of all pairs."""
-        shown: list[ShownChange] = []
-        for pair in self.result.pairs:
-            shown += [ShownChange(pair.release, pair.next, change) for change in pair.changes]
-        return shown
-
-    @property
     def bars(self) -> Bars:
         """How far each release is from the next."""
         pairs = self.result.pairs
@@ -195,29 +143,54 @@ def page(result: VersionsResult, details: bool = False) -> Page:
         result: Each release with the next.
         details: Whether every pair is shown, in its order, with what is noted of it.
     """
+    changes = _changes(result)
     if details:
-        return _page(result, result.pairs, details=True)
+        return _page(result, result.pairs, changes, details=True)
+    return first_that_fits(_ever_shorter(result, changes))
+
+
+def _ever_shorter(result: VersionsResult, changes: Sequence[ShownChange]) -> Iterator[Page]:
+    """Yield the page with ever fewer pairs, and then with ever fewer known changes."""
     worst = _worst_first(result.pairs)
-    return first_screen(lambda rows: _page(result, worst[:rows]), len(worst))
+    most = min(len(worst), MOST_ROWS)
+    for known in range(min(len(changes), _MOST_CHANGES), -1, -1):
+        for rows in range(most, 0, -1):
+            yield _page(result, worst[:rows], changes[:known])
 
 
-def _page(result: VersionsResult, pairs: Sequence[ReleasePair], details: bool = False) -> Page:
-    """Return the page with a row for each of some pairs."""
+def _page(
+    result: VersionsResult,
+    pairs: Sequence[ReleasePair],
+    changes: Sequence[ShownChange],
+    details: bool = False,
+) -> Page:
+    """Return the page with a row for each of some pairs, and some of the known changes."""
     run = result.request.run
     changed = [pair for pair in _worst_first(result.pairs) if pair.is_changed]
     commands = [typed_command(_on_releases(run, pair)).lines("--why") for pair in changed]
     hidden = [pair for pair in result.pairs if pair not in pairs]
     more_changed = sum(pair.is_changed for pair in hidden)
+    more_changes = len(_changes(result)) - len(changes)
     content = VersionsPage(
         experiment=run.experiment,
         result=result,
         pairs=_pairs_table(pairs),
         more=len(hidden),
         more_changed=more_changed,
+        known=known_changes_blocks(changes),
+        more_changes=more_changes,
         commands=commands,
         details=details,
     )
-    return render(content)
+    return with_answer(render(content))
+
+
+def _changes(result: VersionsResult) -> list[ShownChange]:
+    """Return the known changes of all pairs, those of the pair that differs most first."""
+    shown: list[ShownChange] = []
+    for pair in _worst_first(result.pairs):
+        shown += [ShownChange(pair.release, pair.next, change) for change in pair.changes]
+    return shown
 
 
 def _worst_first(pairs: Sequence[ReleasePair]) -> list[ReleasePair]:

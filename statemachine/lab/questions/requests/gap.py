@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
+from ....engines.records import KnownChange
 from ....errors import BadInputError, check_name
 from ....interface import Model
 from ....measures import QUANTITIES
@@ -14,6 +15,7 @@ from ....processes import checked_jobs
 from ...compare.agreement import Comparison, compare
 from ...compare.chaos import ChaosFloor, chaos_floor
 from ...compare.instead import Instead, instead_of
+from ...compare.known_changes import known_changes
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_model
 from ...compare.sides import Request
@@ -84,6 +86,8 @@ class CompareResult(ShownResult):
             for, or both runs are recorded.
         instead: What to run where nothing moved; None where something did, or where the model of a
             recorded run is not here.
+        changes: Known changes between the releases of an engine that the sides run on, where they
+            differ: each as its probe shows it on both.
     """
 
     page_function: ClassVar[str] = "questions.comparison:page"
@@ -95,6 +99,7 @@ class CompareResult(ShownResult):
     witness: WitnessResult | None
     floor: ChaosFloor | None
     instead: Instead | None
+    changes: tuple[KnownChange, ...] = ()
 
     @cached_property
     def finding(self) -> Finding:
@@ -115,6 +120,7 @@ class CompareResult(ShownResult):
             "touches": self.comparison.touches,
             "witness": self.witness,
             "floor": self.floor,
+            "changes": self.changes,
             "instead": self.instead,
         }
         if self.request.names_sides:
@@ -152,7 +158,8 @@ def answer(request: CompareRequest, reporter: Reporter = QUIET) -> CompareResult
     fingertips = witness(*run.traces, run.path)
     floor = _floor(request, run, comparison, reporter)
     instead = _instead(request.run, run, comparison)
-    return CompareResult(request, run, comparison, played, fingertips, floor, instead)
+    changes = known_changes(run, comparison)
+    return CompareResult(request, run, comparison, played, fingertips, floor, instead, changes)
 
 
 def _instead(request: Request, run: SidesRun, comparison: Comparison) -> Instead | None:
