@@ -14,7 +14,7 @@ import pytest
 from statemachine.lab.compare import Agreement, Comparison, Request, Side, compare
 from statemachine.lab.compare.chaos import Band, Chance, ChaosFloor
 from statemachine.lab.compare.instead import Instead
-from statemachine.lab.compare.outcomes import Outcome
+from statemachine.lab.compare.outcomes import RunOutcome
 from statemachine.lab.compare.perturbed import EXACT
 from statemachine.lab.questions.compare_report import ReportParts, report_page
 from statemachine.lab.questions.compared_names import shortened
@@ -425,8 +425,8 @@ def test_after_agreement_comes_an_experiment_that_moves_more(
 # Of a robot that floats.
 
 
-def fall(left: float | None, right: float | None) -> Outcome:
-    return Outcome("fell", "fall", "s", left, right, 1.0, 0.02, "", "differs")
+def fall(left: float | None, right: float | None) -> RunOutcome:
+    return RunOutcome("fell", "fall", "s", left, right, 1.0, 0.02, "", "differs")
 
 
 @pytest.mark.parametrize(
@@ -440,7 +440,7 @@ def fall(left: float | None, right: float | None) -> Outcome:
     ],
 )
 def test_which_sides_fell(
-    hold: tuple[Trace, Trace], outcomes: tuple[Outcome, ...], falls: str
+    hold: tuple[Trace, Trace], outcomes: tuple[RunOutcome, ...], falls: str
 ) -> None:
     comparison = replace(with_agreements(hold, agreement()), outcomes=outcomes)
     assert finding_of(comparison).falls == falls

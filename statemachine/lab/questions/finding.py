@@ -15,7 +15,7 @@ from ...measures import QUANTITIES
 from ..compare import Agreement, Comparison
 from ..compare.agreement import ComparisonOutcome
 from ..compare.chaos import Chance, ChaosFloor
-from ..compare.outcomes import FELL, Outcome
+from ..compare.outcomes import FELL, RunOutcome
 from ..compare.series import at_the_end
 from ..runs.floating import Bases
 from .compared_names import traces_of
@@ -173,7 +173,7 @@ class Finding:
     ended: tuple[EarlyEnd, ...]
     missing: tuple[MissingPart, ...]
     bases: Bases
-    fall: Outcome | None
+    fall: RunOutcome | None
 
     @property
     def falls(self) -> Falls:
