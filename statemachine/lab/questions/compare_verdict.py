@@ -150,8 +150,8 @@ class EndedVerdict(_Verdict, PageContent):
 
     @property
     def reason(self) -> str:
-        """Why it ended."""
-        return shortened([self.ended.reason], _REASON)[0]
+        """Why it ended, without the end of the sentence."""
+        return shortened([self.ended.reason.rstrip(".")], _REASON)[0]
 
     @property
     def other(self) -> str | None:
