@@ -238,8 +238,11 @@ class Attribution:
                 break
 
     def count_of_first_orders(self) -> int:
-        """Return how many sets the first orders may have, at the most."""
-        return 2 * _FEWEST * max(0, len(self._active) - 1)
+        """Return how many sets the first orders may have, at the most, that are not known yet.
+
+        Those of one cause, and of all but one, are.
+        """
+        return 2 * _FEWEST * max(0, len(self._active) - 3)
 
     def count_of_more_orders(self, sets: int | None) -> int:
         """Estimate how many sets are missing until the shares are precise enough.
