@@ -31,6 +31,7 @@ _PATIENCE = 300.0  # s, of one command on a busy machine
 _SHARE = 0.02  # how far a share may be from the raw one
 _SAME = 1e-6  # of a gap: two computations of one run
 _SECONDS = 0.4
+_FIXED = "fixed"  # what the written file is called
 _TIMESTEP = 0.002
 _HEIGHT = 0.42  # m, of the base: the feet are above the floor, and fall onto it
 
@@ -293,7 +294,8 @@ def _contact(draw: random.Random, folder: Path) -> list[str]:
     _write(folder, mjcf_of(left), mjcf_of(right))
     found = _why(folder, "gravity", "left.xml", "right.xml")
     raw = raw_shares(left, right, lambda parameters: raw_joints(mjcf_of(parameters), None))
-    return _wrong_answer(found, causes, raw)
+    problems = _wrong_answer(found, causes, raw)
+    return problems + _wrong_file(folder, lambda text: raw_joints(text, None))
 
 
 def _function(draw: random.Random, folder: Path) -> list[str]:
@@ -311,7 +313,9 @@ def _function(draw: random.Random, folder: Path) -> list[str]:
         return swing["offset"] + swing["size"] * math.sin(swing["rate"] * seconds) * sign
 
     raw = raw_shares(left, right, lambda parameters: raw_joints(mjcf_of(parameters), command_of))
-    return _wrong_answer(found, causes, raw)
+    return _wrong_answer(found, causes, raw) + _wrong_file(
+        folder, lambda text: raw_joints(text, command_of)
+    )
 
 
 def _releases(draw: random.Random, folder: Path) -> list[str]:
@@ -336,7 +340,7 @@ def _releases(draw: random.Random, folder: Path) -> list[str]:
 def _base(draw: random.Random, folder: Path) -> list[str]:
     """A URDF whose base is free on the left: told so, and not told of the right."""
     left = drawn_parameters(draw, 4)
-    names = {name: cause for name, cause in _EDITS.items() if name.startswith(("mass", "damping"))}
+    names = {name: cause for name, cause in _FIXED_EDITS.items() if "armature" not in name}
     right, causes = edited(draw, left, names, 2)
     _write(folder, urdf_of(left), urdf_of(right), ".urdf")
     sides = ("left.urdf", "base=free", "right.urdf")
@@ -346,16 +350,25 @@ def _base(draw: random.Random, folder: Path) -> list[str]:
     problems = []
     if code != 1:
         problems.append(f"free against fixed: exit code {code}: {error.strip()[-300:]}")
-    found = _why(folder, "gravity", *sides)
-    raw = raw_shares(left, right, lambda parameters: raw_joints(_floating(parameters), None))
-    return problems + _wrong_answer(found, causes, raw)
+    # Nothing holds the robot that floats, so its joints stay where they are on both sides.
+    code, answer, error = _asked(
+        folder, "compare", "gravity", *sides, "--why", "--quantity", "joints",
+        "--seconds", str(_SECONDS),
+    )  # fmt: skip
+    if code != 0 or answer["gap"] > _SAME:
+        problems.append(f"free against open: exit code {code}: {error.strip()[-300:]}")
+    # One that is fixed hangs and swings, and the side that does not say so is fixed, too.
+    found = _why(folder, "gravity", "left.urdf", "base=fixed", "right.urdf")
+    raw = raw_shares(left, right, lambda parameters: raw_joints(urdf_of(parameters), None))
+    problems += _wrong_answer(found, causes, raw)
+    return problems + _wrong_file(folder, lambda text: raw_joints(text, None), ".urdf")
 
 
-def _floating(parameters: Parameters) -> str:
-    """Return the URDF's robot with a base that floats, as MuJoCo itself would save it."""
+def floating(urdf: str) -> str:
+    """Return the robot of a URDF with a base that floats, as MuJoCo itself would save it."""
     import mujoco
 
-    spec = mujoco.MjSpec.from_string(urdf_of(parameters))
+    spec = mujoco.MjSpec.from_string(urdf)
     spec.compiler.fusestatic = False
     for body in spec.worldbody.bodies:
         body.add_freejoint()
@@ -400,10 +413,22 @@ def _write(folder: Path, left: str, right: str, ending: str = ".xml") -> None:
     (folder / f"right{ending}").write_text(right, encoding="utf-8")
 
 
+def _wrong_file(
+    folder: Path, joints_of: Callable[[str], np.ndarray], ending: str = ".xml"
+) -> list[str]:
+    """Return whether the file that was written moves otherwise than the left one."""
+    target = folder / f"{_FIXED}{ending}"
+    if not target.exists():
+        return ["no file was written"]
+    left = (folder / f"left{ending}").read_text("utf-8")
+    gap = float(np.abs(joints_of(target.read_text("utf-8")) - joints_of(left)).max())
+    return [f"the written file is {gap:.3g} rad from the left one"] if gap > _SAME else []
+
+
 def _why(folder: Path, what: str, *sides: str) -> tuple[int | None, dict[str, Any], str]:
     return _asked(
         folder, "compare", what, *sides, "--why", "--quantity", "joints",
-        "--seconds", str(_SECONDS),
+        "--seconds", str(_SECONDS), "--write", f"{_FIXED}{Path(sides[-1]).suffix}",
     )  # fmt: skip
 
 
@@ -441,7 +466,7 @@ def _gap_to_raw_bullet(folder: Path, parameters: Parameters) -> float:
     steps = round(_SECONDS * 240)
     words = [sys.executable, "-c", _IN_BULLET, str(folder / "left.urdf"), str(steps), str(rows)]
     subprocess.run(words, check=True, capture_output=True)
-    ours = raw_joints(_floating(parameters), None, 1 / 240)
+    ours = raw_joints(floating(urdf_of(parameters)), None, 1 / 240)
     return float(np.abs(np.load(rows) - ours[: steps + 1]).max())
 
 

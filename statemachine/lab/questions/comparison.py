@@ -22,6 +22,7 @@ from .next_command import Purpose, next_command
 from .requests.gap import CompareResult
 from .worst import WORST, worst_of
 
+_FEW_ROWS = 5  # of the table, before the command is shortened
 _TITLE = 30  # characters of a name in the title of the table
 
 
@@ -123,8 +124,12 @@ def page(result: CompareResult, details: bool = False) -> Page:
 
 
 def _ever_shorter(result: CompareResult) -> Iterator[Page]:
-    """Yield the page, then with a shorter command, then with ever fewer rows."""
-    yield _with_rows(result, WORST, ())
+    """Yield the page with ever fewer rows, then with a shorter command, too.
+
+    A command that can be copied is worth some rows.
+    """
+    for rows in range(WORST, _FEW_ROWS - 1, -1):
+        yield _with_rows(result, rows, ())
     for rows in range(WORST, 0, -1):
         yield _with_rows(result, rows, (), is_short=True)
 
