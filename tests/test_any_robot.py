@@ -25,8 +25,9 @@ from statemachine.lab.recordings import record_scenario
 from statemachine.lab.robots import ExaminedModel, Survey
 from statemachine.lab.robots.examine import examine
 from statemachine.lab.robots.page import page as survey_page
-from statemachine.lab.runs.robot import hold_ctrl, is_servo
+from statemachine.lab.runs.robot import is_servo
 from statemachine.lab.runs.scenarios import SCENARIOS, fitting
+from statemachine.lab.runs.usual_commands import hold_ctrl
 from statemachine.show.blocks import Code, Page, Question, Table, Text
 
 from .support.claims import assert_has, assert_not_in, refused

@@ -468,7 +468,7 @@ def test_a_base_that_floats_on_one_side_alone_is_said_first(tmp_path: Path) -> N
     fixed = written(tmp_path / "fixed.xml", humanoid(3).replace('<freejoint name="root"/>', ""))
     result = run("hold", free, fixed)
     assert result.finding.bases.differ
-    assert printed(result)[0].startswith("✗ The base of the left is free")
+    assert printed(result)[0].startswith("✗ The base of free.xml is free")
     assert not result.finding.holds
 
 

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,8 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.lab.why import Explanation, trials
+from statemachine.lab.runs.drive import Controller
+from statemachine.lab.why import Explanation, search, trials
 from statemachine.processes.parallel import forks_for, in_forks
 from statemachine.show.as_json import dumps
 
@@ -40,7 +40,7 @@ def _figures(found: Explanation) -> str:
     return dumps(vars(found) | {"took": 0.0, "provenance": ()})
 
 
-def _feedback(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+def _feedback(model: sm.Model, _seed: int) -> Controller:
     """A closure over the Model and over what it remembers: nothing that can be pickled."""
     last, place = [0.0], model.joint_id("shoulder")
 
@@ -61,7 +61,7 @@ def test_forks_give_the_figures_of_one_process(
     closed = replace(SWING, controller=_feedback)
     # Six that interact: orders are drawn.
     names = ("mass", "gravity", "gains", "axis", "armature", "medium")
-    monkeypatch.setattr("statemachine.lab.why.search.SETS", 20)
+    monkeypatch.setattr(search, "SETS", 20)
     run = partial(explained, tmp_path, ARM, _apart(ARM, names), seconds=0.2, quantity="joints")
     for scenario in (SWING, closed):
         one = run(scenario=scenario, jobs=1)
@@ -84,7 +84,7 @@ def test_what_cannot_be_run_is_told_alike(tmp_path: Path) -> None:
     """A function that fails does so here, with its own error; after a first run of each side."""
     begun: list[int] = []
 
-    def failing(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+    def failing(model: sm.Model, _seed: int) -> Controller:
         begun.append(1)
         if len(begun) > 3:
             raise ZeroDivisionError("of the function")
@@ -136,7 +136,7 @@ def test_a_fork_that_is_killed_is_no_crash(tmp_path: Path, capfd: pytest.Capture
 def test_a_run_whose_process_dies_is_a_set_that_cannot_be_run(tmp_path: Path) -> None:
     here = os.getpid()
 
-    def deadly(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+    def deadly(model: sm.Model, _seed: int) -> Controller:
         if os.getpid() != here and model.compiled.body_mass[1] != 0.5:
             os.kill(os.getpid(), signal.SIGKILL)
         return lambda _model, _data: [0.5] * model.nu

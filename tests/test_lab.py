@@ -321,7 +321,10 @@ def test_arguments_make_the_request(light: str, heavy: str) -> None:
     run = result.request.run
     assert (run.seconds, run.every, run.options) == (0.1, 2, {"timestep": 0.001})
     assert result.request.tolerances == {"joint": pytest.approx(np.radians(1)), "tip": 0.01}
-    assert result.request.uncertainty == Uncertainty(0.0, pytest.approx(np.radians(0.1)))
+    uncertainty = result.request.uncertainty
+    assert isinstance(uncertainty, Uncertainty)
+    assert uncertainty.length == 0.0
+    assert uncertainty.angle == pytest.approx(np.radians(0.1))
     assert result.floor is not None
 
 

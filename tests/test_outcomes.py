@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.interface import Array, Model
+from statemachine.interface import Array, Data, Model
 from statemachine.lab.compare.agreement import Comparison, compare
 from statemachine.lab.compare.outcomes import DISTANCE, FELL, TRACKING, outcomes_of_run
 from statemachine.lab.recordings import Rerun, Trace
@@ -22,8 +22,8 @@ PUSH = (0.4, 0.0, 1.5, 9.0, 0.0, 0.0)  # m/s and rad/s: it jumps forward, and tu
 BACKENDS = ("mujoco", "pybullet")
 
 
-def _swing(time: float, _data: object) -> Array:
-    return 0.5 * np.sin(6.0 * time + np.arange(4))
+def _swing(_model: Model, data: Data) -> Array:
+    return 0.5 * np.sin(6.0 * data.time + np.arange(4))
 
 
 def _run(model: Model, qvel: tuple[float, ...] = PUSH, seconds: float = SECONDS) -> Trace:

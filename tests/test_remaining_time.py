@@ -133,7 +133,7 @@ def _told(clock: Clock, seconds: float, runs: int, **how: int) -> None:
 def test_a_long_wait_is_said_once_where_nobody_sees_a_bar(
     clock: Clock, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("statemachine.show.progress.RemainingTime", _with(clock))
+    monkeypatch.setattr("statemachine.show.remaining.RemainingTime", _with(clock))
     _told(clock, 5.0, 10, runs_at_once=1)
     assert capsys.readouterr().err == "why: shares: about 35 s more\n"
 
@@ -141,7 +141,7 @@ def test_a_long_wait_is_said_once_where_nobody_sees_a_bar(
 def test_of_a_short_wait_nothing_is_said(
     clock: Clock, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("statemachine.show.progress.RemainingTime", _with(clock))
+    monkeypatch.setattr("statemachine.show.remaining.RemainingTime", _with(clock))
     _told(clock, 2.0, 10, runs_at_once=1)
     assert capsys.readouterr().err == ""
 

@@ -20,6 +20,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
+from statemachine.lab.compare import perturbed
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.lab.why import (
     Explanation,
@@ -28,6 +29,7 @@ from statemachine.lab.why import (
     Share,
     WhyRequest,
     explain,
+    search,
 )
 from statemachine.lab.why.deadline import Deadline, TimeIsUp
 from statemachine.lab.why.shapley import shapley
@@ -173,7 +175,7 @@ def test_the_shares_are_the_shapley_values_of_plain_mujoco(
 def test_the_ranking_is_told_before_the_shares_where_these_take_long(
     sides: tuple[sm.Model, sm.Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("statemachine.lab.why.search._LONG", 0.0)
+    monkeypatch.setattr(search, "_LONG", 0.0)
     told: list[Explanation] = []
     found = explain(_asked(sides), so_far=told.append)
     (ranked,) = told
@@ -267,14 +269,14 @@ def test_a_floor_that_was_broken_off_is_of_the_runs_that_were_made(
     made: list[int] = []
     whole = Trials._run_perturbed
 
-    def perturbed(trials: Trials, side: int, *how: Any) -> Any:
+    def run_perturbed(trials: Trials, side: int, *how: Any) -> Any:
         if len(made) == 7:
             raise TimeIsUp
         made.append(side)
         return whole(trials, side, *how)
 
-    monkeypatch.setattr("statemachine.lab.compare.perturbed.RUNS", 8)
-    monkeypatch.setattr(Trials, "_run_perturbed", perturbed)
+    monkeypatch.setattr(perturbed, "RUNS", 8)
+    monkeypatch.setattr(Trials, "_run_perturbed", run_perturbed)
     found = explain(_asked(sides, uncertain=WhyRequest.uncertain, time_limit=1e6))
     assert (found.draws, found.verdict.answer) == (3, "stopped")
 

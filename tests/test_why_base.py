@@ -52,7 +52,7 @@ def command(tmp_path_factory):
     model = sm.load(path)
     with sm.make_data(model) as data:
         sm.reset(model, data)
-        return np.array(HOLD.controller(model, 0)(0.0, data))
+        return np.array(HOLD.controller(model, 0)(model, data))
 
 
 def test_the_base_is_measured_unless_another_quantity_is_asked_for(tmp_path, command):

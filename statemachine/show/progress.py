@@ -6,8 +6,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-from .remaining import LONG, RemainingTime, in_words
+if TYPE_CHECKING:
+    from .remaining import RemainingTime
 
 _PATIENCE = 0.5  # seconds without a bar
 _PACE = 0.1  # seconds between two pictures of it
@@ -38,10 +40,10 @@ def progress(
     def tell(fraction: float) -> None:
         nonlocal is_said
         wait.ended(fraction)
-        left = wait.seconds
-        if not is_said and left is not None and left > LONG:
+        words = "" if is_said else wait.words()
+        if words:
             is_said = True
-            print(f"{what}: {in_words(left)}", file=sys.stderr, flush=True)
+            print(f"{what}: {words}", file=sys.stderr, flush=True)
 
     tell(0.0)
     yield tell
@@ -51,7 +53,11 @@ class _Wait:
     """What is known of how long it still takes."""
 
     def __init__(self, runs_at_once: int, takes: float | None) -> None:
-        self._measured = RemainingTime(runs_at_once) if runs_at_once else None
+        self._measured: RemainingTime | None = None
+        if runs_at_once:
+            from .remaining import RemainingTime  # here, for most work is too short to measure
+
+            self._measured = RemainingTime(runs_at_once)
         self._takes, self._began = takes, time.monotonic()
 
     def ended(self, fraction: float) -> None:
@@ -65,6 +71,15 @@ class _Wait:
         if self._takes is not None:
             return max(0.0, self._takes - (time.monotonic() - self._began))
         return None if self._measured is None else self._measured.seconds
+
+    def words(self) -> str:
+        """Return how long it still takes in words; "" where that is not known, or is not long."""
+        seconds = self.seconds
+        if seconds is None:
+            return ""
+        from .remaining import LONG, in_words
+
+        return in_words(seconds) if seconds > LONG else ""
 
 
 @contextmanager
@@ -94,9 +109,7 @@ def _bar(what: str, wait: _Wait) -> Iterator[Callable[[float], None]]:
         if not started and now - began > _PATIENCE:
             bar.start()
             started = True
-        left = wait.seconds
-        words = "" if left is None or left < LONG else in_words(left)
-        bar.update(task, completed=fraction, left=words)
+        bar.update(task, completed=fraction, left=wait.words())
         if started and now - drawn > _PACE:
             bar.refresh()
             drawn = now

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import statemachine as sm
+from statemachine.lab.runs.drive import Controller
 from statemachine.lab.runs.scenarios import Scenario
 from statemachine.lab.why import Explanation, WhyRequest, explain
 
@@ -74,7 +75,7 @@ def _swing(time: float) -> tuple[float, float]:
     return (0.8, -0.5) if time < 0.5 else (-0.3, 0.6)
 
 
-def _controller(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+def _controller(model: sm.Model, _seed: int) -> Controller:
     places = [model.actuator_names.index(name) for name in ("shoulder", "elbow")]
 
     def controller(_model: sm.Model, data: sm.Data) -> list[float]:

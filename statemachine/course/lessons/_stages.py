@@ -13,7 +13,7 @@ from ...interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ...lab.probes import conventions
 from ...lab.runs.drive import Progress
 from ...lab.runs.readings import Tip, read_derived, read_stored
-from ...lab.runs.robot import hold_ctrl
+from ...lab.runs.usual_commands import hold_ctrl
 from ...measures.text import grouped
 from ...show.blocks import Block, Table
 from ...show.pictures import Pipeline, Traces

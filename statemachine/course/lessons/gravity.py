@@ -15,8 +15,14 @@ from ...errors import DivergedError, UnsupportedError
 from ...interface import Model, make_data, reset
 from ...lab.runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
 from ...lab.runs.provenance import Provenance, provenance
-from ...lab.runs.robot import carried_by_joint, is_the_arm, start_keyframe, touching
-from ...lab.runs.scenarios import SCENARIOS
+from ...lab.runs.robot import (
+    FREE_FALL,
+    UNACTUATED,
+    carried_by_joint,
+    is_the_arm,
+    start_keyframe,
+    touching,
+)
 from ...measures.text import NONE, apart, position, signed
 from ...show.blocks import Block, Table
 from ...show.lesson_template import Blocks, Results, differences, emulated, largest_gap, where
@@ -96,7 +102,7 @@ def code(model: Model, options: Options, load: str) -> str:
         imports, shown = "", "(1000 * data.qpos[slot]).round(2)"
     else:
         imports, shown = "import numpy as np\n", "np.degrees(data.qpos[slot]).round(3)"
-    off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
+    off = ", ".join(f"{name}={value}" for name, value in UNACTUATED.items())
     start = start_line(model, "variant")
     if start:
         start += "    "
@@ -154,9 +160,9 @@ def _longer_variants(model: Model, seconds: float) -> dict[str, Model]:
     if not seconds:
         return {}
     steps_in(model, seconds)  # says what is wrong with it
-    variants = {"contacts": model.replace(**SCENARIOS["gravity"].options)}
+    variants = {"contacts": model.replace(**UNACTUATED)}
     with suppress(UnsupportedError):
-        variants["no contacts"] = model.replace(**SCENARIOS["fall"].options)
+        variants["no contacts"] = model.replace(**FREE_FALL)
     return variants
 
 

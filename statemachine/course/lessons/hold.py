@@ -17,13 +17,13 @@ from ...lab.runs.drive import Progress, steps_in
 from ...lab.runs.provenance import Provenance, model_digest, provenance
 from ...lab.runs.robot import (
     command,
-    hold_ctrl,
     is_servo,
     start_keyframe,
     touching,
     trees_of_actuators,
 )
 from ...lab.runs.scenarios import SCENARIOS
+from ...lab.runs.usual_commands import hold_ctrl
 from ...measures import largest, together
 from ...measures.text import position, short_time
 from ...release_names import version_of

@@ -14,8 +14,7 @@ import numpy as np
 
 from ...backends import load
 from ...interface import Array, forward, make_data, reset, step
-from ...lab.runs.robot import TARGET
-from ...lab.runs.scenarios import SCENARIOS
+from ...lab.runs.robot import TARGET, UNACTUATED
 from ...show.blocks import Page, Printed
 from ...show.pictures import RobotPicture
 
@@ -110,7 +109,7 @@ def _lag() -> _Poses:
 
 def _servos_off_and_on() -> _Poses:
     """Return the arm without its servos, and with them, while nobody writes ctrl."""
-    return _poses(_ARM, 22, options=SCENARIOS["gravity"].options), _poses(_ARM, 22)
+    return _poses(_ARM, 22, options=UNACTUATED), _poses(_ARM, 22)
 
 
 def _two_starts() -> _Poses:

@@ -38,7 +38,7 @@ class MujocoEngine(RawEngine):
     moment_arms = function_of(".mujoco.moment_arms:moment_arms")
     describe = function_of(".mujoco.description:describe")
     differences = function_of(".mujoco.differences:differences")
-    sensors = function_of(".mujoco._drives:sensors")
+    sensors = function_of(".mujoco._sensors:sensors")
     readable = function_of(".mujoco._readable:readable")
     shown_elements = function_of(".mujoco._readable:shown_elements")
     entries = function_of(".mujoco.differences:entries")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from ...measures.text import quantity
 from ...show.blocks import Headline, Text
@@ -13,7 +12,6 @@ from ...show.templates import PageContent, render_blocks
 from ..compare import Agreement, Comparison
 from ..compare.instead import Instead
 from ..compare.motion import MotionExtent
-from ..compare.outcomes import RunOutcome
 from ..runs.floating import Bases
 from .compared_names import name_of, named, short_labels, shortened
 from .finding import Divergence, EarlyEnd, Finding
@@ -84,23 +82,6 @@ class DifferVerdict(_Verdict, PageContent):
         if at is None or not at.body:
             return None
         return _short(at.body), _short(at.ground)
-
-    @property
-    def fall(self) -> RunOutcome | None:
-        """When each side fell, where they differ in that; None else, and of a fixed base."""
-        for outcome in self.comparison.outcomes:
-            if outcome.kind == "fall" and outcome.verdict == "differs":
-                return outcome
-        return None
-
-    @property
-    def falling(self) -> Literal["", "left alone", "right alone", "both"]:
-        """Who fell, where the sides differ in that; "" else."""
-        if self.fall is None:
-            return ""
-        if self.fall.left is None:
-            return "right alone"
-        return "left alone" if self.fall.right is None else "both"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from ...errors import BadInputError, check_name
 from ...interface import Array, Data, Model
 from ...interface.options import OptionValue
 from .drive import Controller
-from .robot import has_floor, hold_ctrl, home, is_the_arm, need_actuators, waves
+from .robot import FREE_FALL, UNACTUATED, has_floor, home, is_the_arm
+from .usual_commands import hold_ctrl, need_actuators, waves
 
 # Swings the arm with the box in its jaws by 23 degrees.
 MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
@@ -156,7 +157,7 @@ _ALL = (
         _nothing,
         "No actuator of the file acts: what can move is left to gravity and to what it touches.",
         _need_joints,
-        options={"actuation": False},
+        options=UNACTUATED,
     ),
     Scenario(
         "droop",
@@ -177,7 +178,7 @@ _ALL = (
         "No actuator of the file acts and nothing can touch anything: what can move is left "
         "to gravity. A robot that floats falls as a whole.",
         _need_joints,
-        options={"actuation": False, "contacts": False},
+        options=FREE_FALL,
     ),
     Scenario(
         "box",

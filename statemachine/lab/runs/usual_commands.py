@@ -1,0 +1,118 @@
+"""What a robot of any kind is told: a pose to hold, waves to follow.
+
+A number of ctrl is what its actuator makes of it: a position servo takes it as a target, a motor
+as a force. So a pose is asked of servos only, and a motor gets the force that holds its joint.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import BadInputError
+from ...interface import Array, JointType, Model
+from .robot import (
+    TARGET,
+    farther,
+    home,
+    is_servo,
+    is_the_arm,
+    on_scalar_joint,
+    qpos_and_load_at_start,
+)
+
+_FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
+_NO_FORCE = 1e-9  # N·m or N; less is rounding
+_DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
+
+
+def start_ctrl(model: Model) -> Array:
+    """Ctrl (nu,) at the start: the keyframe's, else zero."""
+    key = home(model)
+    return np.zeros(model.nu) if key is None else model.keyframes[model.key_id(key)].ctrl.copy()
+
+
+def hold_ctrl(model: Model) -> Array:
+    """The command (nu,) of `hold`: a pose for the servos, and what holds the other joints.
+
+    The SO-101 gets its own pose. Of another robot each position servo is sent from where it
+    starts by a quarter of its range, towards the farther end, and by at most 0.5 rad or 0.1 m. A
+    motor gets the force against gravity at the start, as far as that is known and in its range;
+    what else there is, as a muscle or a thruster, is left at the start's ctrl.
+
+    Raises:
+        BadInputError: The model has no actuators.
+    """
+    need_actuators(model)
+    if is_the_arm(model) and model.nu == len(TARGET):
+        return np.array(TARGET)
+    qpos, load = qpos_and_load_at_start(model)
+    ctrl, servos, key = start_ctrl(model), is_servo(model), home(model)
+    for i in range(model.nu):
+        low, high = model.actuator_ctrlrange[i]
+        joint, gear = model.actuator_jntid[i], float(model.actuator_gear[i])
+        if servos[i]:
+            begin = ctrl[i] if key else float(qpos[model.jnt_qposadr[joint]] * gear)
+            most = _FARTHEST[JointType(int(model.jnt_type[joint]))] * abs(gear)
+            ctrl[i] = farther(begin, _reachable(model, i), most)
+        elif load is not None and _holds(model, i):
+            force = load[model.jnt_dofadr[joint]] / np.count_nonzero(model.actuator_jntid == joint)
+            if abs(force) > _NO_FORCE:
+                factor = model.actuator_gain[i] * gear
+                ctrl[i] = np.clip(force / factor, low, high)
+    return np.array([float(f"{value:.{_DIGITS}g}") + 0.0 for value in ctrl])
+
+
+def need_actuators(model: Model) -> None:
+    """Raise BadInputError for a model that nothing can be commanded in."""
+    if not model.nu:
+        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
+
+
+def _reachable(model: Model, i: int) -> tuple[float, float]:
+    """What a servo may be told: its ctrlrange, within what its joint can reach."""
+    low, high = (float(end) for end in model.actuator_ctrlrange[i])
+    joint = model.actuator_jntid[i]
+    if model.jnt_limited[joint]:
+        ends = np.sort(model.jnt_range[joint] * model.actuator_gear[i])
+        if max(low, ends[0]) < min(high, ends[1]):
+            low, high = max(low, float(ends[0])), min(high, float(ends[1]))
+    return low, high
+
+
+def _holds(model: Model, i: int) -> bool:
+    """Whether an actuator is a motor on a joint that hangs on no floating base.
+
+    The legs of a robot that floats carry what the floor gives back, which is not known.
+    """
+    if not (np.isfinite(model.actuator_gain[i]) and on_scalar_joint(model)[i]):
+        return False
+    if not model.actuator_gain[i] * model.actuator_gear[i]:
+        return False
+    body = int(model.jnt_bodyid[model.actuator_jntid[i]])
+    while body:
+        kinds = model.jnt_type[model.jnt_bodyid == body]
+        if np.isin(kinds, (int(JointType.FREE), int(JointType.BALL))).any():
+            return False
+        body = int(model.body_parentid[body])
+    return True
+
+
+def waves(model: Model, seed: int) -> tuple[Array, Array, Array, Array]:
+    """Waves for every actuator: middle (nu,); size, frequency [Hz], phase (3, nu) of three sines.
+
+    They stay within the middle half of its range; without a range, of one from -1 to 1. A robot
+    with a keyframe "home" is moved about that one's ctrl.
+    """
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    low, high = np.nan_to_num(model.actuator_ctrlrange, posinf=1.0, neginf=-1.0).T
+    draw = np.random.default_rng(seed)
+    frequency = draw.uniform(0.2, 1.5, (3, model.nu))  # Hz
+    phase = draw.uniform(0.0, 2 * np.pi, (3, model.nu))
+    size = draw.uniform(0.2, 1.0, (3, model.nu))
+    size *= 0.25 * (high - low) / size.sum(axis=0)
+    middle = (low + high) / 2
+    if home(model) is not None:
+        quarter = 0.25 * (high - low)
+        middle = np.clip(start_ctrl(model), low + quarter, high - quarter)
+    return middle, size, frequency, phase
