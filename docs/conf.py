@@ -23,6 +23,7 @@ default_role = "code"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 2  # what [a link](models.md#urdf) leads to
 html_theme = "furo"
 html_title = f"statemachine {version}"
 html_static_path = ["_static"]
