@@ -74,7 +74,8 @@ def flatten(value: Any, kind: str, key: tuple[str, ...] = ()) -> Iterator[tuple[
             word = last.replace("*", field) if "*" in last else _word(field, kind)
             before = key[:-1] if "*" in last else key
             if word != "-":
-                yield from flatten(inner, kind, (*before, word) if word else before)
+                within = f"{kind} {field}" if f"{kind} {field}" in _WORDS else kind
+                yield from flatten(inner, within, (*before, word) if word else before)
     elif isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
         seen: dict[str, int] = {}
         for number, entry in enumerate(value):
