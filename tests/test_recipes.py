@@ -93,7 +93,7 @@ def test_a_lesson(copy: Copy) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_a_quantity(copy: Copy) -> None:
     copy.follow("Add a compared quantity")
-    assert_in(copy.run("compare", "hold", "--seconds", "0.5", code=1), "rad/s", "joint speeds")
+    assert_in(copy.run("compare", "hold", "--seconds", "0.5", code=1), "rad/s", "gripper speed")
     given = ("--tolerance", "joint-speed=100rad/s", "--json", "--html", "hold.html")
     found = json.loads(copy.run("compare", "hold", "--seconds", "0.5", *given, code=1))
     rows = found["comparison"]["agreements"]
