@@ -61,8 +61,8 @@ def test_a_mocap_body_needs_no_keyframe(here: Cli, tmp_path: Path) -> None:
     )
     here("compare", "--models", left, right)
     said = here("compare", "gravity", left, right, "--seconds", ".1", "--why", code=0).stdout
-    assert "\u2713 Parameters of equality 0" in said
-    assert "100.0 % of the gap is explained" in " ".join(said.split())
+    assert said.lstrip().startswith("Parameters of equality 0")
+    assert "Explained 100.0 %" in said
 
 
 def test_the_target_of_a_thruster_is_no_joint(here: Cli, tmp_path: Path) -> None:
@@ -73,7 +73,8 @@ def test_the_target_of_a_thruster_is_no_joint(here: Cli, tmp_path: Path) -> None
     acting = [row for row in json.loads(said)["differences"] if row["matters"]]
     assert [row["subject"] for row in acting] == ["mass", "inertia"]
     said = here("compare", "waves", left, right, "--seconds", ".2", "--why", code=0).stdout
-    assert "Mass of x, 1.00 kg on the left and 1.20 kg on the right: 100.0 %" in said
+    assert "Mass of x, 1.00 kg on the left and 1.20 kg on the right (1.2.xml, line 1)" in said
+    assert "100.0 % of the" in said
 
 
 def test_only_transmissions_by_a_joint_have_one(tmp_path: Path) -> None:

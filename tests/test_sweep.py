@@ -471,7 +471,7 @@ def test_rows_are_written_whole_and_read_in_order(two_rows: Any, tmp_path: Path)
 @pytest.fixture
 def dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A sweep of one file."""
-    monkeypatch.setattr("statemachine.lab.sweep.rows._SOON", 60.0)
+    monkeypatch.setattr(sys.modules["statemachine.lab.sweep.rows"], "_SOON", 60.0)
     run_sweep(small("hold", "damping=0.5x,1x", "timestep=0.005"), tmp_path / "s", jobs=1)
     return tmp_path / "s"
 
@@ -796,7 +796,8 @@ def test_cells_that_failed_are_run_again_if_asked(
     assert Counter(dict(counted(tmp_path / "out")).values())["BadInputError"] == 6
     # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
     code = (
-        "import os, signal, sys; from statemachine.lab import sweep\n"
+        "import os, signal, sys; import statemachine.lab.sweep\n"
+        "sweep = sys.modules['statemachine.lab.sweep']\n"
         "from statemachine.cli import main\n"
         "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "main(sys.argv[1:])"
@@ -852,7 +853,7 @@ def test_a_worker_with_another_version_or_file_is_told_of(policy: str) -> None:
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("statemachine.lab.sweep._PATIENCE", 0.5)
+    monkeypatch.setattr(sys.modules["statemachine.lab.sweep"], "_PATIENCE", 0.5)
     refused(
         (
             BadInputError,
