@@ -136,6 +136,8 @@ def _set_inertial(raw: Any, body: int, inertial: Inertial | None) -> None:
         raw.body_mass[body] = 0.0
         raw.body_inertia[body] = 0.0
         return
+    # MuJoCo's own measure of how soft contacts are, which another engine does not have.
+    raw.body_invweight0[body] = 0.0
     moments, quat = principal(inertial.tensor)
     raw.body_mass[body], raw.body_ipos[body] = inertial.mass, inertial.com
     raw.body_inertia[body], raw.body_iquat[body] = moments, quat
