@@ -344,7 +344,7 @@ BALL = {"quantity": "ball"}
 BY_NUMBER = replace(HOME, controller=lambda _model, _seed: lambda _model, _data: [0.8, -0.5])
 # As in a run of two sides: what the left was told last holds, and each begins with its own.
 TOLD_ONCE = replace(
-    HOME, controller=lambda _m, _s: lambda time, _d: [0.8, -0.5] if time < 0.1 else None
+    HOME, controller=lambda _m, _s: lambda _model, data: [0.8, -0.5] if data.time < 0.1 else None
 )
 PUSHED = ARM.replace(
     "</actuator>", '<general name="push" site="tip" gear="0 0 0 0 1 0" gainprm="1"/></actuator>'

@@ -211,7 +211,7 @@ def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(
     file(folder, "r.xml", damping=".2")
     for side in ("l", "r"):
         model, options = sm.load(f"{side}.xml").replace(timestep=0.004), {"timestep": 0.004}
-        wave, push = (lambda time, _d: [np.sin(6 * time)]), (lambda _t, _d: [0.5])
+        wave, push = (lambda _m, data: [np.sin(6 * data.time)]), (lambda _m, _d: [0.5])
         write(
             record(
                 model,

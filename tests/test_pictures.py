@@ -67,7 +67,7 @@ def sides() -> tuple[sm.Model, Trace, Trace]:
     one, two = (
         record(
             model,
-            lambda _t, _d, told=told: np.array(told),
+            lambda _m, _d, told=told: np.array(told),
             0.5,
             metadata=RunMetadata(experiment="swing"),
         )
@@ -398,7 +398,7 @@ def compared() -> tuple[Trace, Trace, Any]:
     two = shipped("hold", "pybullet")
     one = record(
         sm.load("so101/scene"),
-        lambda _t, _d: np.array(FIRST),
+        lambda _m, _d: np.array(FIRST),
         2.0,
         metadata=RunMetadata(experiment="hold"),
     )

@@ -342,11 +342,11 @@ def test_a_run_that_is_longer_than_the_limit_is_broken_off(
     """The runs with causes equalized take 40 s each."""
     runs: list[int] = []
 
-    def slow(_model: sm.Model, _seed: int) -> Callable[[float, sm.Data], None]:
+    def slow(_model: sm.Model, _seed: int) -> Callable[[sm.Model, sm.Data], None]:
         runs.append(1)
         wait = 0.02 if len(runs) > 3 else 0.0  # both sides, and one again
 
-        def controller(_time: float, _data: sm.Data) -> None:
+        def controller(_model: sm.Model, _data: sm.Data) -> None:
             time.sleep(wait)
 
         return controller

@@ -25,7 +25,7 @@ from statemachine import releases
 
 from ._tally import Tally, command, run_bounded
 
-TRIES = 40
+TRIES = 100
 RELEASE = "mujoco==3.3.7"
 _PATIENCE = 300.0  # s, of one command on a busy machine
 _SHARE = 0.02  # how far a share may be from the raw one
