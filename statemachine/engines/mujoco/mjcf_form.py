@@ -29,6 +29,8 @@ _GAINS = ("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuato
 _WEIGHTS = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
 _SHAPE = ("geom_size", "geom_type", "geom_pos", "geom_quat")
 _DERIVED = ("geom_rbound", "geom_aabb", "geom_fluid")  # they follow from the shape
+# One for each output of an actuator, of which that of a ball joint has three.
+_OF_OUTPUTS = {"actuator_gear", "actuator_lengthrange"}
 _OPTION_WORDS = {
     **{"euler": "Euler", "rk4": "RK4", "pgs": "PGS", "cg": "CG", "newton": "Newton"},
 }
@@ -63,6 +65,8 @@ class MjcfForm(FileForm):
         target = FileTarget(self._raw, edits, spec_edits)
         texts: list[AttributeText] = []
         for (kind, number), names in target.elements().items():
+            if names & _OF_OUTPUTS and len(self._raw.actuator_gear) > self._raw.nu:
+                raise NotWrittenError("an actuator of the file has several outputs, each its own")
             if kind == "opt":
                 texts += option_texts(self._source, target, names, self._source.root)
                 continue
