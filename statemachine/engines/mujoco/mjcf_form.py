@@ -65,7 +65,7 @@ class MjcfForm(FileForm):
         target = FileTarget(self._raw, edits, spec_edits)
         texts: list[AttributeText] = []
         for (kind, number), names in target.elements().items():
-            if names & _OF_OUTPUTS and len(self._raw.actuator_gear) > self._raw.nu:
+            if names & _OF_OUTPUTS and self._has_several_outputs:
                 raise NotWrittenError("an actuator of the file has several outputs, each its own")
             if kind == "opt":
                 texts += option_texts(self._source, target, names, self._source.root)
@@ -73,6 +73,11 @@ class MjcfForm(FileForm):
             element = self._elements.find(_KINDS.get(kind, kind), self._number(kind, number))
             texts += self._of_element(target, kind, number, element, names)
         return texts
+
+    @property
+    def _has_several_outputs(self) -> bool:
+        """Whether an actuator has more than one output."""
+        return bool(np.any(self._raw.actuator_outnum > 1))
 
     def _number(self, kind: str, number: int) -> int:
         """Return the id of an element; of a degree of freedom that of its joint."""
