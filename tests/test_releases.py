@@ -331,7 +331,7 @@ class TestReleases:
         for words, code, *says in (
             (("hold", *sides, "--one-step"), SAYS_NO, "that differs is “velocity update”"),
             (
-                *(("hold", *sides, "--why"), 0),
+                *(("hold", *sides, "--why", "--details"), 0),
                 *("Integrator implicitfast implicitfast", "both sides run with euler"),
             ),
             (("--models", *sides, "--details"), 0, "loaded into mujoco 3.3.7"),
