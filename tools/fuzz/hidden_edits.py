@@ -351,10 +351,7 @@ def _base(draw: random.Random, folder: Path) -> list[str]:
     if code != 1:
         problems.append(f"free against fixed: exit code {code}: {error.strip()[-300:]}")
     # Nothing holds the robot that floats, so its joints stay where they are on both sides.
-    code, answer, error = _asked(
-        folder, "compare", "gravity", *sides, "--why", "--quantity", "joints",
-        "--seconds", str(_SECONDS),
-    )  # fmt: skip
+    code, answer, error = _asked_why(folder, "gravity", *sides)
     if code != 0 or answer["gap"] > _SAME:
         problems.append(f"free against open: exit code {code}: {error.strip()[-300:]}")
     # One that is fixed hangs and swings, and the side that does not say so is fixed, too.
@@ -425,11 +422,16 @@ def _wrong_file(
     return [f"the written file is {gap:.3g} rad from the left one"] if gap > _SAME else []
 
 
-def _why(folder: Path, what: str, *sides: str) -> tuple[int | None, dict[str, Any], str]:
+def _asked_why(folder: Path, what: str, *words: str) -> tuple[int | None, dict[str, Any], str]:
     return _asked(
-        folder, "compare", what, *sides, "--why", "--quantity", "joints",
-        "--seconds", str(_SECONDS), "--write", f"{_FIXED}{Path(sides[-1]).suffix}",
+        folder, "compare", what, *words, "--why", "--quantity", "joints",
+        "--seconds", str(_SECONDS),
     )  # fmt: skip
+
+
+def _why(folder: Path, what: str, *sides: str) -> tuple[int | None, dict[str, Any], str]:
+    """Ask what explains the gap, and for the right's file with the left's values."""
+    return _asked_why(folder, what, *sides, "--write", f"{_FIXED}{Path(sides[-1]).suffix}")
 
 
 _IN_RELEASE = """

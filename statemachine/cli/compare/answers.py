@@ -14,14 +14,13 @@ from .requests import explain_request_of, request_of, typed
 
 if TYPE_CHECKING:
     from ...engines.pictures import Renderer
-    from ...lab.compare import Request
     from ...lab.questions.requests.causes import ExplainRequest
     from ...lab.questions.requests.converge import ConvergeRequest
     from ...lab.questions.requests.gap import CompareRequest, CompareResult
     from ...lab.questions.requests.models import ModelsRequest
     from ...lab.questions.requests.one_step import OneStepRequest
     from ...lab.questions.requests.versions import VersionsRequest
-    from ...lab.questions.run_files import RunFiles, ShownModels
+    from ...lab.questions.run_files import RunFiles
 
     Question = (
         CompareRequest
@@ -126,7 +125,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     """Compare both runs, write what is asked for, and show."""
     from ...lab.questions import compare_report, comparison
     from ...lab.questions.requests.gap import answer
-    from ...lab.questions.run_files import find_renderer, write_page, write_tests
+    from ...lab.questions.run_files import ShownModels, find_renderer, write_page, write_tests
     from ...lab.why import InterruptedExplanation
     from ...lab.why import page as why
 
@@ -146,7 +145,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
             complain(f"stopped: {files.html} was not written", 0)
             show(why.page(stop.result, options.details), stop.result, options.json)
             return INTERRUPTED
-        line = write_page(files.html, result.run.traces, _shown(request.run), whole)
+        line = write_page(files.html, result.run.traces, ShownModels.of(request.run), whole)
         print(line, file=sys.stderr)
     if files.junit is not None:
         write_tests(files.junit, [result.comparison])
@@ -166,22 +165,13 @@ def _files_of(options: argparse.Namespace) -> RunFiles:
     return RunFiles(html=html, junit=options.junit, plot=options.plot, film=options.film)
 
 
-def _shown(run: Request) -> ShownModels:
-    """Return what both runs are drawn with."""
-    from ...lab.questions.run_files import ShownModels
-
-    if run.sides:
-        return ShownModels([side.path for side in run.sides], run.menagerie, own_names=True)
-    return ShownModels([run.model, run.model], run.menagerie)
-
-
 def _write_pictures(files: RunFiles, result: CompareResult, renderer: Renderer | None) -> None:
     """Write the figure and the film that are asked for."""
-    from ...lab.questions.run_files import write_figure, write_film
+    from ...lab.questions.run_files import ShownModels, write_figure, write_film
 
     reporter, traces = TerminalReporter(), result.run.traces
     if files.plot is not None:
         write_figure(files.plot, traces, result.comparison, result.floor, reporter)
     if files.film is not None and renderer is not None:
-        shown = _shown(result.request.run)
+        shown = ShownModels.of(result.request.run)
         write_film(files.film, traces, shown, renderer, result.comparison, reporter)

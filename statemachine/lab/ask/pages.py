@@ -7,7 +7,6 @@ from pathlib import Path
 from ...errors import BadInputError
 from ...models import AnyPath
 from ...show.charts import write_pictures
-from ..compare.sides import Request
 from ..compare.typed_command import typed_command
 from ..questions import plot
 from ..questions.compare_report import whole_page
@@ -61,7 +60,7 @@ def write(
         plot.write_plot(plot.of_comparison(result.comparison, result.floor), target)
     elif suffix == _FILM:
         RunFiles(film=target).check(reporter)
-        shown, renderer = _shown(result.request.run), find_renderer(reporter)
+        shown, renderer = ShownModels.of(result.request.run), find_renderer(reporter)
         write_film(target, result.run.traces, shown, renderer, result.comparison, reporter)
     elif suffix == _TESTS:
         RunFiles(junit=target).check(reporter)
@@ -90,14 +89,7 @@ def _write_page(result: CompareResult, target: Path, why: bool, reporter: Report
     asked = ExplainRequest(run, uncertainty=result.request.uncertainty) if why else None
     made_by = typed_command(run).lines()
     page = whole_page(result, asked, made_by, reporter)
-    write_page(target, result.run.traces, _shown(run), page)
-
-
-def _shown(run: Request) -> ShownModels:
-    """Return what both runs are drawn with."""
-    if run.sides:
-        return ShownModels([side.path for side in run.sides], run.menagerie, own_names=True)
-    return ShownModels([run.model, run.model], run.menagerie)
+    write_page(target, result.run.traces, ShownModels.of(run), page)
 
 
 def _other_suffix(target: Path, known: tuple[str, ...]) -> BadInputError:

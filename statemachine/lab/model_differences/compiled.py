@@ -227,10 +227,6 @@ class CompiledDifferences:
         """Tell whether a joint of the left is a free one."""
         return ids.left >= 0 and self._matched.left.jnt_type[ids.left] == JointType.FREE
 
-    def _right_name(self, kind: str, ids: ElementIds) -> str:
-        """Return the name of an element on the right; "" where that has none."""
-        return self._locator.name(1, kind, ids.right)
-
     def _of_extra_actuator(self, row: ModelDifference) -> Iterator[DifferingQuantity]:
         """Yield what an actuator is that only one side has, and its gains."""
         sides = (self._effects.left, self._effects.right)

@@ -19,6 +19,7 @@ from ...show.html import check_target, write_report
 from ..compare import Comparison
 from ..compare.alike import with_bodies_of
 from ..compare.chaos import ChaosFloor
+from ..compare.sides import Request
 from ..recordings import Trace
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
@@ -83,6 +84,13 @@ class ShownModels:
     files: Sequence[AnyPath | None]
     menagerie: AnyPath | None = None
     own_names: bool = False
+
+    @classmethod
+    def of(cls, run: Request) -> ShownModels:
+        """Return what both runs of a comparison are drawn with."""
+        if run.sides:
+            return cls([side.path for side in run.sides], run.menagerie, own_names=True)
+        return cls([run.model, run.model], run.menagerie)
 
     def load(self, number: int, trace: Trace) -> tuple[AnyPath, Model, bool]:
         """Load the model of a run.

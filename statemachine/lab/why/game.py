@@ -72,11 +72,6 @@ class Game:
         """Tell whether a set was evaluated, and could not be run."""
         return math.isnan(self.parts.get(equalized, 0.0))
 
-    @property
-    def some_failed(self) -> bool:
-        """Whether a set could not be run."""
-        return any(math.isnan(part) for part in self.parts.values())
-
     def failures(self) -> tuple[Subset, ...]:
         """Return the sets that could not be run: the smaller ones first, then by their names."""
         sets = [subset for subset, part in self.parts.items() if math.isnan(part)]
