@@ -81,8 +81,8 @@ def _stored_otherwise(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[
     """
     left, right = sides.raws
     weights_of_both = left.body_invweight0[a], right.body_invweight0[b]
-    if not np.all(weights_of_both):  # of what another engine made of a file there is none
-        return
+    if not all(np.any(weights) for weights in weights_of_both):
+        return  # of what another engine made of a file there is none
     if left.body_simple[a] == right.body_simple[b] or same(*weights_of_both):
         return
     value = DifferingQuantity("invweight0", plain(weights_of_both[0]), plain(weights_of_both[1]))

@@ -31,8 +31,8 @@ class TypedCommand:
     def lines(self, *further: str) -> str:
         """Return the command as one types it, continued on further lines where it is long.
 
-        Where a word is longer than a line, such as the path of a file, dots stand for all that was
-        typed.
+        A word that is longer than a line, such as the path of a file, is not cut: what is printed
+        can be copied.
 
         Args:
             *further: Words that follow: the question, and its options.
@@ -40,8 +40,6 @@ class TypedCommand:
         if self.run is not None:
             return python_call(self.run, *further)
         typed = [shlex.quote(word) for word in self.words]
-        if max(map(len, typed)) > _WIDTH:
-            typed = [*typed[:2], "..."]
         lines: list[str] = []
         line = ""
         for word in (*typed, *map(shlex.quote, further)):
