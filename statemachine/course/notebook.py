@@ -34,7 +34,8 @@ from ..show.blocks import (
     Text,
     Verdict,
 )
-from ..show.pictures import Bars, Picture, Pipeline, RobotPicture, Slots, Traces
+from ..show.html.diagram import figure
+from ..show.pictures import Bars, Diagram, Picture, Pipeline, RobotPicture, Slots, Traces
 from ..show.terminal import judged
 from ..show.text_blocks import together
 from .lessons import LESSONS, Lesson, module
@@ -284,6 +285,8 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
         case Traces() | Slots() | Pipeline() | Bars():
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
+        case Diagram():
+            return figure(block)  # on one line: HTML ends at an empty one
     return _words(block)
 
 

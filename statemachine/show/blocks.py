@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from .pictures import Picture
+from .pictures import Diagram, Picture
 
 if TYPE_CHECKING:
     import numpy as np
@@ -288,6 +288,7 @@ Block = (
     | Table
     | Verdict
     | Picture
+    | Diagram
     | Interactive
     | Section
 )

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from .diagrams.shapes import Shape
+
     Numbers = Sequence[float] | NDArray[Any]
     Poses = NDArray[np.float64]
 
@@ -107,6 +109,21 @@ class RobotPicture:
     poses: Callable[[], tuple[Poses, Poses | None]]
     interval: float = 0.08
     near: str = ""
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Boxes, arrows and brackets; shown by every medium in its own way.
+
+    Attributes:
+        title: What it shows.
+        words: What is to be seen, for who cannot see it.
+        shapes: What it consists of.
+    """
+
+    title: str
+    words: str
+    shapes: Sequence[Shape]
 
 
 Picture = Traces | Slots | Pipeline | Bars | RobotPicture

@@ -9,42 +9,66 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from .blocks import Block, Code, Heading, Items, Page, Printed, Table, Text, Verdict
+from .pictures import Diagram
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.text import Text as RichText
 
+    from .diagrams.shapes import Look
+
 
 # Spellings for where there is no Unicode; what is not here becomes a question mark.
-ASCII = str.maketrans(
-    {
-        "−": "-",
-        "–": "-",
-        "×": "x",
-        "≤": "<=",
-        "±": "+-",
-        "“": "'",
-        "”": "'",
-        "·": "*",
-        "°": " deg",
-        "µ": "u",
-        "Δ": "d",
-        "\u0307": "'",
-        "…": "...",
-        "²": "^2",
-        "³": "^3",
-        "⁻": "^-",
-        "″": '"',
-        "÷": "/",
-        "≈": "~",
-        "─": "-",
-        "✓": "yes",
-        "✗": "NO",
-        "†": "+",
-        "→": "->",
-        "█": "#",
-    }
-)
+_SPELLINGS = {
+    "−": "-",
+    "–": "-",
+    "×": "x",
+    "≤": "<=",
+    "±": "+-",
+    "“": "'",
+    "”": "'",
+    "·": "*",
+    "°": " deg",
+    "µ": "u",
+    "Δ": "d",
+    "\u0307": "'",
+    "…": "...",
+    "²": "^2",
+    "³": "^3",
+    "⁻": "^-",
+    "″": '"',
+    "÷": "/",
+    "≈": "~",
+    "─": "-",
+    "✓": "yes",
+    "✗": "NO",
+    "†": "+",
+    "→": "->",
+    "█": "#",
+    "≠": "!=",
+    # Of diagrams: each is one letter, as what it stands for.
+    "│": "|",
+    "┌": "+",
+    "┐": "+",
+    "└": "+",
+    "┘": "+",
+    "├": "+",
+    "┤": "+",
+    "┬": "+",
+    "┴": "+",
+    "┼": "+",
+    "╭": "+",
+    "╮": "+",
+    "╯": "+",
+    "╰": "+",
+    "╌": ".",
+    "╎": ":",
+    "▲": "^",
+    "▶": ">",
+    "▼": "v",
+    "◀": "<",
+}
+ASCII = str.maketrans(_SPELLINGS)
 # What would make a terminal do something instead of showing it (a student's text may hold it).
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 # A blank between a figure and its unit or sign.
@@ -100,6 +124,8 @@ def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[Ren
         case Verdict(text, holds):
             mark = RichText(_shown("✓" if holds else "✗", plain), "green" if holds else "red")
             return ["", _hanging(mark, coded(text))]
+        case Diagram():
+            return ["", *_diagram(block, plain, width)]
     return []
 
 
@@ -120,6 +146,41 @@ def _coded(text: str, plain: bool, piped: bool, style: str) -> RichText:
             shown = f"`{shown}`"
         line.append(shown, _LOOKS[span.kind])
     return line
+
+
+# Colours of what a diagram is about; no colour says anything alone.
+_DIAGRAM_STYLES: Mapping[Look, str] = {
+    "plain": "",
+    "constant": "blue",
+    "state": "yellow",
+    "derived": "green",
+    "call": "magenta",
+    "apart": "bold red",
+    "faint": "dim",
+}
+
+
+def _diagram(block: Diagram, plain: bool, width: int) -> list[RenderableType]:
+    """Return the lines of a diagram; where it is too wide, what there is to be seen."""
+    from rich.text import Text as RichText
+
+    from .diagrams.canvas import painted
+    from .diagrams.shapes import size_of
+
+    if size_of(block.shapes)[0] > width:
+        return [RichText(_shown(f"{block.title}. {block.words}", plain))]
+    lines: list[RenderableType] = [RichText(_shown(block.title, plain), "italic")]
+
+    def spelled(text: str) -> str:
+        text = _shown(text, plain).replace(NO_BREAK, " ")  # no line of a diagram is broken
+        return text.encode("ascii", "replace").decode() if plain else text
+
+    for parts in painted(block.shapes, spelled):
+        line = RichText()
+        for part in parts:
+            line.append(part.text, _DIAGRAM_STYLES[part.look])
+        lines.append(line)
+    return lines
 
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:

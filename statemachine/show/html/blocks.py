@@ -19,8 +19,9 @@ from ..blocks import (
     Text,
     Verdict,
 )
-from ..pictures import Bars, Traces
+from ..pictures import Bars, Diagram, Traces
 from ..text_blocks import non_breaking
+from .diagram import figure
 from .markup import Html, joined, prose, tag
 
 # Draws an interactive block: what it shows is known where its kind is defined.
@@ -58,6 +59,8 @@ def _block(block: Block, interactive: DrawInteractive, level: int) -> Html:
             return table(block)
         case Bars() | Traces():
             return _picture(block)
+        case Diagram():
+            return figure(block)
         case _:
             return _words(block)
 

@@ -1,0 +1,1 @@
+"""Diagrams of boxes, arrows and brackets: what they consist of, and how a terminal shows them."""
