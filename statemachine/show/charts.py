@@ -18,7 +18,8 @@ from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Array
 from .blocks import Block
-from .pictures import Bars, Pipeline, Slots, Traces
+from .diagrams import figure as diagram_figure
+from .pictures import Bars, Diagram, Pipeline, Slots, Traces
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
@@ -35,7 +36,7 @@ SIDES: tuple[dict[str, Any], ...] = (
 GAP: dict[str, Any] = {"color": INK, "linewidth": 1.0}  # of the sides
 Box = tuple[float, float, float, float]
 
-Drawn = Traces | Slots | Pipeline | Bars
+Drawn = Traces | Slots | Pipeline | Bars | Diagram
 _DOTS = 150  # a PNG has to an inch
 SUFFIXES = (".svg", ".png", ".pdf")
 # The same figures give the same bytes: no settings of the user's, no random names, no date, no
@@ -158,6 +159,8 @@ def draw_picture(axes: Any, picture: Drawn) -> None:
             _pipeline(axes, picture)
         case Bars():
             _bars(axes, picture)
+        case Diagram():
+            diagram_figure.draw(axes, picture.shapes)
 
 
 def chart(picture: Traces, size: tuple[float, float], box: Box) -> str:
@@ -359,6 +362,8 @@ def _size_of(picture: Drawn) -> tuple[float, float]:
         case Pipeline(stages=stages):
             longest = max(len(content) for _, content in stages)
             return 7.5, 0.26 * longest + 1.6
+        case Diagram(shapes=shapes):
+            return diagram_figure.size_in_inches(shapes)
 
 
 def data_url(content: bytes, kind: str) -> str:

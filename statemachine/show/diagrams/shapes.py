@@ -146,6 +146,15 @@ def _last_place(shape: Shape) -> Place:
             return column + 1 + max(length_of(name), length_of(note)), bottom
 
 
+def box_below(place: Place, boxes: Sequence[Box]) -> Box | None:
+    """Return the box on whose upper edge a place is; None if there is none."""
+    column, row = place
+    for box in boxes:
+        if box.top == row and box.left < column < box.right:
+            return box
+    return None
+
+
 def first_column(middle: int, length: int) -> int:
     """Return where a text of some length begins whose middle is known."""
     return middle - length // 2

@@ -16,6 +16,7 @@ from ..diagrams.shapes import (
     Place,
     Shape,
     Words,
+    box_below,
     clean,
     cut,
     length_of,
@@ -165,10 +166,8 @@ def _head(before: Point, end: Point) -> tuple[Point, str]:
 def _point(place: Place, boxes: Sequence[Box]) -> Point:
     """Return the middle of a cell; on the upper edge of a box that edge."""
     column, row = place
-    y = (row + 0.5) * _ROW
-    for box in boxes:
-        if box.top == row and box.left < column < box.right:
-            y = _top(box)
+    box = box_below(place, boxes)
+    y = (row + 0.5) * _ROW if box is None else _top(box)
     return (column + 0.5) * _COLUMN, y
 
 
