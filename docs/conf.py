@@ -53,13 +53,13 @@ def _make_pages(_app) -> None:
 
 
 def _link(_app, _name: str, source: list[str]) -> None:
-    """A link to such a file leads to its page."""
+    """Let a link to such a file lead to its page."""
     for path, name in PAGES.items():
         source[0] = source[0].replace(f"]({path})", f"](reference/{name}.md)")
 
 
 def _attributes(_app, _what, _name, _thing, _options, lines: list[str]) -> None:
-    """The attributes of a class as a list, in which two names may share a line."""
+    """List the attributes of a class, two of which may share a line."""
     inside = False
     for k, line in enumerate(lines):
         if inside and line and not line.startswith("    "):

@@ -8,7 +8,7 @@ PACKAGE = Path(__file__).parent.parent / "statemachine"
 
 
 def rooms() -> dict[str, list[Path]]:
-    """The modules of each room: a folder of the package, or a module beside them."""
+    """Return the modules of each room: a folder of the package, or a module beside them."""
     found: dict[str, list[Path]] = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = path.relative_to(PACKAGE).parts
@@ -17,7 +17,7 @@ def rooms() -> dict[str, list[Path]]:
 
 
 def table() -> str:
-    """A page with files and lines, the largest room first."""
+    """Write a table of files and lines, the largest room first."""
     lines = {
         room: sum(len(path.read_text("utf-8").splitlines()) for path in paths)
         for room, paths in rooms().items()

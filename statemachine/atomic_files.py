@@ -56,7 +56,8 @@ def check_place(target: Path, suffixes: Sequence[str] = (), what: str = "the out
 
 @contextmanager
 def beside(*targets: Path) -> Iterator[list[str]]:
-    """Names of new files beside their places, which are renamed to these: whole or not at all.
+    """Yield the names of new files beside their places, which are renamed to these: whole or not at
+    all.
 
     Each name ends as its target does, for programs that go by that. Several files that belong
     together are renamed one right after the other. No filesystem does that at once, so the
@@ -92,7 +93,7 @@ def beside(*targets: Path) -> Iterator[list[str]]:
 
 
 def _special(target: Path) -> bool:
-    """Whether it is there and no file: a device, a pipe."""
+    """Tell whether a path is there and is no file: a device, a pipe."""
     return target.exists() and not target.is_file() and not target.is_dir()
 
 
@@ -103,18 +104,20 @@ def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
 
 
 def replace_bytes(target: Path, content: bytes) -> int:
-    """The same of bytes; how many."""
+    """Replace a file by these bytes, whole or not at all, and return how many there are."""
     replace_file(target, lambda out: out.write(content))
     return len(content)
 
 
 def replace_text(target: Path, text: str, encoding: str = "utf-8") -> None:
-    """The same of text; what the encoding lacks, as half of a pair of characters, is a "?"."""
+    """Replace a file by this text; a character that the encoding lacks, as half of a pair,
+    becomes "?".
+    """
     replace_bytes(target, text.encode(encoding, errors="replace"))
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    """Rows as CSV. No cell is a formula: a spreadsheet would run what a file is called."""
+    """Return rows as CSV. No cell is a formula: a spreadsheet would run what a file is called."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     for row in rows:
@@ -129,7 +132,7 @@ def replace_csv(target: Path, rows: Iterable[Iterable[object]]) -> None:
 
 @contextmanager
 def _part_of(target: Path) -> Iterator[str]:
-    """A new file beside a place; gone at the end unless it was renamed."""
+    """Yield a new file beside a place; it is deleted at the end unless it was renamed."""
     folder = Path(tempfile.gettempdir()) if _special(target) else target.parent
     start = f".{target.name}{_PART}"
     for part in folder.glob(f"{glob.escape(start)}*{glob.escape(target.suffix)}"):

@@ -15,7 +15,7 @@ _LONGEST = 2000  # characters of a message
 
 
 def cut(message: str) -> str:
-    """A message, without its middle where names in a file made it too long to be read."""
+    """Return a message, without its middle where names in a file made it too long to be read."""
     if len(message) <= _LONGEST:
         return message
     half = (_LONGEST - 5) // 2
@@ -146,7 +146,9 @@ class DivergedWarning(UserWarning):
 
 
 def no_attribute(owner: object, name: str, raw: object) -> AttributeError:
-    """That a Model or Data has no such attribute, and whether the engine's own object has it."""
+    """Return the error for an attribute that a Model or Data lacks; it tells whether the
+    engine's object has it.
+    """
     kind = type(owner).__name__
     own = f"; the engine's own is .raw.{name}" if hasattr(raw, name) else ""
     return AttributeError(f"{kind!r} has no attribute {name!r}{own}", name=name, obj=owner)
@@ -159,7 +161,7 @@ def check_name(kind: str, name: object, known: Iterable[str]) -> None:
 
 
 def one_line(words: object) -> str:
-    """What is said, in one line."""
+    """Return a text in one line."""
     return " ".join(str(words).split())
 
 
@@ -172,7 +174,7 @@ def printable(words: object) -> str:
 
 
 def shown(value: object) -> str:
-    """What somebody gave, on one line of a message."""
+    """Return a value as it is shown on one line of a message."""
     text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())
     return text if len(text) <= 200 else f"{text[:197]}..."
 
@@ -180,13 +182,13 @@ def shown(value: object) -> str:
 def did_you_mean(
     name: object, known: Iterable[str], cutoff: float = 0.5, show: Callable[[str], str] = str
 ) -> str:
-    """The end of a message about a mistyped name: the nearest that is known, or nothing."""
+    """Return the end of a message about a mistyped name: the nearest known one, or nothing."""
     close = difflib.get_close_matches(name if isinstance(name, str) else "", known, 1, cutoff)
     return f". Did you mean {show(close[0])}?" if close else ""
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
-    """The error for a mistyped name: what is known, and the nearest spelling."""
+    """Return the error for a mistyped name: the known ones, and the nearest spelling."""
     names = tuple(known)
     listed = ", ".join(names) if names else "none"
     hint = did_you_mean(name, names, show=repr)

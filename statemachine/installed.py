@@ -21,6 +21,7 @@ from types import ModuleType
 from typing import Any
 
 from .errors import MissingEngineError, unknown_name
+from .program import install_command, pip
 
 # Keep what C code prints off the terminal, and have it for an error message.
 
@@ -70,12 +71,12 @@ class _Streams:
 
     @cached_property
     def catcher(self) -> int:
-        """The stream in memory."""
+        """Return the stream in memory."""
         self._libc.open_memstream.restype = ctypes.c_void_p
         return self._libc.open_memstream(ctypes.byref(self._text), ctypes.byref(self._size))
 
     def size(self) -> int:
-        """How many bytes are in the stream in memory."""
+        """Return how many bytes are in the stream in memory."""
         if not self.variables:
             return 0
         self._libc.fflush(ctypes.c_void_p(self.catcher))
@@ -120,11 +121,11 @@ class Wheel:
 
     @property
     def distribution(self) -> str:
-        """Its name alone."""
+        """Return the requirement's name alone."""
         return self.requirement.partition("==")[0]
 
     def fits(self, system: str, machine: str, python: int) -> bool:
-        """Whether it can be installed on a machine."""
+        """Tell whether a wheel can be installed on a machine."""
         return (
             self.system in ("", system)
             and (not self.machines or machine.lower() in self.machines)
@@ -190,7 +191,7 @@ ENGINES = {engine.name: engine for engine in _ENGINES}
 
 
 def engine_version(name: str) -> str:
-    """Version of an installed engine, read from its metadata; it is not imported.
+    """Return the version of an installed engine, read from its metadata; it is not imported.
 
     The distribution is named where it is not the engine's own: "3.2.8 (pybullet-arm64)".
 
@@ -206,7 +207,7 @@ def engine_version(name: str) -> str:
 
 
 def wheel_here(engine: Engine) -> Wheel | None:
-    """What can be installed on this machine without a compiler."""
+    """Return what can be installed on this machine without a compiler."""
     here = (sys.platform, platform.machine(), sys.version_info.minor)
     if platform.python_implementation() != "CPython":
         return None
@@ -254,7 +255,7 @@ def require(name: str) -> ModuleType:
 
 
 def require_extra(module: str, what: str, package: str, extra: str, instead: str = "") -> Any:
-    """A module of a package that an extra brings.
+    """Return a module of a package that an extra brings.
 
     Args:
         module: Its full name.
@@ -270,14 +271,14 @@ def require_extra(module: str, what: str, package: str, extra: str, instead: str
         return importlib.import_module(module)
     except ImportError as error:
         raise MissingEngineError(
-            f"{what} needs {package}: pip install 'statemachine-sim[{extra}]'"
+            f"{what} needs {package}: {install_command(extra)}"
             + (f"; {instead}" if instead else ""),
             engine=module.partition(".")[0],
         ) from error
 
 
 def available() -> tuple[list[str], list[MissingEngineError]]:
-    """Names of the engines that load here, and for each other what is wrong with it."""
+    """Return the names of the engines that load here, and for each other what is wrong with it."""
     found: list[str] = []
     missing: list[MissingEngineError] = []
     for name in ENGINES:
@@ -304,7 +305,7 @@ def raise_if_interrupted(error: BaseException) -> None:
 
 
 def _installed(engine: Engine) -> dict[str, str]:
-    """Version by distribution: one entry, or none."""
+    """Return the version by distribution: one entry, or none."""
     found: dict[str, str] = {}
     for distribution in engine.distributions:
         with suppress(importlib.metadata.PackageNotFoundError):
@@ -319,9 +320,9 @@ def _installed(engine: Engine) -> dict[str, str]:
 
 
 def _remedy(engine: Engine) -> str:
-    """What to type on this machine, or that nothing is to be had."""
+    """Return what to type on this machine, or that nothing can be installed."""
     if wheel := wheel_here(engine):
-        return f"pip install {wheel.requirement} (wheels for {engine.places})"
+        return f"{pip()} install {wheel.requirement} (wheels for {engine.places})"
     where = f"{platform.system()} {platform.machine()} and Python 3.{sys.version_info.minor}"
     return f"no wheel for {where}, only for {engine.places}"
 

@@ -70,7 +70,7 @@ class Kinematics:
 
     @classmethod
     def same_reading(cls, model: Model) -> Kinematics:
-        """Poses by Pinocchio from the numbers that a Model was compiled to.
+        """Return the poses by Pinocchio from the numbers that a Model was compiled to.
 
         This checks the code that computes. A misreading of the file is in the numbers, and
         cannot be seen.
@@ -131,7 +131,7 @@ class Kinematics:
         return tuple(ends)[:-1]
 
     def pose(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Placement:
-        """World pose of a site or body: `pos` (3,), `mat` (3, 3).
+        """Return the world pose of a site or body: `pos` (3,) [m], `mat` (3, 3).
 
         Args:
             qpos: (nq,) in MuJoCo's layout, quaternions wxyz.
@@ -146,7 +146,7 @@ class Kinematics:
         return Placement(positions[0], matrices[0])
 
     def poses(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Placement:
-        """World poses of a site or body: `pos` (N, 3), `mat` (N, 3, 3).
+        """Return the world poses of a site or body: `pos` (N, 3) [m], `mat` (N, 3, 3).
 
         Args:
             qpos: (N, nq) in MuJoCo's layout, quaternions wxyz.
@@ -171,7 +171,7 @@ class Kinematics:
         return Placement(positions, matrices)
 
     def jacobian(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Array:
-        """Jacobian (6, nv) of a site or body: d(linear, angular velocity)/d(qvel).
+        """Return the Jacobian (6, nv) of a site or body: d(linear, angular velocity)/d(qvel).
 
         World axes, at the frame's origin; columns in MuJoCo's layout, so that it
         equals `mj_jacSite`'s jacp over jacr.
@@ -206,7 +206,7 @@ class Kinematics:
         return ours
 
     def definition(self, name: str, kind: Kind = "site") -> FrameDefinition:
-        """How a frame is fixed to a body, as the witness has read it.
+        """Return how a frame is fixed to a body, as the witness has read it.
 
         Raises:
             UnknownNameError: There is no such frame.
@@ -229,7 +229,7 @@ class Kinematics:
         return known[name]
 
     def _configurations(self, qpos: ArrayLike) -> Array:
-        """(N, nq) in MuJoCo's layout to (N, nq) in Pinocchio's."""
+        """Return positions in Pinocchio's layout (N, nq), of positions in MuJoCo's (N, nq)."""
         ours = as_numbers(qpos, "qpos")
         ours = as_vector(ours, (*ours.shape[:1], self.nq), "qpos")
         theirs = np.empty((len(ours), self._model.nq))
@@ -250,7 +250,7 @@ class Kinematics:
 
 
 def shared_joints(kinematics: Kinematics, names: Sequence[str]) -> list[int]:
-    """Which of an engine's joints the witness has, by their numbers.
+    """Return the joints of an engine's Model that the witness has, too, by their numbers.
 
     Args:
         kinematics: The witness.

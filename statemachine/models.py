@@ -36,13 +36,13 @@ _COUNTERPARTS = {"so101": "robotstudio_so101"}
 
 
 def models_dir() -> Path:
-    """The folder of our own models: inside the wheel, or at the checkout's root."""
+    """Return the folder of our own models: inside the wheel, or at the checkout's root."""
     inside = _PACKAGE / "_models"
     return inside if inside.is_dir() else _PACKAGE.parent / "models"
 
 
 def model_names() -> list[str]:
-    """Names of the models that come with the library: the arm and its scenes first."""
+    """Return the names of the models that come with the library: the arm and its scenes first."""
     root = models_dir()
     names = [path.relative_to(root).with_suffix("").as_posix() for path in root.glob("*/*.xml")]
     return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
@@ -319,7 +319,7 @@ def mesh_places(name: str, folder: Path) -> Iterator[Path]:
 
 
 def included_file(name: str, path: Path, includer: Path) -> Path | None:
-    """The file that an MJCF includes, or None where there is none.
+    """Return the file that an MJCF includes, or None where there is none.
 
     MuJoCo looks in the folder of the model's file, then in that of the file with the <include>.
 
@@ -333,7 +333,7 @@ def included_file(name: str, path: Path, includer: Path) -> Path | None:
 
 
 def numbers(text: str, count: int, what: str) -> list[float]:
-    """The numbers of an attribute of a model's file; `what` it is, for the message.
+    """Return the numbers of an attribute of a model's file; `what` it is, for the message.
 
     Raises:
         ModelError: They are not so many, or no finite numbers.

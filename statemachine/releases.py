@@ -36,14 +36,14 @@ _JUST_MADE = 3600.0  # [s] since its last change, that a folder without a lock i
 
 
 def folder() -> Path:
-    """Where the environments are: $STATEMACHINE_ENGINES, or a folder of the user's cache."""
+    """Return where the environments are: $STATEMACHINE_ENGINES, or a folder of the user's cache."""
     given = os.environ.get("STATEMACHINE_ENGINES")
     cache = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
     return Path(given) if given else Path(cache or Path.home() / ".cache", "statemachine/engines")
 
 
 def python_of(name: str) -> Path:
-    """The Python of a release.
+    """Return the Python of a release.
 
     Raises:
         MissingEngineError: It is not here.
@@ -56,7 +56,7 @@ def python_of(name: str) -> Path:
 
 
 def backends_of(versions: str) -> list[str]:
-    """The backends of releases, and of the one that is installed, from the oldest on.
+    """Return the backends of releases, and of the one that is installed, from the oldest on.
 
     Args:
         versions: With commas between: "3.1.6,3.3.7".
@@ -80,7 +80,7 @@ def backends_of(versions: str) -> list[str]:
 
 
 def is_here(name: str) -> bool:
-    """Whether a release has an environment.
+    """Tell whether a release has an environment.
 
     Raises:
         BadInputError: As `version_of`.
@@ -90,7 +90,8 @@ def is_here(name: str) -> bool:
 
 
 def published(since: str) -> list[str]:
-    """The backends of all releases since one, up to the one that is installed, the oldest first.
+    """Return the backends of all releases since one, up to the one that is installed, the oldest
+    first.
 
     The package index names them.
 
@@ -247,7 +248,7 @@ def around_a_change(
     compared: Callable[[tuple[str, str]], Any],
     report: Callable[[str], object],
 ) -> list[str]:
-    """The first and the last of a row of releases, and two neighbours between that differ.
+    """Return the first and the last of a row of releases, and neighbours between that differ.
 
     By bisection: the left bound agrees with the first one. Releases that are not here are added;
     of one that cannot be, a neighbour takes the place.

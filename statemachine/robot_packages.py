@@ -18,6 +18,7 @@ from types import ModuleType
 from typing import Any
 
 from .errors import MissingEngineError, ModelFileError, check_name, one_line
+from .program import install_command
 
 MENAGERIE, DESCRIPTIONS = "menagerie:", "robot_descriptions:"
 _ANSWERS_WITHIN = 5.0  # s; a slower network counts as no network
@@ -84,7 +85,7 @@ def _of_descriptions(name: str) -> Path:
 
 
 def _is_cloned(package: Any, name: str) -> bool:
-    """Whether the repository of a robot is on this machine, as far as the package tells."""
+    """Tell whether the repository of a robot is on this machine, as far as the package tells."""
     home = os.environ.get("ROBOTDESCRIPTIONS_CACHE", "~/.cache/robot_descriptions")
     try:
         known = importlib.import_module("robot_descriptions._repositories").REPOSITORIES
@@ -100,7 +101,7 @@ def _package(module: str, extra: str, name: str) -> ModuleType:
     except ImportError as error:
         raise MissingEngineError(
             f"{name!r} is a robot of the package {module}, which is not installed here: "
-            f"pip install 'statemachine-sim[{extra}]'",
+            + install_command(extra),
             engine=module,
         ) from error
 

@@ -59,7 +59,7 @@ def _parts(quat: ArrayLike) -> tuple[Array, Array, Array, Array]:
 
 
 def _together(*parts: Array) -> Array:
-    """Arrays (...) of one shape as the entries of one (..., n); faster than `np.stack`."""
+    """Stack arrays (...) of one shape into one (..., n); faster than `np.stack`."""
     array = np.empty((*parts[0].shape, len(parts)))
     for k, part in enumerate(parts):
         array[..., k] = part
@@ -84,7 +84,7 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def rotation(axis: Array, angle: float) -> Array:
-    """Rotation matrix about a unit axis (Rodrigues)."""
+    """Return the rotation matrix about a unit axis (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
@@ -97,24 +97,24 @@ class Placement(NamedTuple):
     mat: Array
 
     def __matmul__(self, inner: Placement) -> Placement:
-        """The pose `inner`, given in this frame, in the frame that this one is given in."""
+        """Return the pose `inner`, given in this frame, in the frame that this one is given in."""
         return Placement(self.pos + self.mat @ inner.pos, self.mat @ inner.mat)
 
     @property
     def inverse(self) -> Placement:
-        """The way back."""
+        """Return the inverse pose."""
         return Placement(-self.mat.T @ self.pos, self.mat.T)
 
     def of(self, point: Array) -> Array:
-        """A point (3,) of this frame in the frame that this one is given in."""
+        """Return a point (3,) of this frame in the frame that this one is given in."""
         return self.pos + self.mat @ point
 
     def distance(self, other: Placement) -> float:
-        """Between the origins [m]."""
+        """Return the distance between the origins [m]."""
         return float(np.linalg.norm(self.pos - other.pos))
 
     def angle(self, other: Placement) -> float:
-        """Between the axes [rad]."""
+        """Return the angle between the axes [rad]."""
         return float(angle_between(self.mat, other.mat))
 
 

@@ -26,7 +26,7 @@ def wheel(folder: Path) -> Path:
 
 
 def student_kit(built: Path) -> dict[str, bytes]:
-    """What a student needs, by name in the zip."""
+    """Return what a student needs, by name in the zip."""
     exercises = {name: _template(name) for name in ("step_loop.py", "test_arm.py", "conftest.py")}
     start = (HERE / "START.md").read_text(encoding="utf-8").replace("WHEEL", built.name)
     return {
@@ -39,7 +39,7 @@ def student_kit(built: Path) -> dict[str, bytes]:
 
 
 def _template(name: str) -> bytes:
-    """A student's file as it is handed out.
+    """Return a student's file as it is handed out.
 
     Raises:
         SystemExit: Somebody has worked in it.
@@ -56,7 +56,7 @@ def _template(name: str) -> bytes:
 
 
 def _changed(file: Path) -> bool:
-    """Whether a file differs from the one that is committed; False outside a repository."""
+    """Return whether a file differs from the one that is committed; False outside a repository."""
     command = ["git", "-C", str(ROOT), "diff", "--quiet", "HEAD", "--", str(file)]
     try:
         return subprocess.run(command, capture_output=True, check=False).returncode == 1
@@ -65,7 +65,7 @@ def _changed(file: Path) -> bool:
 
 
 def autograder(built: Path) -> dict[str, bytes]:
-    """What Gradescope unpacks as /autograder/source, by name in the zip."""
+    """Return what Gradescope unpacks as /autograder/source, by name in the zip."""
     return {
         built.name: built.read_bytes(),
         "constraints.txt": (ROOT / "constraints.txt").read_bytes(),

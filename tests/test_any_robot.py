@@ -213,8 +213,9 @@ def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_free_body_is_written_at_its_height(model: Any) -> None:
-    found, page, code = lesson("write", model(BOX))
-    assert_has(found, slide=True, value=1.05)
+    found, page, code = lesson("forward", model(BOX), further=True)
+    assert_has(found, value=1.05)
+    assert found.further.slide
     assert "+ 2  # the height of a free body" in code
     assert page.holds
 
@@ -224,13 +225,26 @@ _QUICK: dict[str, dict[str, Any]] = {
     "gravity": {"seconds": 0.2, "longer": 0.2},
     "hold": {"seconds": 0.2},
     "replay": {"steps": 30},
-    "forward": {"arrays": True, "lag": True, "seconds": 0.1},
+    "forward": {"further": True, "seconds": 0.1},
+    "time": {"steps": 40},
 }
 
 
 @pytest.mark.parametrize("robot", list(ROBOTS))
 @pytest.mark.parametrize(
-    "name", ["objects", "state", "write", "forward", "hold", "gravity", "reset", "replay"]
+    "name",
+    [
+        "nowhere",
+        "objects",
+        "state",
+        "forward",
+        "hold",
+        "gravity",
+        "reset",
+        "replay",
+        "time",
+        "summary",
+    ],
 )
 def test_every_lesson_that_makes_sense_holds(model: Any, robot: str, name: str) -> None:
     """Of another robot than the arm a lesson shows code, tables and curves."""
@@ -247,7 +261,7 @@ def test_every_lesson_that_makes_sense_holds(model: Any, robot: str, name: str) 
 
 def test_a_value_is_in_the_range_of_its_joint(model: Any) -> None:
     robot = model(MIXED.format(rest=""))
-    values = [lesson("write", robot, **joint)[0].value for joint in ({"joint": "rail"}, {})]
+    values = [lesson("forward", robot, **joint)[0].value for joint in ({"joint": "rail"}, {})]
     assert values == [0.5, 0.8]  # a quarter of the 2 m
 
 
@@ -353,7 +367,7 @@ def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) ->
         ),
         ("menagerie:", 2, "'menagerie:' names no robot: type menagerie:NAME"),
         ("menagerie:unitre_g1", 2, "Did you mean 'unitree_g1'?"),
-        ("robot_descriptions:panda_mj_description", 3, "pip install 'statemachine-sim[robots]'"),
+        ("robot_descriptions:panda_mj_description", 3, "[robots]"),
     ],
 )
 @pytest.mark.parametrize("command", ["lesson gravity --model", "compare hold", "trace record hold"])

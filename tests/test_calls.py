@@ -433,13 +433,13 @@ def write_in_a_call(right: Any, model: Any, data: Any) -> None:
 
 @around(MujocoData, "_recompute")
 def write_beside_a_call(_right: Any, self: Any) -> None:
-    mujoco.mj_forward(self._home.raw, self.raw)
+    mujoco.mj_forward(self._model.raw, self.raw)
     self.raw.qvel[2] = 1e-300
-    mujoco.mj_forward(self._home.raw, self.raw)
+    mujoco.mj_forward(self._model.raw, self.raw)
 
 
 forward_that_steps = around(MujocoData, "_recompute")(
-    lambda _right, self: mujoco.mj_step(self._home.raw, self.raw)
+    lambda _right, self: mujoco.mj_step(self._model.raw, self.raw)
 )
 
 

@@ -112,12 +112,19 @@ def test_fingertip_against_another_arm(
     assert found["position_worst"] is None or "refused" not in said
 
 
-def test_alone_it_lists_the_lessons_in_order(here: Cli) -> None:
+def test_alone_it_names_the_commands_to_begin_with(here: Cli) -> None:
     text = here(code=0).stdout
-    places = [text.index(f"\n  {name} ") for name in LESSONS]
-    assert places == sorted(places)
+    commands = re.findall(r"^    statemachine (\w+)", text, re.M)
+    assert commands == ["lesson", "check", "compare", "doctor"]
+    assert "statemachine --help" in text
     assert max(map(len, text.splitlines())) <= 80
-    assert text.count("\n") < 24  # beside the prompt of a small terminal
+    assert text.count("\n") <= 14
+
+
+def test_the_help_of_lesson_lists_the_lessons_in_order(here: Cli) -> None:
+    text = here("lesson", "--help", code=0).stdout
+    places = [text.index(f"\n    {name} ") for name in LESSONS]
+    assert places == sorted(places)
 
 
 def in_a_shell(command: str) -> subprocess.CompletedProcess[str]:
@@ -168,7 +175,8 @@ def test_the_doctor_says_what_the_viewer_lacks(cli: Cli, tmp_path: Path) -> None
     done = cli("doctor", "--json", PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}", code=0)
     (viewer,) = (f for f in json.loads(done.stdout)["findings"] if f["name"] == "viser")
     assert not viewer["works"]
-    assert "pip install 'statemachine-sim[view]'" in viewer["found"]
+    assert "pip install -e " in viewer["found"]
+    assert "[view]" in viewer["found"]
 
 
 def test_version(cli: Cli) -> None:

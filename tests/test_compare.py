@@ -365,6 +365,7 @@ def test_the_help_knows_the_experiments() -> None:
     assert tuple(SCENARIOS) == tuple(EXPERIMENTS)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_the_command(here: Cli) -> None:
     assert max(map(len, here("compare", "hold", code=1).stdout.splitlines())) <= 80
@@ -375,7 +376,7 @@ def test_the_command(here: Cli) -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("form", ["html", "plot"])
+@pytest.mark.parametrize("form", [pytest.param("html", marks=pytest.mark.slow), "plot"])
 def test_a_robot_that_stands_still_was_not_compared(form: str, here: Cli, tmp_path: Path) -> None:
     file = written(tmp_path / "still.xml", STILL)
     out = tmp_path / ("a.html" if form == "html" else "a.svg")

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from statemachine.course.lessons.speed import SpeedResult
 
 import statemachine as sm
 from statemachine.course.lessons import session
 from statemachine.course.lessons._falling import Forces, milestones
-from statemachine.course.lessons.speed import SpeedResult
 from statemachine.errors import BadInputError, ModelError
 from statemachine.lab.runs import in_turns
 from statemachine.lab.runs.provenance import provenance

@@ -166,6 +166,7 @@ def test_what_is_not_brought_over_is_refused_with_its_reason(left, right, reason
     assert not found.verdict.holds
 
 
+@pytest.mark.slow
 def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
     found = explained(tmp_path, ARM, ARM.replace(*EXTRA), scenario=SWING)
     assert [each.name for each in found.shares if each.share is None] == ["extra joint of more"]
@@ -227,7 +228,16 @@ def test_a_mass_that_moves_the_centre_of_its_body_is_one_cause(tmp_path: Path) -
 
 
 @pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("name", ["mass", "gains", "damping", "gear", "place", "armature"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "mass",
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("gains", "damping", "gear", "place", "armature")
+        ),
+    ],
+)
 def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
     bare = ARM.replace(FLOOR, "")
     case = ALONE[name]
@@ -240,6 +250,7 @@ def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
     assert found.verdict.holds
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.filterwarnings("ignore:PyBullet. contacts begin")
 def test_what_an_engine_leaves_out_is_said(tmp_path: Path) -> None:
@@ -289,6 +300,7 @@ def test_every_array_of_a_compiled_model_is_compared_or_has_no_effect():
 ACTS_WITH_AN_OPTION = ("body_gravcomp", "actuator_group", "tree_sleep_policy")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["so101/scene_box"])
 def test_each_figure_of_a_model_is_found_and_brought_over(model):
     """One entry of each array is changed: the list has it, and the edits undo it."""
@@ -502,6 +514,7 @@ def test_causes_are_brought_over(name, tmp_path):
     assert found.unit == "rad" or "rotation" not in how.get("quantity", "")
 
 
+@pytest.mark.slow
 def test_a_finer_list_goes_down_to_single_entries(tmp_path):
     """What each entry of a place, an inertia, a range, gravity or a servo explains by itself."""
     changes = [
@@ -535,6 +548,7 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
     assert abs(told["inertia (diaginertia[1]) of lower"]) > 1e-6
 
 
+@pytest.mark.slow
 def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
     from statemachine.engines.mujoco._quantities import same
     from statemachine.engines.mujoco.differences import differences, edited, entries

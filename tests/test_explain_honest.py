@@ -119,6 +119,7 @@ def test_an_option_of_an_engine_as_it_comes_counts(
     assert not {"armature", "dry friction", "joint limits"} & {r["name"] for r in found["shares"]}
 
 
+@pytest.mark.slow
 def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
     """The joint's damping differs by less than a tolerance; the box slides, or does not."""
     file(folder, "l.xml", more=SLIDING.format(".2"), qpos=".8 0 1 .06 1 0 0 0")

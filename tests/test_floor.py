@@ -82,6 +82,7 @@ def test_identical_sides_are_inside_all_the_time(tmp_path: Path) -> None:
     assert "Every gap lies inside it, all the time." in " ".join(text.split())
 
 
+@pytest.mark.slow
 def test_a_gap_of_chaos_alone_is_told_from_one_that_was_made(tmp_path: Path) -> None:
     # For 15 s a difference grows by the same factor, whatever its size; later the pendulums are as
     # far apart as they can be, and last bits say which pair is farther.

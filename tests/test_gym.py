@@ -464,8 +464,7 @@ def test_without_gymnasium_the_extra_is_named() -> None:
         "try:\n    import statemachine.gym\n"
         "except ImportError as error:\n    print(type(error).__name__, error)\n",
         ROOT,
-        "MissingEngineError statemachine.gym needs Gymnasium: "
-        "pip install 'statemachine-sim[gym]'\n",
+        "MissingEngineError statemachine.gym needs Gymnasium: python -m pip install -e '.[gym]'\n",
     )
 
 

@@ -17,9 +17,10 @@ from statemachine.engines.mujoco import known_changes
 from statemachine.engines.records import KnownChange
 from statemachine.errors import EngineWarning
 from statemachine.lab.compare.sides import Request, Side
-from statemachine.lab.questions.requests import gap
+from statemachine.lab.questions.requests import causes, gap
 from statemachine.lab.questions.requests.versions import ReleasePair, VersionsRequest, answer
 from statemachine.lab.questions.versions import page
+from statemachine.lab.why import page as why
 from statemachine.show.blocks import Items
 
 from .support.backends import RELEASES
@@ -137,6 +138,20 @@ def test_a_comparison_of_two_releases_tells_them_too_and_of_two_files_none(
         run = Request(("hold",), sides=(Side(file, OLD), Side(right)), seconds=0.5)
         told.append(names(gap.answer(gap.CompareRequest(run, uncertainty=None)).changes))
     assert told == [["kv of a limited servo"], []]
+
+
+def test_causes_of_a_gap_between_two_releases_have_them_too(
+    tmp_path: Path, old_releases: None
+) -> None:
+    text = SERVO.format(integrator="implicitfast", limit=LIMIT)
+    file = str(written(tmp_path / "m.xml", text))
+    run = Request(("hold",), sides=(Side(file, OLD), Side(file)), seconds=0.5)
+    compared = gap.answer(gap.CompareRequest(run, uncertainty=None))
+    result = causes.answer(causes.ExplainRequest(run, uncertainty=None, jobs=1))
+    assert result.changes == compared.changes
+    assert names(result.changes) == ["kv of a limited servo"]
+    (items,) = blocks(why.page(result), Items)
+    assert OLD.partition("==")[2] in items.texts[0]
 
 
 BOXES = """<mujoco><worldbody><geom type="plane" size="2 2 0.1"/>

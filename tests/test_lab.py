@@ -21,6 +21,7 @@ from statemachine.lab.recordings import record, write
 
 from .support.files import written
 from .support.processes import of_python
+from .support.screens import wide_lines
 from .support.small_models import TWO_LINKS, TWO_SERVOS
 
 LINKS = {"drives": "".join(TWO_SERVOS), "keys": ""}
@@ -382,7 +383,7 @@ def test_print_shows_what_the_command_prints(light: str, heavy: str) -> None:
     printed = of_python("-m", "statemachine", *words, code=1).stdout
     result = lab.compare(light, heavy, what="hold", seconds=0.1, chaos=False)
     assert str(result) == printed.strip("\n")
-    assert max(map(len, str(result).splitlines())) <= 80
+    assert not wide_lines(str(result).splitlines())
     assert "\x1b" not in str(result)
 
 

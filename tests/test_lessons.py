@@ -34,31 +34,31 @@ import statemachine as sm
 from statemachine.cli import lesson as lesson_command
 from statemachine.cli import main
 from statemachine.course import asking, quiz
-from statemachine.course.lessons import LESSONS, PATH, module, worlds
+from statemachine.course.lessons import LESSONS, MOVED, PATH, _many_worlds, module
 from statemachine.course.lessons.request import LessonRequest
 from statemachine.course.lessons.session import CodeRun, LessonRun, load_line, page_of_lesson, take
 from statemachine.course.quiz import RecordedReader
-from statemachine.errors import BadInputError, StateMachineError
+from statemachine.errors import BadInputError, StateMachineError, UnknownNameError
 from statemachine.lab.recordings import record_scenario
 from statemachine.lab.runs.in_turns import Ratio
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.show import lesson_template as template
 from statemachine.show import progress as bar
+from statemachine.show import terminal
 from statemachine.show.blocks import Code, Heading, Page, Printed, Question, Table, Text, Verdict
 from statemachine.show.pictures import Traces
 
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
 from .support.pages import blocks, lesson_result, with_figures
-from .support.processes import Cli, of_python
+from .support.processes import Cli, of_python, one_line
 from .support.requirements import ROOT
 
-_TIMED = {"time", "speed", "worlds", "objects", "questions"}  # print wall times
-_QUICK = {
-    "speed": {"steps": 200},
-    "worlds": {"most": 4},
-    "gravity": {"longer": 0.0},
-    "forward": {"arrays": True, "seconds": 0.4},
+_TIMED = {"time", "objects", "summary", "questions"}  # print wall times
+_QUICK: dict[str, dict[str, Any]] = {
+    "objects": {"most": 4},
+    "time": {"steps": 200},
+    "forward": {"further": True, "seconds": 0.4},
 }
 
 
@@ -80,41 +80,48 @@ def _repage(name: str, backend: str, result: Any) -> Page:
 
 def test_the_path_has_ten_lessons_in_the_order_of_the_course() -> None:
     assert [lesson.name for lesson in PATH] == [
-        "objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time",
-        "speed",
+        "nowhere", "objects", "state", "forward", "hold", "gravity", "reset", "replay", "time",
+        "summary",
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("name", MOVED)
+def test_a_lesson_that_went_says_where_it_is(cli: Cli, name: str) -> None:
+    command = MOVED[name].partition(" --")[0]
+    for words in (("lesson", name), ("lesson", "--from", name)):
+        one_line(cli(*words), f"statemachine {command}")
+    assert command.split()[1] in LESSONS
+    refused((UnknownNameError, f"statemachine {command}", lambda: LessonRequest(name)))
+
+
 @pytest.mark.slow
-def test_what_a_shared_model_saves(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worlds, "_MOST_APART", 2)
-    monkeypatch.setattr(worlds, "_ROUND", 0.002)
+def test_what_many_worlds_cost(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_many_worlds, "_MOST_APART", 2)
+    monkeypatch.setattr(_many_worlds, "_ROUND", 0.002)
     fractions: list[float] = []
-    lesson = LESSONS["worlds"]
+    lesson = LESSONS["objects"]
     model = sm.load(lesson.model, backend=backend)
-    taken: Any = take(lesson, model, backend, {"most": 4}, progress=fractions.append)
+    options = {"most": 4, "worlds": 2, "further": True}
+    taken: Any = take(lesson, model, backend, options, progress=fractions.append)
     result, page = taken.result, page_of_lesson(lesson, {backend: taken})
-    assert taken.printed.startswith("worlds: 1, ")
-    assert max(map(len, taken.code.splitlines())) <= 76
-    shared = model.capabilities.shared_model
-    assert [cost.n for cost in result.costs] == ([1, 4] if shared else [1])
-    assert result.load > result.make_data > 0
-    assert all(cost.step > 0 and cost.faster.rounds == worlds._ROUNDS for cost in result.costs)
-    assert fractions == sorted(fractions)
-    assert fractions[-1] == 1
-    assert [len(table.rows) for table in blocks(page, Table)] == [5, len(result.costs)]
+    many, shared = result.further, model.capabilities.shared_model
+    assert [cost.n for cost in many.costs] == ([1, 4] if shared else [1])
+    rounds = _many_worlds._ROUNDS
+    assert all(cost.step > 0 and cost.faster.rounds == rounds for cost in many.costs)
+    assert 0 < min(fractions) <= max(fractions) <= 1
     (curves,) = blocks(page, Traces)
-    assert list(curves.curves) == [f"{backend}: a step of one world"]
+    assert list(curves.curves) == [backend]
     if not shared:
-        page = _repage("worlds", backend, with_figures(result, limit="the reason"))
+        many = with_figures(many, limit="the reason")
+        page = _repage("objects", backend, with_figures(result, further=many))
         assert any("the reason" in text.text for text in blocks(page, Text))
 
 
 def test_worlds_that_are_apart_fit_into_the_memory_that_is_free(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(worlds, "free_memory", lambda: 5 * 3 * 30e6)
-    most, why = worlds._limit(4096, 30e6)
+    monkeypatch.setattr(_many_worlds, "free_memory", lambda: 5 * 3 * 30e6)
+    most, why = _many_worlds._limit(4096, 30e6)
     assert most == 5
     assert "about 30 MB, and 450 MB are free" in why
 
@@ -124,9 +131,14 @@ def test_worlds_that_are_apart_fit_into_the_memory_that_is_free(
 
 # Options with which a run on PyBullet gives all slots.
 _ALL = {
-    "forward": {"arrays": True, "seconds": 0.4},
-    "gravity": {"seconds": 1.0, "longer": 2.0},
-    "replay": {"steps": 50},
+    "nowhere": {"further": True},
+    "objects": {"further": True, "most": 4, "worlds": 2},
+    "forward": {"further": True, "seconds": 0.4},
+    "hold": {"further": True},
+    "gravity": {"seconds": 1.0, "longer": 2.0, "further": True},
+    "reset": {"further": True},
+    "replay": {"steps": 50, "further": True},
+    "time": {"steps": 200, "further": True},
 }
 
 
@@ -139,7 +151,7 @@ def test_each_branch_of_a_template_can_be_filled_in(name: str) -> None:
     slots = dict.fromkeys(("mujoco", "pybullet"), True) | vars(taken.result)
     slots |= module(name).slots(taken.result)
     tables = getattr(module(name), "tables", lambda *_results: {})
-    alone = ("code", "printed", *tables({"pybullet": taken.result}, taken.result))
+    alone = ("code", "printed", "diagram", *tables({"pybullet": taken.result}, taken.result))
     slots |= {block: block for block in alone}
     text = (ROOT / "statemachine" / "course" / "lessons" / f"{name}.md").read_text("utf-8")
     conditions = sorted(set(re.findall(r"<!-- if (?:not )?(\w+) -->", text)))
@@ -275,8 +287,17 @@ Change = Callable[[Any], Any]
 _BELIED: dict[str, tuple[str, Change]] = {
     "worlds disturb each other": ("objects", lambda r: with_figures(r, alone=False)),
     "the model changes": ("objects", lambda r: with_figures(r, constant=False)),
-    "a write is seen": ("write", lambda r: with_figures(r, changed=("xpos",))),
-    "an array is made anew": ("write", lambda r: with_figures(r, same_arrays=False)),
+    "a fresh arm is somewhere": ("nowhere", lambda r: with_figures(r, first=r.second)),
+    "a fresh Data is not empty": ("nowhere", lambda r: with_figures(r, empty=False)),
+    "forward changes what is stored": ("nowhere", lambda r: with_figures(r, stored=False)),
+    "forward computes something else": ("nowhere", lambda r: with_figures(r, repeats=False)),
+    "qpos is a copy": ("forward", lambda r: with_figures(r, view=r.copy)),
+    "the engine has another array": ("forward", lambda r: with_figures(r, in_engine=0.0)),
+    "an array is made anew": (
+        "forward",
+        lambda r: with_figures(r, further=with_figures(r.further, same_arrays=False)),
+    ),
+    "a program prints something else": ("summary", lambda r: with_figures(r, changed=("replay",))),
     "readings 3 and 4 are equal": ("forward", lambda r: with_figures(r, equal=((2, 3),))),
     "a step leaves what is new": (
         "forward",
@@ -328,21 +349,13 @@ _QUIET = Ratio("null", 1.0, 0.99, 1.01, 20)
         ("forward", lambda _: {}, 1),
         ("forward", lambda _: {"equal": ((2, 3),)}, 2),
         ("forward", lambda _: {"equal": ()}, None),
-        ("write", lambda _: {"view": 0.0}, 1),
+        ("nowhere", lambda _: {}, 0),
+        ("nowhere", lambda result: {"first": result.second}, 1),
+        ("summary", lambda _: {}, 1),
+        ("summary", lambda _: {"changed": ("replay", "time")}, None),
         ("time", lambda _: {"passed": 0.2}, 1),
         ("gravity", lambda _: {}, 2),
         ("gravity", lambda result: {"servos_on": result.servos_off}, 0),
-        *(
-            (
-                "speed",
-                lambda _, x=x: {
-                    "loop": Ratio("loop", x, x - 0.1, x + 0.1, 20),
-                    "told_apart": x != 1.05,  # which is within the noise
-                },
-                right,
-            )
-            for x, right in ((0.5, 0), (1.05, 0), (1.5, 1), (10, 2))
-        ),
     ],
 )
 def test_the_right_choice_is_computed(name: str, changes: Change, right: int | None) -> None:
@@ -351,26 +364,70 @@ def test_the_right_choice_is_computed(name: str, changes: Change, right: int | N
     assert blocks(page, Question)[0].right == right
 
 
-def test_what_cannot_be_told_apart_is_said_so() -> None:
-    result = _on_mujoco("speed")
-    for loop, said in (
-        (Ratio("loop", 1.5, 1.4, 1.6, 20), "takes 1.50 times as long"),
-        (Ratio("loop", 1.02, 1.0, 1.04, 20), "cannot be told apart by 20 rounds"),
-        (Ratio("loop", 1.5, 1.4, 1.6, 4), "cannot be told apart by 4 rounds"),
-    ):
-        page = _repage(
-            "speed",
-            "mujoco",
-            with_figures(result, loop=loop, null=_QUIET, told_apart=loop.differs_from(_QUIET)),
-        )
-        assert any(said in text.text for text in blocks(page, Text))
-    # The code measures the steps that the table does.
-    page, taken = _take("speed", "mujoco", steps=123)
-    assert_in(
-        taken.code, "wall(model, start(model), [123])", "wall(model, start(model), [1] * 123)"
+def _rate(median: float, rounds: int = 20) -> Ratio:
+    """So many times real time, give or take a tenth of it."""
+    return Ratio("real time", median, 0.9 * median, 1.1 * median, rounds)
+
+
+@pytest.mark.parametrize(
+    ("rate", "right"),
+    [
+        (_rate(0.5), 0),
+        (_rate(4.0), 1),
+        (_rate(90.0), 2),
+        (_rate(1.05), None),  # slower than the real world, or faster?
+        (_rate(9.5), None),
+        (_rate(90.0, rounds=4), None),  # too few to tell
+    ],
+)
+def test_how_many_times_real_time_is_told_if_the_rounds_can_tell_it(
+    rate: Ratio, right: int | None
+) -> None:
+    page = _repage("time", "mujoco", with_figures(_on_mujoco("time"), rate=rate))
+    question = blocks(page, Question)[1]
+    assert (question.right, question.undecided) == (right, right is None)
+
+
+@pytest.mark.parametrize(
+    ("loop", "right"),
+    [
+        (Ratio("loop", 0.5, 0.4, 0.6, 20), 0),
+        (Ratio("loop", 1.5, 1.4, 1.6, 20), 1),
+        (Ratio("loop", 10.0, 9.9, 10.1, 20), 2),
+        (Ratio("loop", 1.02, 1.0, 1.04, 20), None),  # within the noise
+        (Ratio("loop", 2.0, 1.9, 2.1, 20), None),
+        (Ratio("loop", 1.5, 1.4, 1.6, 4), None),
+    ],
+)
+def test_what_a_loop_costs_is_told_if_it_is_more_than_the_noise(
+    loop: Ratio, right: int | None
+) -> None:
+    result = _take("time", "mujoco", further=True)[1].result
+    cost = with_figures(
+        result.further, loop=loop, null=_QUIET, told_apart=loop.differs_from(_QUIET)
     )
-    long = module("speed").code(sm.load("so101"), {"steps": 50_001}, "…")
-    assert "wall(model, start(model), [20000] * 2 + [10001])" in long  # Ctrl-C is heard between
+    page = _repage("time", "mujoco", with_figures(result, further=cost))
+    question = blocks(page, Question)[2]
+    assert (question.right, question.undecided) == (right, right is None)
+
+
+def test_a_prediction_that_the_runs_cannot_decide_is_not_scored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    open_question = Question("how fast?", ("slow", "fast"), None, "it varies", undecided=True)
+    monkeypatch.setattr("builtins.input", Mock(side_effect=["b"]))
+    reader = RecordedReader(tmp_path / "mine.json", "time")
+    terminal.show(Page("t", "o", [open_question, Text("measured")]), "", reader)
+    assert_in(capsys.readouterr().out, "cannot be told on this machine now", "it varies")
+    assert reader.summary == "mine.json: 0 of 0 predictions right"
+
+
+def test_the_code_of_time_counts_the_steps_that_the_page_does() -> None:
+    page, taken = _take("time", "mujoco", steps=123)
+    assert "sm.step(model, data, 123)" in taken.code
+    options = {"steps": 50_001, "realtime": False, "seconds": None}
+    long = module("time").code(sm.load("so101"), options, "…")
+    assert "for n in [20000] * 2 + [10001]:" in long  # Ctrl-C is heard between
     assert any("123 steps" in text.text for text in blocks(page, Text))
 
 
@@ -410,21 +467,17 @@ def test_what_catches_the_falling_arm() -> None:
     assert_in(said, "It is the contact that catches", "at 4 s it is at 23.92°, at 100 s at 53.89°")
 
 
-@pytest.mark.parametrize("asked", [(), ("arrays",), ("lag",), ("arrays", "lag")])
-def test_forward_computes_what_it_shows(asked: tuple[str, ...], backend: str) -> None:
-    options = {"arrays": False, "seconds": None} | dict.fromkeys(asked, True)
-    page, taken = _take("forward", backend, **options)
+@pytest.mark.parametrize("further", [False, True])
+def test_forward_computes_what_it_shows(further: bool, backend: str) -> None:
+    page, taken = _take("forward", backend, further=further, seconds=0.5)
     found = taken.result
-    assert bool(found.changes) == ("arrays" in asked)
-    assert (len(found.lag.time) if found.lag else 0) == (400 if "lag" in asked else 0)
-    own = {"arrays": "write", "lag": "step"} if backend != "mujoco" else {}
-    assert {answer.question for answer in found.itself} == {own[a] for a in asked if a in own}
-    ours = [table for table in blocks(page, Table) if "itself, without us" not in table.title]
-    assert (len(ours), len(blocks(page, Heading))) == (1 + len(asked), len(asked))
-    for flag in ("arrays", "lag"):
-        line = f"`statemachine lesson forward --{flag}`"
-        said = any(text.text.endswith(line) for text in blocks(page, Text))
-        assert said == (flag not in asked)
+    assert bool(found.changes) == bool(found.lag) == bool(found.further) == further
+    assert found.lag is None or len(found.lag.time) == 100
+    own = {"write", "step"} if further and backend != "mujoco" else set()
+    assert {answer.question for answer in found.itself} == own
+    assert bool(blocks(page, Heading)) == further
+    said = any("lesson forward --further" in text.text for text in blocks(page, Text))
+    assert said is not further
     assert page.holds
 
 
@@ -509,9 +562,9 @@ def test_real_time_is_the_loops_affair(cli: Cli) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_options_may_stand_before_the_name(here: Cli) -> None:
     for words, engine in (
-        ("--backend pybullet write", "pybullet"),
-        ("write --backend pybullet", "pybullet"),
-        ("--backend pybullet write --backend mujoco", "mujoco"),
+        ("--backend pybullet nowhere", "pybullet"),
+        ("nowhere --backend pybullet", "pybullet"),
+        ("--backend pybullet nowhere --backend mujoco", "mujoco"),
     ):
         assert f"Printed by {engine}:" in here("lesson", *words.split()).stdout
 
@@ -574,7 +627,7 @@ def _at_a_terminal(
 
 
 _ASKED = "Your prediction"
-_LATER = "Go on later with: statemachine lesson --from "
+_LATER = r"Go on later with: [^\n]*statemachine lesson --from "
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
@@ -623,14 +676,14 @@ _LATER = "Go on later with: statemachine lesson --from "
         ),
         (
             *("--from state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}),
-            *(f"{_LATER}state", "3 of 10"),
+            *(f"{_LATER}state", "4 of 10"),
         ),
         (
             "--from time",
             [(_ASKED, "q\n")],
             {},
             f"9 of 10.*{_LATER}time",
-            "10 of 10|Where to go next",
+            "10 of 10",
         ),
         (
             *("--from time --record {tmp_path}/mine.json", [(_ASKED, "q\n")], {}),
@@ -642,7 +695,7 @@ _LATER = "Go on later with: statemachine lesson --from "
                 *((_ASKED, "b\n"), ("Enter for lesson 2", "\n")),
                 *((_ASKED, "\n"), ("Enter for lesson 3", "q\n")),
             ],
-            *({}, f"1 of 10, objects: .*2 of 10, state: .*{_LATER}write", "3 of 10"),
+            *({}, f"1 of 10, nowhere: .*2 of 10, objects: .*{_LATER}state", "3 of 10"),
         ),
     ],
 )
@@ -749,7 +802,6 @@ def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
         return Page("t", "o", [Verdict("v", request.name != "hold")]), {"mujoco": request.name}
 
     monkeypatch.setattr(lesson_command, "_take", take_lesson)
-    monkeypatch.setattr(lesson_command, "_last_page", lambda *_: 0)
     assert main(["lesson"]) == 1
     assert ran == [lesson.name for lesson in PATH]
     ran.clear()
@@ -769,19 +821,13 @@ def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asking, "can_ask", lambda: True)
 
 
-@pytest.mark.usefixtures("short_path", "pinocchio")
-def test_what_follows_the_path_is_shown_a_screenful_at_a_time(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.usefixtures("short_path")
+def test_the_path_waits_before_each_lesson(monkeypatch: pytest.MonkeyPatch) -> None:
     prompts: list[str] = []
     monkeypatch.setattr("builtins.input", lambda prompt: prompts.append(prompt) or "")
     monkeypatch.setattr(shutil, "get_terminal_size", lambda **_: os.terminal_size((80, 24)))
-    assert main(["lesson", "--from", "speed"]) == 0
-    said = capsys.readouterr().out
-    assert said.index("The fingertip, and an independent witness") < said.index("Where to go next")
-    _, first, *others = prompts  # the lesson's own question comes first
-    assert "fingertip" in first
-    assert set(others) == {"Enter for more (q to stop) "}
+    assert main(["lesson", "--from", "time"]) == 0
+    assert [prompt for prompt in prompts if "Enter for lesson 10" in prompt]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
@@ -802,12 +848,11 @@ def test_answers_are_told_where_nobody_is_asked(here: Cli) -> None:
 
 _SMALL = {
     "objects": {"worlds": 2},
-    "forward": {"seconds": 0.005},
+    "forward": {"further": True, "seconds": 0.005},
     "hold": {"seconds": 0.005},
     "gravity": {"seconds": 0.005, "longer": 0.0},
     "replay": {"steps": 1},
-    "time": {"realtime": True, "seconds": 0.005},
-    "speed": {"steps": 1},
+    "time": {"realtime": True, "seconds": 0.005, "steps": 1},
 }
 
 

@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -113,34 +114,39 @@ def is_program(file: Path) -> bool:
     return 'if __name__ == "__main__"' in file.read_text(encoding="utf-8")
 
 
-def imported_by(file: Path, in_functions: bool) -> Iterator[str]:
-    """Yield the full names of what a file imports.
+@cache
+def imported_by(file: Path, in_functions: bool) -> tuple[str, ...]:
+    """Return the full names of what a file imports.
 
     Args:
         file: Of Python.
         in_functions: Whether imports within functions count.
     """
+    names: list[str] = []
     nodes = list(ast.parse(file.read_text(encoding="utf-8")).body)
     while nodes:
         node = nodes.pop()
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             before = ""
             if node.level:
                 package = file.relative_to(ROOT).parts[:-1]
                 before = ".".join(package[: len(package) - node.level + 1])
             module = ".".join(part for part in (before, node.module) if part)
-            yield from (f"{module}.{alias.name}" for alias in node.names)
+            names += [f"{module}.{alias.name}" for alias in node.names]
         elif is_for_type_checking(node):
             continue
         elif in_functions or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             nodes += [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt)]
+    return tuple(names)
 
 
 def is_for_type_checking(node: ast.AST) -> bool:
     """Tell whether a statement is `if TYPE_CHECKING:`."""
-    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    if not isinstance(node, ast.If) or not isinstance(node.test, ast.Name):
+        return False
+    return node.test.id == "TYPE_CHECKING"
 
 
 def file_of_module(name: str) -> Path | None:

@@ -135,6 +135,7 @@ def test_a_warning_of_a_raw_simulation_does_not_come_out_of_our_step() -> None:
         sm.forward(model, data)
 
 
+@pytest.mark.slow
 def test_what_is_kept_of_warnings_is_bounded(mujoco_scene: sm.Model) -> None:
     done = threading.Event()
     with ThreadPoolExecutor(1) as pool, sm.make_data(mujoco_scene) as data:
@@ -146,6 +147,7 @@ def test_what_is_kept_of_warnings_is_bounded(mujoco_scene: sm.Model) -> None:
         assert len(mujoco_alarms._TEXTS) <= 256
 
 
+@pytest.mark.slow
 def test_three_threads_that_diverge_at_once_each_hear_of_their_own(mujoco_box: sm.Model) -> None:
     start = threading.Barrier(3)
 

@@ -71,6 +71,7 @@ def sites_of_list() -> list[Site]:
     return [site for file in files if file.exists() for site in sites(file, ROOT)]
 
 
+@pytest.mark.slow
 def test_every_fault_of_the_list_stands_in_its_file_in_one_place(
     sites_of_list: list[Site],
 ) -> None:
@@ -81,6 +82,7 @@ def test_every_fault_of_the_list_stands_in_its_file_in_one_place(
     assert elsewhere == [], "python -m tools.mutants --renew brings the list up to date"
 
 
+@pytest.mark.slow
 def test_every_fault_of_the_list_makes_another_module(sites_of_list: list[Site]) -> None:
     mutants = {row.mutant for row in run.read()}
     for site in sites_of_list:

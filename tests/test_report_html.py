@@ -468,6 +468,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     assert not replace(located, shares=(row,), found_in=found).verdict.holds
 
 
+@pytest.mark.slow
 def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
     text = page_of(hold, explanation=explanation_of(hold))
     with looking(write_report(tmp_path / "x.html", text), java_script_enabled=False) as tab:

@@ -46,8 +46,10 @@ TYPED = [
     ("engines", ReleasesRequest()),
     ("check step_loop.py --time-limit 2", CheckRequest("step_loop.py", time_limit=2.0)),
     (
-        "lesson write --value 0.3",
-        LessonRequest("write", "so101/scene", options={"joint": None, "value": 0.3}),
+        "lesson hold --seconds 0.3",
+        LessonRequest(
+            "hold", "so101/scene", options={"seconds": 0.3, "target": None, "further": False}
+        ),
     ),
     (
         "sweep hold --vary kp=1,2 --out d --jobs 2",
@@ -91,8 +93,8 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: CheckRequest("a.py", time_limit=0.0), "the time limit must be above 0 s"),
     (lambda: FaultsRequest("a.py", only=("foo",)), "no fault named 'foo'"),
     (lambda: LessonRequest("foo"), "no lesson named 'foo'"),
-    (lambda: LessonRequest("write", options={"foo": 1}), "no option of the lesson write"),
-    (lambda: LessonRequest("write", backends=("pybullet:engine",)), "keep the contract"),
+    (lambda: LessonRequest("hold", options={"foo": 1}), "no option of the lesson hold"),
+    (lambda: LessonRequest("hold", backends=("pybullet:engine",)), "keep the contract"),
     (lambda: RecordRequest("foo"), "no experiment named 'foo'"),
     (lambda: RecordRequest("hold", backend="all"), "trace record takes one --backend"),
     (lambda: Sweep("hold", seeds=0), "--seeds must be at least 1"),

@@ -44,7 +44,7 @@ def derived(part: str, change: Callable[[MujocoData, np.ndarray], np.ndarray]) -
 @around(MujocoData, "_derive")
 def a_read_recomputes(right: Any, self: MujocoData, name: str) -> np.ndarray:
     if name == "site_xpos":
-        mujoco.mj_kinematics(self._home.raw, self.raw)
+        mujoco.mj_kinematics(self._model.raw, self.raw)
     return right(self, name)
 
 
@@ -115,7 +115,7 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     ),
     "reset computes": (
         followed_by(
-            MujocoData, "_reset", lambda data, _: mujoco.mj_forward(data._home.raw, data.raw)
+            MujocoData, "_reset", lambda data, _: mujoco.mj_forward(data._model.raw, data.raw)
         ),
         {"fresh_and_reset_are_zero"},
     ),

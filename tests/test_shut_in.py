@@ -578,6 +578,7 @@ def test_a_link_within_the_folder_is_as_good_as_the_file(tmp_path: Path) -> None
 # Where nothing can be shut in, it is said.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["shut_in", "watched"])
 def test_the_table_says_where_reading_is_only_watched(
     way: str, tmp_path: Path, request: pytest.FixtureRequest

@@ -126,7 +126,7 @@ def test_a_clash_of_import_names_is_said_in_one_line(
         ("compare hold --why", "pybullet", None, "pybullet is not installed"),
         ("conventions --backend pybullet", "pybullet", None, "pybullet is not installed"),
         ("conventions --calls --backend mujoco", "mujoco", None, "mujoco is not installed"),
-        ("view", "viser", None, "pip install 'statemachine-sim[view]'"),
+        ("view", "viser", None, "[view]"),
         *(
             pytest.param(f"compare hold {words}", module, None, extra, marks=pytest.mark.slow)
             for words, module, extra in (

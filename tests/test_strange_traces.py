@@ -225,6 +225,7 @@ def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Mo
     assert not ruler.between
 
 
+@pytest.mark.slow
 def test_models_compare_alike_whatever_strings_hash_to(cli: Cli) -> None:
     words = ("compare", "--models", "so101", "so101", "--json")
     one, two = (cli(*words, PYTHONHASHSEED=seed, code=0).stdout for seed in ("1", "77"))

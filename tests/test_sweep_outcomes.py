@@ -278,6 +278,7 @@ def test_the_first_screen_is_one_of_24_lines(count: int, verdict: str) -> None:
     assert len(shown(page(report, details=True)).splitlines()) > len(lines)
 
 
+@pytest.mark.slow
 def test_the_command_says_first_which_parameter_moves_the_base(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -426,6 +426,7 @@ def test_the_command_prints_the_report_as_page_and_as_json(
     assert main(["sweep", "--report", folder, "--quantity", "tips"]) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     sweep = Sweep(

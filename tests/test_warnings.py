@@ -25,9 +25,9 @@ EXPECTED = '@pytest.mark.filterwarnings("ignore:shapes")'
     ("category", "mark", "part", "code"),
     [
         ("EngineWarning", "", "not slow", 1),
-        ("EngineWarning", EXPECTED, "not slow", 0),
-        ("EngineWarning", "", "", 0),
-        ("DeprecationWarning", "", "not slow", 0),
+        pytest.param("EngineWarning", EXPECTED, "not slow", 0, marks=pytest.mark.slow),
+        pytest.param("EngineWarning", "", "", 0, marks=pytest.mark.slow),
+        pytest.param("DeprecationWarning", "", "not slow", 0, marks=pytest.mark.slow),
     ],
 )
 def test_a_warning_that_nobody_expects(

@@ -13,6 +13,7 @@ from statemachine.lab.compare.typed_command import TypedCommand, typed_command
 from statemachine.lab.questions.requests.causes import ExplainRequest, answer
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import Explanation, Share
+from statemachine.lab.why.apart_page import ApartSentence
 from statemachine.lab.why.changes_page import WhyChanges
 from statemachine.lab.why.page import WhyPage, page
 from statemachine.lab.why.rewriting import RewrittenFile
@@ -87,10 +88,12 @@ def test_the_page_begins_with_the_verdict_and_ends_with_what_to_type(gains: Expl
     result = replace(gains, command=COMMAND)
     first = page(result)
     assert first.origin == ""
-    assert "kp" in first.title
-    assert "right.xml, line 31" in first.title
-    (verdict,) = blocks(first, Verdict)
-    assert verdict.holds is gains.verdict.holds is True
+    assert first.headline is not None
+    assert "kp" in first.headline.lead
+    assert "right.xml, line 31" in first.headline.lead
+    assert first.headline.holds is gains.verdict.holds is True
+    assert not blocks(first, Verdict)
+    assert shown(first)[0] == "✓"
     assert isinstance(first.blocks[-1], Code)
     assert first.blocks[-1].lines[0].startswith("statemachine compare waves left.xml")
 
@@ -98,7 +101,7 @@ def test_the_page_begins_with_the_verdict_and_ends_with_what_to_type(gains: Expl
 def test_details_have_every_cause_and_the_first_screen_too(many: Explanation) -> None:
     whole = page(many, details=True)
     text = shown(whole)
-    assert page(many).title == whole.title
+    assert page(many).headline == whole.headline
     rows = [row for table in blocks(whole, Table) for row in table.rows]
     rows += [
         row
@@ -138,8 +141,8 @@ def test_what_is_advised_follows_from_the_verdict(
 def test_two_equal_files_are_said_to_be_equal_and_nothing_else(tmp_path: Path) -> None:
     result = explained(tmp_path, ARM, ARM, uncertain=None, jobs=1)
     content = WhyPage(result, 8, ())
-    assert content.nothing_differs
-    assert content.gap is None
+    assert ApartSentence(result).nothing_differs
+    assert ApartSentence(result).gap is None
     assert content.conclusion == "no gap"
     assert not blocks(page(result), Table)
 
@@ -220,7 +223,16 @@ def test_the_command_has_what_was_asked_of_both_sides() -> None:
 
 def test_a_cause_without_a_value_is_told_by_its_name(gains: Explanation) -> None:
     share = Share("extra shape of box", (), None, "geom", share=1.0, alone=1.0, last=1.0)
-    assert page(replace(gains, shares=(share,))).title.startswith("Extra shape of box: 100.0 %")
+    headline = page(replace(gains, shares=(share,))).headline
+    assert headline is not None
+    assert headline.lead.startswith("Extra shape of box: 100.0 %")
+
+
+def test_an_answer_that_is_not_complete_is_marked_as_none(gains: Explanation) -> None:
+    ended = replace(gains, ended_by="time limit", method="alone and last")
+    assert page(gains).holds
+    assert not page(ended).holds
+    assert shown(page(ended))[0] == "✗"
 
 
 def test_what_nobody_can_type_is_a_call_of_python(gains: Explanation) -> None:

@@ -30,12 +30,12 @@ from statemachine.errors import (
 )
 
 from .support.claims import overlapping, refused
+from .support.data_uses import meanwhile
 from .support.lives import equal, live
 from .support.motions import opened, started
 from .support.processes import runs_in_silence
 from .support.requirements import ROOT, SHARED, shared
 from .support.small_models import RICH, loaded, model_of
-from .support.turns import meanwhile
 
 N = 4
 
@@ -432,6 +432,7 @@ def test_a_record_goes_on_past_a_warning_that_ends_nothing(tmp_path: Path) -> No
     assert {str(w.message) for w in ours} == {str(w.message) for w in single}
 
 
+@pytest.mark.slow
 def test_the_engine_prints_nothing_and_writes_no_log(tmp_path: Path) -> None:
     code = """
 import warnings, numpy as np, statemachine as sm

@@ -65,7 +65,11 @@ NAMES = (
 
 @pytest.mark.parametrize(
     ("backend", "name"),
-    [*(("mujoco", name) for name in NAMES), ("mujoco", "all of them"), ("pybullet", "all of them")],
+    [
+        *(pytest.param("mujoco", name, marks=pytest.mark.slow) for name in NAMES),
+        ("mujoco", "all of them"),
+        ("pybullet", "all of them"),
+    ],
 )
 @pytest.mark.filterwarnings("ignore:PyBullet. friction of")
 def test_a_world_is_the_data_of_a_replaced_model(backend: str, name: str) -> None:

@@ -88,7 +88,9 @@ _BACKENDS: dict[str, str] = {
 
 
 def backend_names() -> list[str]:
-    """Names that `load` takes for `backend`, whether or not their engine is installed."""
+    """Return the names that `load` takes for `backend`, whether or not their engine is
+    installed.
+    """
     _discover()
     return list(_BACKENDS)
 
@@ -150,7 +152,7 @@ def parse_backend(word: str) -> BackendChoice:
 
 
 def backend_engine(name: str) -> str | None:
-    """The engine (a key of `installed.ENGINES`) that a backend needs.
+    """Return the engine (a key of `installed.ENGINES`) that a backend needs.
 
     Raises:
         UnknownNameError: There is no such backend.
@@ -333,7 +335,8 @@ def load_for_places(model: AnyPath, backend: str = DEFAULT, **arguments: Any) ->
 
 
 def on_default(model: Model) -> Model:
-    """A model on the engine that compiles MJCF: itself, or what that engine makes of its file.
+    """Return a model on the engine that compiles MJCF: itself, or what that engine makes of its
+    file.
 
     Raises:
         MissingEngineError: That engine is not installed here.

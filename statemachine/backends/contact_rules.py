@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def bodies_meet(raw: MjModel, a: int, b: int) -> bool:
-    """Whether geoms of two bodies may touch.
+    """Tell whether geoms of two bodies may touch.
 
     They may not within one rigid piece, nor as parent and child, nor where they are excluded.
     """
@@ -30,12 +30,12 @@ def bodies_meet(raw: MjModel, a: int, b: int) -> bool:
 
 
 def masks_meet(raw: MjModel, a: int, b: int) -> bool:
-    """Whether the masks of two geoms let them touch."""
+    """Tell whether the masks of two geoms let them touch."""
     return bool((raw.geom_contype[[a, b]] & raw.geom_conaffinity[[b, a]]).any())
 
 
 def mixed(raw: MjModel, a: int, b: int) -> tuple[int, Array, Array, Array]:
-    """The parameters of a contact of two geoms.
+    """Return the parameters of a contact of two geoms.
 
     Returns:
         condim; sliding, spinning and rolling friction (3,); solref (2,); solimp (5,).

@@ -31,7 +31,8 @@ _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></w
 
 
 def commands_kept(m: MjModel, delay: Array, timestep: Array | float) -> Ints:
-    """How many commands each actuator keeps: what its delay needs, and what the file asks for.
+    """Return how many commands each actuator keeps: those of its delay, and those that the file
+    asks for.
 
     Args:
         m: The compiled model; its own delays and timestep are not looked at.
@@ -62,7 +63,8 @@ def commands_kept(m: MjModel, delay: Array, timestep: Array | float) -> Ints:
 
 
 def with_room(m: MjModel, counts: Ints | None = None) -> MjModel:
-    """The same model, with a buffer for the delay of every actuator; itself if it has them.
+    """Return the same model with a buffer for the delay of every actuator, or itself if it has
+    them.
 
     Args:
         m: The compiled model, with its timestep and delays.
@@ -83,7 +85,7 @@ def with_room(m: MjModel, counts: Ints | None = None) -> MjModel:
 
 
 def with_room_of(m: MjModel, before: MjModel, counts: Ints) -> MjModel:
-    """What `with_room` would make of one of many worlds that share larger buffers.
+    """Return what `with_room` would make of one of many worlds that share larger buffers.
 
     Args:
         m: The compiled model of the world, in the buffers that all share.
@@ -97,7 +99,7 @@ def with_room_of(m: MjModel, before: MjModel, counts: Ints) -> MjModel:
 
 
 def places_of(before: MjModel, shared: MjModel, counts: Ints) -> Ints:
-    """Where the buffers of a Data of one world's model are in those that many worlds share.
+    """Return where the buffers of a Data of one world's model lie in those that many worlds share.
 
     Args:
         before: The compiled model before it got room.
@@ -141,7 +143,9 @@ def hold(m: MjModel, history: Array, ctrl: Array, counts: Ints | None = None) ->
 
 
 def _appended(m: MjModel, counts: Ints) -> tuple[Ints, Ints]:
-    """Actuators that need a larger buffer, and where each starts; last, where they all end."""
+    """Return the actuators that need a larger buffer, and where each starts; last, where they
+    all end.
+    """
     short = np.flatnonzero(counts > m.actuator_history[:, 0])
     # Two numbers of the buffer's own, and a time and a command for each that is kept.
     sizes = 2 + counts[short] * (1 + m.actuator_ctrlnum[short])
@@ -149,7 +153,7 @@ def _appended(m: MjModel, counts: Ints) -> tuple[Ints, Ints]:
 
 
 def _of_size(m: MjModel, nhistory: int) -> MjModel:
-    """A copy whose Data have buffers of another size."""
+    """Return a copy whose Data have buffers of another size."""
     blob = saved(m)
     at = _history_offset()
     blob[at : at + 8] = np.frombuffer(struct.pack("<q", nhistory), np.uint8)
@@ -158,7 +162,7 @@ def _of_size(m: MjModel, nhistory: int) -> MjModel:
 
 @cache
 def _history_offset() -> int:
-    """Where the size of the buffers, `nhistory`, stands in a saved model.
+    """Return where the size of the buffers, `nhistory`, stands in a saved model.
 
     It is the first in which two models with other buffers differ; sizes come before arrays.
     """

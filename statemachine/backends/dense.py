@@ -18,7 +18,7 @@ _PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
 
 
 def pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:
-    """F with matrix·F = right where it is between its bounds, and beyond them nowhere.
+    """Return F with matrix·F = right where F is between its bounds; elsewhere F is at a bound.
 
     At its lower bound a row may have matrix·F > right, at its upper one <. Rows change
     between free and bounded until none has to; where that goes round in circles,

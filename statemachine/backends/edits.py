@@ -113,7 +113,7 @@ def _flags(raw: MjModel, options: Mapping[str, Any]) -> Any:
 
 
 def varied(raw: MjModel, options: Mapping[str, Any]) -> tuple[MjModel, dict[str, Any]]:
-    """What worlds share, and the arrays of the compiled model that each has of its own.
+    """Return what worlds share, and the arrays of the compiled model that each has of its own.
 
     Args:
         raw: The compiled model; flags that are the same for all are written into it.
@@ -143,12 +143,15 @@ def varied(raw: MjModel, options: Mapping[str, Any]) -> tuple[MjModel, dict[str,
 
 
 def _rows(array: Array, value: Any) -> Array:
-    """A copy of an array of the compiled model, once for each world that a value speaks of."""
+    """Return a copy of an array of the compiled model, once for each world that a value speaks
+    of.
+    """
     return np.array(np.broadcast_to(array, (*value.shape[:-1], *array.shape[-2:])))
 
 
 def edited(raw: MjModel, options: dict[str, Any], timestep: float) -> MjModel:
-    """A copy with options of `Model.replace`, which has checked them, and room for a latency.
+    """Return a copy with options of `Model.replace`, which has checked them, and room for a
+    latency.
 
     Args:
         raw: Stays as it is.
@@ -194,7 +197,7 @@ def put(raw: MjModel, name: str, value: Any, index: tuple[Any, ...] = ()) -> Non
 
 
 def step_length(timestep: float, substeps: int, options: Mapping[str, Any]) -> float:
-    """What one engine step takes [s] after `replace`.
+    """Return what one engine step takes [s] after `replace`.
 
     Args:
         timestep: Of the Model before [s].

@@ -140,7 +140,9 @@ class Machine:
         self.world.command(self._acting)
 
     def _acts(self, ctrl: Array, given: Array) -> Array:
-        """What acts in a step: a command, late where there is a latency, and the mocap bodies."""
+        """Return the values that act in a step: a command, late where there is a latency, and
+        the mocap bodies.
+        """
         wires = self.wires.copy()
         wires[: len(ctrl)] = self._model._acting("ctrl", acting(ctrl, given, self._delay_steps))
         return wires
@@ -231,11 +233,11 @@ class Machine:
 
     @property
     def _written(self) -> bool:
-        """Whether qpos or qvel is no longer what it was left at."""
+        """Tell whether qpos or qvel was written since the engine left it."""
         return self._last_state[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
 
     def _remembered(self, written: bool) -> Memory:
-        """What the world is to know, at the present, of the step before."""
+        """Return the memory that the world is given of the step before the present."""
         world = self.world
         now = self._memory if self._world_is_elsewhere else world.memory
         if not written:
@@ -247,7 +249,7 @@ class Machine:
         ]
 
     def present(self) -> Moment:
-        """All that decides the next engine step, with the command that acts in it."""
+        """Return all that decides the next engine step, with the command that acts in it."""
         memory = self._remembered(self._written)
         ctrl = self._acts(self.ctrl, self.given)
         return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
@@ -257,7 +259,7 @@ class Machine:
         self.moment, self._world_knows_moment, self.derived = self.present(), False, {}
 
     def derive(self, name: str) -> Any:
-        """An array of `records.DERIVED`, or "contacts"; computed at the first reading."""
+        """Return an array of `records.DERIVED`, or "contacts"; computed at the first reading."""
         if name not in self.derived:
             values = self._compute(name)
             for value in values.values():
@@ -278,7 +280,7 @@ class Machine:
 
 
 def acting(ctrl: Array, given: Array, delay_steps: Ints) -> Array:
-    """The command (nu,) that acts in a step: of each number that of so many steps before.
+    """Return the command (nu,) that acts in a step: each number as it was its delay ago.
 
     Args:
         ctrl: (nu,) of the step.
@@ -310,20 +312,20 @@ class HiddenData(Data):
 
     @property
     def raw(self) -> Any:
-        """The engine's own object; read from it, and write through qpos and qvel."""
-        if self._trouble == "closed":
-            self._refuse_if_troubled()
+        """Return the engine's own object; read from it, and write through qpos and qvel."""
+        if self._unusable == "closed":
+            self._refuse_if_unusable()
         return self._machine.world.raw
 
     @property
     def time(self) -> float:
-        if self._trouble == "closed":
-            self._refuse_if_troubled()
+        if self._unusable == "closed":
+            self._refuse_if_unusable()
         return self._machine.time
 
     def _derive(self, name: str) -> Any:
         if name in self._machine.world.untold:
-            raise unsupported(self._home, "contacts" if name == "contacts" else "forces by part")
+            raise unsupported(self._model, "contacts" if name == "contacts" else "forces by part")
         return self._machine.derive(name)
 
     def _recompute(self) -> None:
@@ -337,13 +339,15 @@ class HiddenData(Data):
         inputs = [self._machine.time], now.qpos, now.qvel, self._machine.wires
         parts = [*inputs, *now.memory, self._machine.given.ravel()]
         blob = np.concatenate(parts).tobytes()
-        model, (fingerprint, layout) = self._home, self._layout
+        model, (fingerprint, layout) = self._model, self._layout
         return State(model.backend, model.engine_version, fingerprint, layout, blob)
 
     def _set_state(self, state: State) -> None:
         for name in INPUTS:
-            check_entries(self._home._acting(name, state[name]), name, self._home._coordinate_name)
-        self._home._check_quaternions(state["qpos"])
+            check_entries(
+                self._model._acting(name, state[name]), name, self._model._coordinate_name
+            )
+        self._model._check_quaternions(state["qpos"])
         memory = [state[name] for name, _ in self._machine.world.memory_layout]
         led = [state[name] for name, _ in self._layout[1] if name in MOCAP]
         wires = np.concatenate([state["ctrl"], *led])
@@ -362,9 +366,9 @@ class HiddenData(Data):
     def _failed(self, error: Exception) -> None:
         world = self._machine.world
         if isinstance(error, DivergedError):
-            self._give_up(f"{error.quantity}[{error.index}] diverged at {error.time:g} s")
+            self._make_unusable(f"{error.quantity}[{error.index}] diverged at {error.time:g} s")
         elif isinstance(error, world.errors):
-            self._give_up(f"{world.engine} gave up: {error}")
+            self._make_unusable(f"{world.engine} gave up: {error}")
             raise EngineError(f"{world.engine} gave up: {error}") from error
 
 

@@ -97,11 +97,11 @@ class HiddenWorld(ABC):
 
     @abstractmethod
     def read(self) -> tuple[Array, Array]:
-        """Where the engine is: qpos (nq,) and qvel (nv,), MuJoCo's conventions."""
+        """Return the state of the engine: qpos (nq,) and qvel (nv,), MuJoCo's conventions."""
 
     @abstractmethod
     def derive(self, name: str, moment: Moment, read: Read) -> Mapping[str, Any]:
-        """What the last step, or `look`, shows of the moment that it started from.
+        """Return the derived values of the moment that the last step, or `look`, started from.
 
         Args:
             name: Of `records.DERIVED`, or "contacts".
@@ -127,14 +127,14 @@ class HiddenWorld(ABC):
         self.step()
 
     def kinematics(self, moment: Moment, name: str) -> Mapping[str, Array]:
-        """`name` of `records.POSES` at a moment, where that needs no step.
+        """Return `name` of `records.POSES` at a moment, where that needs no step.
 
         And what comes with it. Empty by default: `derive` gives it.
         """
         return {}
 
     def diverging(self, fastest: float) -> bool:
-        """A quick look between the engine steps of a call: is a coordinate NaN or beyond its bound?
+        """Tell whether a coordinate is NaN or beyond its bound: a quick look between engine steps.
 
         If so, all are read, and the first that is raises DivergedError. All are looked at at
         the end of a call, so that this may look at some.
@@ -156,19 +156,21 @@ class HiddenWorld(ABC):
         return steps
 
     def renewed(self) -> HiddenWorld:
-        """The world in which the state is overwritten: another, where `place` leaves traces.
+        """Return the world in which the state is overwritten: another, where `place` leaves traces.
 
         Then this one is closed.
         """
         return self
 
     def memory_at(self, key: int | None) -> Memory:
-        """The memory that the default state has (None), or a keyframe: zeros by default."""
+        """Return the memory that the default state has (None), or a keyframe: zeros by default."""
         return tuple(np.zeros(length) for _, length in self.memory_layout)
 
     @property
     def memory(self) -> Memory:
-        """What the engine remembers of its last step, beside qpos, qvel and ctrl: new arrays."""
+        """Return what the engine remembers of its last step, beside qpos, qvel and ctrl: new
+        arrays.
+        """
         return ()
 
 
@@ -196,7 +198,7 @@ class LookAhead:
         return LookAhead, (self._open,)
 
     def at(self, moment: Moment) -> dict[str, Any]:
-        """Contacts, forces and poses of a moment, all that the engine tells."""
+        """Return the Contacts, forces and poses of a moment, all that the engine offers."""
         with HiddenWorld.lock:
             self.world = world = self._open() if self.world is None else self.world.renewed()
             world.look(moment)
@@ -204,7 +206,9 @@ class LookAhead:
 
 
 def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
-    """Contacts, forces and poses of a moment that a world's last step started from, or `look`."""
+    """Return the Contacts, forces and poses of a moment that a world's last step, or `look`,
+    started from.
+    """
     values = dict[str, Any]()
 
     def read(name: str) -> Any:
@@ -222,7 +226,7 @@ def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
 
 
 def bounded(qpos: Array, qvel: Array, fastest: float) -> bool:
-    """Whether no position is beyond `HUGE`, no velocity beyond `fastest`, and none is NaN.
+    """Tell whether no position is beyond `HUGE`, no velocity beyond `fastest`, and none is NaN.
 
     By a cheap sufficient condition.
     """

@@ -65,7 +65,7 @@ _NOTES = {
 
 
 def capabilities(raw: mujoco.MjModel) -> Capabilities:
-    """The record of one compiled model: two of its own settings show in it."""
+    """Return the record of one compiled model: two of its own settings show in it."""
     behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
     if raw.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
         behaviours["stale after a step"] = Behaviour(
@@ -167,7 +167,7 @@ class MujocoModel(Model):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
         check_numbers(compiled, str(self.path))
-        return MujocoModel(compiled, self.path, self.substeps)._started_as(self, {})
+        return MujocoModel(compiled, self.path, self.substeps)._inherit_start(self, {})
 
     def _make_data(self) -> MujocoData:
         try:
@@ -189,7 +189,7 @@ class MujocoModel(Model):
         return MujocoWorlds(self, base, (n, workers), derived, (arrays, follow), layout)
 
     def _varied(self, options: dict[str, Any]) -> tuple[MujocoModel, dict[str, Any]]:
-        """What worlds share, and the arrays of the compiled model that each has of its own.
+        """Return what worlds share, and the arrays of the compiled model that each has of its own.
 
         Args:
             options: Checked options of `replace`, each with a value for each world.
@@ -214,7 +214,7 @@ class MujocoModel(Model):
         # As `_replace` has it, so that a timestep is the same to the last bit.
         raw.opt.timestep = step_length(self.timestep, count, {})
         raw, arrays = varied(raw, given)
-        return MujocoModel(raw, self.path, count)._started_as(self, options), arrays
+        return MujocoModel(raw, self.path, count)._inherit_start(self, options), arrays
 
     def _check_friction(self, options: Mapping[str, Any]) -> None:
         """Raise UnsupportedError where the friction of geoms would be without effect."""
@@ -268,7 +268,7 @@ class MujocoData(Data):
     @property
     def raw(self) -> mujoco.MjData:
         if self._raw is None:
-            self._refuse_if_troubled()
+            self._refuse_if_unusable()
         return cast("mujoco.MjData", self._raw)
 
     @property
@@ -277,40 +277,40 @@ class MujocoData(Data):
 
     def _derive(self, name: str) -> Any:
         if name == "contacts":
-            return Contacts(**contact_arrays(self._home.raw, self.raw))
+            return Contacts(**contact_arrays(self._model.raw, self.raw))
         array = self._views.get(name)
         if array is None:
-            array = constraint_part(self._home.raw, self.raw, name)
+            array = constraint_part(self._model.raw, self.raw, name)
             array.setflags(write=False)
         return array
 
     def _recompute(self) -> None:
-        mujoco.mj_forward(self._home.raw, self.raw)
-        self._attend()
+        mujoco.mj_forward(self._model.raw, self.raw)
+        self._raise_pending_warnings()
 
     def _reset(self, key: int | None) -> None:
         if key is None:
-            mujoco.mj_resetData(self._home.raw, self.raw)
+            mujoco.mj_resetData(self._model.raw, self.raw)
         else:
-            mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
-            if self._home._holds_start:
+            mujoco.mj_resetDataKeyframe(self._model.raw, self.raw, key)
+            if self._model._holds_start:
                 from .delays import hold
 
-                hold(self._home.raw, self.raw.history, self.raw.ctrl)
+                hold(self._model.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()
 
     def _get_state(self) -> State:
         fingerprint, layout = self._layout
         vector = np.empty(sum(size for _, size in layout))
-        mujoco.mj_getState(self._home.raw, self.raw, vector, _INTEGRATION)
-        check_vector(vector, layout, self._home)
+        mujoco.mj_getState(self._model.raw, self.raw, vector, _INTEGRATION)
+        check_vector(vector, layout, self._model)
         return State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
 
     def _set_state(self, state: State) -> None:
         # A reset first: it clears the counters, without which a second divergence
         # would go unreported, and whatever else the last run left behind.
-        mujoco.mj_resetData(self._home.raw, self.raw)
-        mujoco.mj_setState(self._home.raw, self.raw, state.vector, _INTEGRATION)
+        mujoco.mj_resetData(self._model.raw, self.raw)
+        mujoco.mj_setState(self._model.raw, self.raw, state.vector, _INTEGRATION)
         self._alarms.clear()
 
     def _set_time(self, time: float) -> None:
@@ -320,25 +320,25 @@ class MujocoData(Data):
         self._alarms = None
         self._views.clear()
 
-    def _attend(self) -> None:
-        if self._warned != self._told:
+    def _raise_pending_warnings(self) -> None:
+        if self._pending_warnings != self._seen_warnings:
             self._alarms.attend()
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
             fatal = gave_up(error)
-            self._give_up(str(fatal))
+            self._make_unusable(str(fatal))
             raise fatal from error
         if isinstance(error, AlarmError):
-            entry = error.entry(self._home)
+            entry = error.entry(self._model)
             command = error.quantity == "ctrl"
             diverged = f"{entry} was not finite at time {error.time:g} s"
-            self._give_up(f"it was stepped with a bad {entry}" if command else diverged)
-            raise ended(self._home, error, "This Data") from None
+            self._make_unusable(f"it was stepped with a bad {entry}" if command else diverged)
+            raise ended(self._model, error, "This Data") from None
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
-    """The engine's step, of (mjModel, mjData, nstep=1); Python runs only where it must."""
+    """Return the engine's step, of (mjModel, mjData, nstep=1); Python runs only where it must."""
     mj_step, substeps = mujoco.mj_step, model.substeps
 
     def finer(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
@@ -370,7 +370,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
 
 
 def _layout(model: MujocoModel, nhistory: int) -> StateLayout:
-    """Fingerprint and layout of States of a model.
+    """Return the fingerprint and layout of the States of a model.
 
     Args:
         model: The Model.

@@ -99,7 +99,9 @@ _NO_OPTION = dict.fromkeys(
 
 
 def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = "") -> Capabilities:
-    """The record of a Model; before there is one, without its bound and its geoms' softness."""
+    """Return the record of a Model; before there is one, without its bound and its geoms'
+    softness.
+    """
     behaviours = {name: Behaviour("emulated", note) for name, note in _EMULATED.items()}
     behaviours |= {name: Behaviour("native", note) for name, note in _NATIVE.items()}
     if soft:
@@ -128,7 +130,7 @@ def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = 
 
 
 def _bound(max_qvel: Array | None) -> str:
-    """The bound of a Model in words, as "2e+05" or "2e+05 to 1e+10"."""
+    """Return the bound of a Model in words, as "2e+05" or "2e+05 to 1e+10"."""
     if max_qvel is None or not len(max_qvel):
         return "its bound"
     low, high = max_qvel.min(), max_qvel.max()
@@ -183,7 +185,7 @@ def load(
     else:
         for difference in (*as_targets(plan), *otherwise(plan)):
             warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
-    return model._started_as(model, checked)
+    return model._inherit_start(model, checked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +228,7 @@ class FileFacts:
 
 
 def base_stands(model: PybulletModel) -> bool:
-    """Whether PyBullet as it comes does not move a base that has a free joint in the model."""
+    """Tell whether PyBullet as it comes does not move a base that has a free joint in the model."""
     if model.plan.file is None or not model.plan.file.floats:
         return False
     with closing(World(model.plan, "engine")) as world:
@@ -314,7 +316,7 @@ class PybulletModel(HiddenModel):
         plan = Plan(compiled, weighed=self.plan.weighed)
         if self.plan.file:
             plan = Plan(weighed_as_it_comes(self.plan, compiled), weighed=True)
-        return self._of(plan, self.substeps, self._asked)._started_as(self, {})
+        return self._of(plan, self.substeps, self._asked)._inherit_start(self, {})
 
     @property
     def shared_worlds(self) -> dict[str, World]:

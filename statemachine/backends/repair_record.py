@@ -50,19 +50,19 @@ class Repair:
 
     @property
     def is_deleted(self) -> bool:
-        """Whether the element is not in the compiled model."""
+        """Tell whether the element is not in the compiled model."""
         return self.used is None
 
     @property
     def is_massless(self) -> bool:
-        """Whether it gave a body a mass or an inertia that the file does not give it."""
+        """Tell whether it gave a body a mass or an inertia that the file does not give it."""
         if self.kind != "body":
             return False
         return self.quantity == "mass" or not (_numbers(self.stated) != 0).any()
 
     @property
     def factor(self) -> float:
-        """How many times larger or smaller the used number is than the stated one, at least 1.
+        """Return by which factor, at least 1, the used number differs from the stated one.
 
         Of three moments that of the one that changed most; infinite where a number was zero or
         negative; NaN where no numbers are compared.

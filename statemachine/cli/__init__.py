@@ -28,12 +28,13 @@ from .common import (
     PROGRAM,
     complain,
 )
+from .overview import overview
 
 _MORE = f"""\
 more commands:
 {{commands}}
 
-`{PROGRAM}` alone lists the lessons.
+`{PROGRAM} lesson --help` lists the lessons.
 `{PROGRAM} COMMAND --help` shows the options of a command."""
 _SAID: set[str] = set()
 
@@ -68,14 +69,7 @@ class _Parser(argparse.ArgumentParser):
         if rest:
             given, _, choices = rest.partition(" (choose from ")
             known = [choice.strip() for choice in choices.rstrip(")").split(",")]
-            hint = did_you_mean(given, known) or f"; known: {', '.join(known)}"
-            from ..course.lessons import LESSONS
-
-            if given in LESSONS:
-                hint = f". Did you mean {PROGRAM} lesson {given}?"
-            elif given in COMMANDS:
-                hint = f". Did you mean {PROGRAM} {given}?"
-            message = f"{wrong}no {given!r}{hint}"
+            message = f"{wrong}no {given!r}{self._hint(given, known)}"
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
             named = {name: each for each in self._actions for name in each.option_strings}
@@ -100,6 +94,18 @@ class _Parser(argparse.ArgumentParser):
             message += "; a model is --model FILE" if option else "; this takes no more words"
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
+
+    def _hint(self, given: str, known: list[str]) -> str:
+        """Return what is typed instead of a word that is no choice."""
+        from ..course.lessons import LESSONS, moved
+
+        if given in LESSONS:
+            return f". Did you mean {PROGRAM} lesson {given}?"
+        if moved(given) and "lesson" in self.prog:
+            return f" any more; {moved(given)}"
+        if given in COMMANDS:
+            return f". Did you mean {PROGRAM} {given}?"
+        return did_you_mean(given, known) or f"; known: {', '.join(known)}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -177,12 +183,10 @@ def _report_fault(error: Exception) -> int:
 
 def _options(words: list[str]) -> argparse.Namespace:
     """Parse the words of a command line."""
-    named = next((word for word in words if word in COMMANDS), "lesson")
+    named = next((word for word in words if word in COMMANDS), "")
     parser = _parser([named])
-    if named == "lesson":
-        from . import lesson
-
-        parser.set_defaults(run=lesson.overview)
+    if not named:
+        parser.set_defaults(run=overview)
     options = parser.parse_args(words)
     if getattr(options, "trust_binary", False):
         from ..backends.binary import TRUST

@@ -12,7 +12,7 @@ from __future__ import annotations
 COMMANDS = {
     "lesson": "the guided path, or one lesson alone",
     "check": "judge an exercise by what it does",
-    "compare": "where two engines part, by how much, and why",
+    "compare": "where two engines differ, by how much, and why",
     "doctor": "what this machine has, and what to do",
     "view": "a running simulation in the browser, with sliders",
     "trace": "record a run, play it on another engine, look into it, draw it",

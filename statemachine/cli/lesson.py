@@ -5,27 +5,25 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import dropwhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..course.lessons import BESIDE, LESSONS, PATH, Lesson
-from ..errors import BadInputError, MissingEngineError
+from ..course.lessons import LESSONS, PATH, Lesson
+from ..errors import BadInputError
 from ..installed import DEFAULT
+from ..program import as_called, command_as_called
 from ..show.blocks import Heading, Page
 from ..typed_numbers import typed_float, typed_int
 from .common import (
     CONTRACT_BACKENDS,
-    MISSING,
     PROGRAM,
     SAYS_NO,
     TerminalReporter,
     add_backend,
     add_json,
     add_menagerie,
-    complain,
     number_list,
     show,
 )
@@ -33,7 +31,6 @@ from .common import (
 if TYPE_CHECKING:
     from ..course.lessons.request import LessonRequest
     from ..course.quiz import Reader
-    from ..lab.validate.fingertip_request import FingertipRequest
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -118,28 +115,6 @@ def _add_option(
     parser.add_argument(flag, metavar=metavar, type=_TYPES.get(metavar, str), help=says, **further)
 
 
-_OVERVIEW = f"""\
-A physics simulator is a state machine that you advance.
-
-  {PROGRAM} lesson           the guided path: ten lessons, about 35 minutes
-
-Each of the ten alone, as in `{PROGRAM} lesson state`:
-{{lessons}}
-then your turn:
-  {PROGRAM} check exercises/step_loop.py   four functions to write, judged
-  {PROGRAM} compare hold --why             where two engines differ, and why
-  {PROGRAM} doctor                         what this machine has, what to do
-All commands: {PROGRAM} --help"""
-
-
-def overview(_options: argparse.Namespace) -> int:
-    """List what there is."""
-    lessons = [f"  {lesson.name:<11}{lesson.question}" for lesson in (*PATH, *BESIDE)]
-    lessons.insert(len(PATH), "and beside the path:")
-    print(_OVERVIEW.format(lessons="\n".join(lessons)))
-    return 0
-
-
 def request_of(options: argparse.Namespace) -> LessonRequest:
     """Return which lesson is to be taken; JSON has all its parts.
 
@@ -212,23 +187,11 @@ def run(options: argparse.Namespace) -> int:
     later = names[names.index(request.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"
     try:
-        return show(page, results, options.json, f"Next: {following}", reader)
+        return show(page, results, options.json, f"Next: {command_as_called(following)}", reader)
     except Stopped:
         return 0
     finally:
         _show_summary(reader)
-
-
-_NEXT = f"""\
-Where to go next:
-  {PROGRAM} lesson questions              six questions: check yourself
-  {PROGRAM} lesson worlds                 many worlds of one Model
-  python exercises/step_loop.py              four functions for you to write
-  {PROGRAM} check exercises/step_loop.py  what they do, judged
-  {PROGRAM} lesson gravity --backend all  on all engines, side by side
-  {PROGRAM} compare hold --why            where two engines differ, and why
-  {PROGRAM} --help                        every command
-"""
 
 
 def run_path(options: argparse.Namespace) -> int:
@@ -259,7 +222,7 @@ def _print_path(requests: Sequence[LessonRequest]) -> int:
 def _show_path(
     options: argparse.Namespace, requests: Sequence[LessonRequest], reader: Reader | None
 ) -> int:
-    """Show lessons, and the last page; where the reader stops, say how to go on."""
+    """Show lessons; where the reader stops, say how to go on."""
     from ..course.asking import Stopped
     from ..show import terminal
 
@@ -276,9 +239,6 @@ def _show_path(
                 code = SAYS_NO
             title = f"{number} of {len(PATH)}, {page.title}"
             terminal.show(replace(page, title=title), "", reader)
-        if code == 0:
-            with suppress(Stopped):
-                code = _last_page(options, reader)
     except (Stopped, KeyboardInterrupt) as stop:
         if reader is not None:
             print(f"\nGo on later with: {_typed_from(options, lesson)}")
@@ -294,38 +254,7 @@ def _typed_from(options: argparse.Namespace, lesson: Lesson) -> str:
     words = [PROGRAM, "lesson", "--from", lesson.name]
     for backend in options.backend or ():
         words += ["--backend", backend]
-    return command(words, ("--record", options.record, None))
-
-
-def last_page_request_of(options: argparse.Namespace) -> FingertipRequest:
-    """Return what is asked on the last page: the fingertip of all engines."""
-    from ..lab.validate.fingertip_request import FingertipRequest
-
-    return FingertipRequest(backends=("all",), menagerie=options.menagerie)
-
-
-def _last_page(options: argparse.Namespace, reader: Reader | None) -> int:
-    """Show the fingertip of all engines against the witness, and where to go next."""
-    from ..lab.validate.certificate import page
-    from ..lab.validate.fingertip_request import answer
-    from ..show import terminal
-
-    code = 0
-    if reader is not None:
-        reader.go_on("the last page: the fingertip, checked by another library")
-    try:
-        certificate = page(answer(last_page_request_of(options), TerminalReporter()))
-        code = 0 if certificate.holds else SAYS_NO
-        title = f"The last page: {certificate.title}"
-        terminal.show(replace(certificate, title=title), "", reader)
-    except MissingEngineError as error:  # nobody can compute it here
-        complain(error, MISSING)
-    if reader is None:
-        sys.stdout.write(_NEXT)
-    else:
-        reader.read(_NEXT)
-        reader.show()
-    return code
+    return as_called(command(words, ("--record", options.record, None)))
 
 
 def _take(request: LessonRequest) -> tuple[Page, dict[str, object]]:

@@ -68,7 +68,7 @@ def run(backend: str) -> list[Outcome]:
 
 
 def _declared(lab: Lab, error: UnsupportedError) -> bool:
-    """Whether the capability record says that this cannot be done."""
+    """Tell whether the capability record says that this cannot be done."""
     try:
         return lab.lacks(error.feature)
     except Exception:  # no Model, no record

@@ -56,7 +56,7 @@ class Lab(ExitStack):
     box = _model("so101/scene_box")
 
     def data(self, model: Model, keyframe: int | None = None) -> Data:
-        """A new Data, closed when the lab is."""
+        """Return a new Data, closed when the lab is."""
         data = self.enter_context(make_data(model))
         if keyframe is not None:
             reset(model, data, keyframe=keyframe)
@@ -64,20 +64,20 @@ class Lab(ExitStack):
 
     @cached_property
     def box_at(self) -> tuple[int, int, int]:
-        """Where the free box starts in qpos and qvel, and its body."""
+        """Return the addresses of the free box in qpos and qvel, and its body."""
         joint = self.box.joint_id("box")
         place, dof = self.box.jnt_qposadr[joint], self.box.jnt_dofadr[joint]
         return int(place), int(dof), self.box.body_id("box")
 
     def after(self, model: Model, nstep: int) -> Data:
-        """A new Data after so many steps and a forward."""
+        """Return a new Data after so many steps and a forward."""
         data = self.data(model)
         step(model, data, nstep)
         forward(model, data)
         return data
 
     def lacks(self, feature: str) -> bool:
-        """Whether the capability record says that a behaviour or option is not supported."""
+        """Tell whether the capability record says that a behaviour or option is not supported."""
         record = self.arm.capabilities
         behaviour = record.behaviours.get(feature)
         if behaviour is not None:
@@ -85,7 +85,7 @@ class Lab(ExitStack):
         return feature in OPTIONS and feature not in record.options
 
     def held(self) -> Data:
-        """A Data in which the jaws hold the box and squeeze it: mid-contact."""
+        """Return a Data in which the jaws hold the box and squeeze it: mid-contact."""
         data = self.data(self.box, keyframe=0)
         data.ctrl[0] += 0.2
         step(self.box, data, 25)
@@ -94,7 +94,7 @@ class Lab(ExitStack):
         return data
 
     def moving(self, push: float = 0.3, nstep: int = 25) -> Data:
-        """A new Data in which the jaws hold the box while the arm turns: mid-contact.
+        """Return a new Data in which the jaws hold the box while the arm turns: mid-contact.
 
         Nothing but reset, a command and steps led there.
 
@@ -157,7 +157,7 @@ def require(condition: bool, message: str) -> None:
 
 
 def require_equal(got: Any, expected: Any, what: str) -> None:
-    """Bit-for-bit equality of arrays, shapes included."""
+    """Require bit-for-bit equality of arrays, shapes included."""
     got, expected = np.asarray(got), np.asarray(expected)
     require(got.shape == expected.shape, f"{what}: shape {got.shape}, expected {expected.shape}")
     if got.dtype.kind == "f":
@@ -168,7 +168,7 @@ def require_equal(got: Any, expected: Any, what: str) -> None:
 
 
 def require_close(got: Any, expected: Any, within: float, what: str) -> None:
-    """Every entry within an absolute bound, shapes equal."""
+    """Require that every entry is within an absolute bound, and the shapes are equal."""
     got, expected = np.asarray(got, dtype=np.float64), np.asarray(expected, dtype=np.float64)
     require(got.shape == expected.shape, f"{what}: shape {got.shape}, expected {expected.shape}")
     gap = np.abs(got - expected).max(initial=0.0)
@@ -180,7 +180,7 @@ def require_raises(
     *calls: Callable[[], Any],
     unchanged: Data | None = None,
 ) -> Exception:
-    """Each call raises one of these errors, whose message is not empty; the last of them.
+    """Require that each call raises one of these errors, with a message; return the last of them.
 
     And the inputs and the time of `unchanged` are afterwards what they were, bit by bit.
     """
@@ -201,7 +201,7 @@ def require_raises(
 
 
 def snapshot(data: Data) -> Arrays:
-    """Copies of everything derived that this backend yields, contacts included."""
+    """Return copies of everything derived that this backend offers, contacts included."""
     values: Arrays = {}
     for name, held in readings(data).items():
         if isinstance(held, Contacts):
@@ -212,14 +212,15 @@ def snapshot(data: Data) -> Arrays:
 
 
 def same(before: Arrays, after: Arrays, what: str) -> None:
-    """Two snapshots hold the same bits."""
+    """Require that two snapshots hold the same bits."""
     require(before.keys() == after.keys(), f"{what}: {sorted(before)} against {sorted(after)}")
     for name, array in before.items():
         require_equal(after[name], array, f"{what}: {name}")
 
 
 def force_on(model: Model, data: Data, body: int) -> tuple[Array, Ints, Array]:
-    """What touches a body: the sum of the forces on it (3,) [N], which contacts, their normals.
+    """Return the sum of the forces on a body (3,) [N], the numbers of its contacts, and their
+    normals.
 
     The normals (n, 3) point towards the body.
     """
@@ -233,7 +234,7 @@ def force_on(model: Model, data: Data, body: int) -> tuple[Array, Ints, Array]:
 
 
 def inputs_of(model: Model, data: Data) -> Array:
-    """time, qpos, qvel and ctrl in one array."""
+    """Return time, qpos, qvel and ctrl in one array."""
     state = get_state(model, data)
     return np.concatenate([[state.time], state["qpos"], state["qvel"], state["ctrl"]])
 

@@ -25,7 +25,7 @@ from ._lab import (
 
 @check(on="box")
 def check_fresh_and_reset_are_zero(lab: Lab, model: Model, data: Data) -> None:
-    """On a fresh Data, and after a reset of either kind, everything derived is zero."""
+    """Check that on a fresh Data, and after a reset of either kind, everything derived is zero."""
     for situation in ("fresh", "reset", "keyframe"):
         if situation != "fresh":
             data.ctrl[0] = 0.3
@@ -39,7 +39,7 @@ def check_fresh_and_reset_are_zero(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="box", keyframe=0)
 def check_shapes(lab: Lab, model: Model, data: Data) -> None:
-    """Derived arrays have the documented shapes, before and after a forward."""
+    """Check that derived arrays have the documented shapes, before and after a forward."""
     for _ in range(3):
         n = len(data.contacts)
         shapes = {
@@ -63,7 +63,7 @@ def check_shapes(lab: Lab, model: Model, data: Data) -> None:
 
 @check("position servo", on="held")
 def check_a_write_marks_nothing_dirty(lab: Lab, model: Model, data: Data) -> None:
-    """After a write to any input, everything derived still says what it said."""
+    """Check that after a write to any input, everything derived still says what it said."""
     before = snapshot(data)
     data.qpos[0] += 0.3
     data.qpos[6:9] += 0.1
@@ -79,7 +79,7 @@ def check_a_write_marks_nothing_dirty(lab: Lab, model: Model, data: Data) -> Non
 
 @check("position servo", on="held")
 def check_a_step_leaves_values_of_the_state_before(lab: Lab, model: Model, data: Data) -> None:
-    """After a step, poses and contacts are those of the state that it started from."""
+    """Check that after a step, poses and contacts are those of the state that it started from."""
     data.ctrl[0] += 0.5
     for nstep in (1, 1, 7):
         if nstep > 1:
@@ -114,7 +114,9 @@ def check_forward_changes_no_input(lab: Lab, model: Model, data: Data) -> None:
 
 
 def check_forward_perturbs_nothing(lab: Lab) -> None:
-    """A run with forwards in between is, bit for bit, the run without, mid-contact too."""
+    """Check that a run with forwards in between is, bit for bit, the run without, mid-contact
+    too.
+    """
 
     def forward_and_read(data: Data) -> None:
         forward(data.model, data)
@@ -133,7 +135,9 @@ def check_forward_perturbs_nothing(lab: Lab) -> None:
 
 @check("position servo", on="held")
 def check_forward_depends_on_the_state_alone(lab: Lab, model: Model, data: Data) -> None:
-    """Another Data, set to the same State, derives the same bits; `freshness` relies on it."""
+    """Check that another Data, set to the same State, derives the same bits; `freshness` relies
+    on it.
+    """
     data.ctrl[0] += 0.2
     step(model, data, 3)
     other = lab.data(model)
@@ -145,7 +149,7 @@ def check_forward_depends_on_the_state_alone(lab: Lab, model: Model, data: Data)
 
 @check(on="box", keyframe=0)
 def check_two_data_are_independent(lab: Lab, model: Model, idle: Data) -> None:
-    """Data of one Model share nothing that a step or a write can reach."""
+    """Check that Data of one Model share nothing that a step or a write can reach."""
     busy = lab.data(model, keyframe=0)
     forward(model, idle)
     before, derived = inputs_of(model, idle), snapshot(idle)
@@ -156,7 +160,7 @@ def check_two_data_are_independent(lab: Lab, model: Model, idle: Data) -> None:
 
 @check(on="box")
 def check_xquat_is_wxyz(lab: Lab, model: Model, data: Data) -> None:
-    """A free body's xquat is the quaternion of its qpos; its xpos the position."""
+    """Check that a free body's xquat is the quaternion of its qpos; its xpos the position."""
     quat = np.array([0.5, -0.1, 0.7, 0.5])
     quat /= np.linalg.norm(quat)
     start, _, body = lab.box_at
@@ -169,7 +173,7 @@ def check_xquat_is_wxyz(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="arm")
 def check_site_and_body_agree(lab: Lab, model: Model, data: Data) -> None:
-    """A site is where its definition puts it in the frame of its body."""
+    """Check that a site is where its definition puts it in the frame of its body."""
     data.qpos[:] = TARGET
     forward(model, data)
     for site in range(model.nsite):
@@ -183,7 +187,7 @@ def check_site_and_body_agree(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="arm")
 def check_the_witness_agrees(lab: Lab, model: Model, data: Data) -> None:
-    """Every body's pose is the one that Pinocchio computes from the file of the arm."""
+    """Check that every body's pose is the one that Pinocchio computes from the file of the arm."""
     witness = Kinematics("so101", joint_names=model.joint_names)
     random = np.random.default_rng(7)
     low, high = model.jnt_range.T
@@ -198,7 +202,7 @@ def check_the_witness_agrees(lab: Lab, model: Model, data: Data) -> None:
 
 
 def check_addresses_cover_qpos_and_qvel(lab: Lab) -> None:
-    """Joints own every slot of qpos and qvel once, in order."""
+    """Check that joints own every slot of qpos and qvel once, in order."""
     model = lab.box
     place = dof = 0
     for joint, name in enumerate(model.joint_names):

@@ -25,7 +25,9 @@ from ._lab import Lab, check, require, require_equal, require_raises
 
 @check(on="box")
 def check_inputs_are_the_same_arrays_for_life(lab: Lab, model: Model, data: Data) -> None:
-    """No verb replaces an input array; all are float64, writable, of the right length."""
+    """Check that no verb replaces an input array; all are float64, writable, of the right
+    length.
+    """
     arrays = {name: getattr(data, name) for name in INPUTS}
     for name, size in zip(INPUTS, (model.nq, model.nv, model.nu), strict=True):
         require(arrays[name].shape == (size,), f"{name} has shape {arrays[name].shape}")
@@ -44,7 +46,7 @@ def check_inputs_are_the_same_arrays_for_life(lab: Lab, model: Model, data: Data
 
 @check(on="arm")
 def check_assignment_copies_in(lab: Lab, model: Model, data: Data) -> None:
-    """`data.ctrl = x` copies the numbers; x stays the caller's."""
+    """Check that `data.ctrl = x` copies the numbers; x stays the caller's."""
     mine = np.arange(6.0) / 10
     data.ctrl = mine
     mine[:] = 9.0
@@ -58,7 +60,9 @@ def _repeated(value: object, count: int) -> list[object]:
 
 @check(on="box", keyframe=0)
 def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> None:
-    """Wrong shape, length, kind, NaN, infinity or a zero quaternion: refused, unchanged."""
+    """Check that a bad assignment is refused and changes nothing: shape, length, kind, NaN,
+    infinity, zero quaternion.
+    """
     bad: list[tuple[str, Any]] = [
         ("ctrl", _repeated(0.0, 5)),
         ("ctrl", [_repeated(0.0, 6)]),
@@ -82,7 +86,7 @@ def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> 
 
 @check(on="arm")
 def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
-    """Derived arrays can neither be written into nor assigned to."""
+    """Check that derived arrays can neither be written into nor assigned to."""
     forward(model, data)
     held: dict[str, Any] = readings(data)
     parts = vars(held.pop("contacts"))
@@ -95,7 +99,9 @@ def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="scene")
 def check_inputs_made_read_only_are_found(lab: Lab, model: Model, data: Data) -> None:
-    """An input that was made read-only is named before anything is reset, restored or copied."""
+    """Check that an input that was made read-only is named before anything is reset, restored or
+    copied.
+    """
     state = get_state(model, data)
     for name in INPUTS:
         getattr(data, name).setflags(write=False)
@@ -112,7 +118,7 @@ def check_inputs_made_read_only_are_found(lab: Lab, model: Model, data: Data) ->
 
 @check(on="arm")
 def check_nstep_is_a_positive_whole_number(lab: Lab, model: Model, data: Data) -> None:
-    """0, -1, 1.5, True, None and text are refused, and no time passes."""
+    """Check that step refuses 0, -1, 1.5, True, None and text, and that no time passes."""
     bad: tuple[Any, ...] = (0, -1, 1.5, 1.0, True, None, "2", 2**40, np.float64(3))
     calls = [partial(step, model, data, nstep) for nstep in bad]
     require_raises(BadInputError, *calls, unchanged=data)
@@ -122,7 +128,9 @@ def check_nstep_is_a_positive_whole_number(lab: Lab, model: Model, data: Data) -
 
 @check(on="box", keyframe=0)
 def check_not_finite_in_place_is_caught(lab: Lab, model: Model, data: Data) -> None:
-    """NaN or infinity written in place: an error, then only reset and set_state."""
+    """Check that NaN or infinity written in place is an error, and then all but reset and
+    set_state are refused.
+    """
     good = get_state(model, data)
     for name, value in (
         ("ctrl", np.nan),
@@ -148,7 +156,9 @@ def check_not_finite_in_place_is_caught(lab: Lab, model: Model, data: Data) -> N
 
 @check(on="arm")
 def check_infinite_ctrl_is_refused_or_clamped(lab: Lab, model: Model, data: Data) -> None:
-    """An infinite ctrl in place is the end of its range to every verb, or an error of each."""
+    """Check that an infinite ctrl in place is the end of its range to every verb, or an error of
+    each.
+    """
     at_end, again = lab.data(model), lab.data(model)
     at_end.ctrl[1] = model.actuator_ctrlrange[1, 1]
     data.ctrl[1] = np.inf
@@ -186,7 +196,7 @@ def _refuses_or_is_unchanged(lab: Lab, data: Any, name: str, value: float) -> No
 
 @check(on="arm")
 def check_divergence_is_caught_every_time(lab: Lab, model: Model, data: Data) -> None:
-    """A second divergence, after a recovery by either way, is told like the first."""
+    """Check that a second divergence, after a recovery by either way, is told like the first."""
     good = get_state(model, data)
     for recover in (partial(reset, model, data), partial(set_state, model, data, good)) * 2:
         data.qvel[1] = np.nan
@@ -197,7 +207,9 @@ def check_divergence_is_caught_every_time(lab: Lab, model: Model, data: Data) ->
 
 @check(on="box")
 def check_zero_quaternion_is_refused(lab: Lab, model: Model, data: Data) -> None:
-    """A quaternion of zeros names no rotation: step and forward refuse, unchanged."""
+    """Check that step and forward refuse a quaternion of zeros, which is no rotation, and change
+    nothing.
+    """
     start = lab.box_at[0] + 3
     data.qpos[start : start + 4] = 0.0
     calls = (partial(verb, model, data) for verb in (step, forward))
@@ -205,7 +217,7 @@ def check_zero_quaternion_is_refused(lab: Lab, model: Model, data: Data) -> None
 
 
 def check_foreign_data_is_refused(lab: Lab) -> None:
-    """A Data works with the Model that made it, and with no other."""
+    """Check that a Data works with the Model that made it, and with no other."""
     data, variant = lab.data(lab.arm), lab.arm.replace(gravity=[0, 0, 0])
     state = get_state(lab.arm, data)
     for model in (lab.scene, variant):
@@ -221,7 +233,9 @@ def check_foreign_data_is_refused(lab: Lab) -> None:
 
 
 def check_closed_data_is_refused(lab: Lab) -> None:
-    """After close every verb and every derived value is an error; close is idempotent."""
+    """Check that after close every verb and every derived value is an error; close is
+    idempotent.
+    """
     model = lab.arm
     with make_data(model) as data:
         qpos = data.qpos
@@ -242,7 +256,7 @@ def check_closed_data_is_refused(lab: Lab) -> None:
 
 @check(on="box")
 def check_unknown_names_are_refused(lab: Lab, model: Model, data: Data) -> None:
-    """A mistyped name lists the known ones, and suggests the nearest."""
+    """Check that a mistyped name lists the known ones, and suggests the nearest."""
     error = require_raises(UnknownNameError, lambda: model.joint_id("elbow_flx"))
     require("Did you mean 'elbow_flex'?" in str(error), f"no suggestion in: {error}")
     keys: tuple[Any, ...] = (99, -1, "helt", 1.0)
@@ -258,7 +272,7 @@ def check_unknown_names_are_refused(lab: Lab, model: Model, data: Data) -> None:
 
 
 def check_bad_options_are_refused(lab: Lab) -> None:
-    """`replace` checks every name and value, and never changes its own Model."""
+    """Check that `replace` checks every name and value, and never changes its own Model."""
     model = lab.arm
     bad: tuple[dict[str, Any], ...] = (
         {"actuaton": False},

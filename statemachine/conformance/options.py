@@ -12,7 +12,7 @@ _G = 9.81
 
 @check("mass", "gravity", "armature", "damping", "frictionloss")
 def check_mass_scales_weight_and_inertia(lab: Lab) -> None:
-    """Every mass doubled: weights and the force for an acceleration double, a fall does not."""
+    """Check that with every mass doubled weights and forces double, and a fall stays the same."""
     limp = lab.arm.replace(actuation=False, armature=0, damping=0, frictionloss=0)
     heavy = limp.replace(mass=2 * limp.body_mass)
     require_close(heavy.body_mass, 2 * limp.body_mass, 0.0, "body_mass")
@@ -34,7 +34,9 @@ def check_mass_scales_weight_and_inertia(lab: Lab) -> None:
 
 @check("friction", "gravity")
 def check_friction_slows_what_slides(lab: Lab) -> None:
-    """On a floor of friction μ a box pushed by a = 5 m/s² accelerates by a - μ·g, or not at all."""
+    """Check that on a floor of friction μ a box pushed by a = 5 m/s² accelerates by a - μ·g, or
+    not at all.
+    """
     push, seconds = 5.0, 0.4
     for friction in (0.1, 0.3, 0.8):
         model = lab.box.replace(gravity=[push, 0, -_G], friction=friction)
@@ -51,7 +53,9 @@ def check_friction_slows_what_slides(lab: Lab) -> None:
 
 @check("kp", "kv", "position servo", "gravity")
 def check_gains_are_those_of_the_servo(lab: Lab) -> None:
-    """At rest a servo is off by load / kp; moving, kv times its speed is taken off its force."""
+    """Check that at rest a servo is off by load / kp; moving, kv times its speed is taken off
+    its force.
+    """
     joint = lab.scene.joint_id("shoulder_lift")
     for kp in (250.0, 998.22, 4000.0):
         model = lab.scene.replace(kp=kp)
@@ -73,7 +77,7 @@ def check_gains_are_those_of_the_servo(lab: Lab) -> None:
 
 @check("latency", "gravity", "position servo")
 def check_latency_delays_a_command(lab: Lab) -> None:
-    """Under a latency of k steps the arm does what it does without, k steps later.
+    """Check that under a latency of k steps the arm does what it does without, k steps later.
 
     Weightless and at rest nothing else tells the moments apart. A latency is rounded up.
     """
@@ -102,7 +106,9 @@ def check_latency_delays_a_command(lab: Lab) -> None:
 
 @check("latency", "position servo", on="arm", latency=0.04)
 def check_a_state_has_the_commands_on_their_way(lab: Lab, model: Model, data: Data) -> None:
-    """With a latency, two restores have one future, whatever was commanded after the State."""
+    """Check that with a latency, two restores have one future, whatever was commanded after the
+    State.
+    """
     other = lab.data(model)
     run_ctrl(model, data, 20, seed=1)
     state = get_state(model, data)
@@ -126,7 +132,7 @@ def check_a_state_has_the_commands_on_their_way(lab: Lab, model: Model, data: Da
 
 @check("latency", "position servo", on="box", keyframe=0, latency=0.1)
 def check_a_keyframe_holds_under_latency(lab: Lab, model: Model, data: Data) -> None:
-    """Before a reset the command was that of the keyframe: the held box stays held."""
+    """Check that the command before a reset was that of the keyframe: the held box stays held."""
     start, arm = data.qpos.copy(), model.jnt_qposadr[model.actuator_jntid]
     step(model, data, 20)
     require_close(data.qpos[arm], start[arm], 0.01, "the arm in the first 0.1 s")

@@ -20,7 +20,7 @@ _PUSH = (2.0, -1.0, -_G)  # a slanted gravity [m/s²]
 
 @check("position servo", "gravity", on="scene")
 def check_untouched_ctrl_is_a_command(lab: Lab, model: Model, data: Data) -> None:
-    """The servos hold the zero pose from the first step on, with a small droop."""
+    """Check that the servos hold the zero pose from the first step on, with a small droop."""
     step(model, data, 200)
     droop = np.degrees(data.qpos[model.jnt_qposadr[model.joint_id("shoulder_lift")]])
     # At rest kp·droop carries the load; 0.5694 N·m is the arm's weight about the joint.
@@ -30,7 +30,7 @@ def check_untouched_ctrl_is_a_command(lab: Lab, model: Model, data: Data) -> Non
 
 @check("position servo", on="arm")
 def check_the_servo_law(lab: Lab, model: Model, data: Data) -> None:
-    """qfrc_actuator is clip(kp·(clip(ctrl) - q) - kv·q̇, forcerange), after forward."""
+    """Check that qfrc_actuator is clip(kp·(clip(ctrl) - q) - kv·q̇, forcerange), after forward."""
     random = np.random.default_rng(13)
     for scale in (1e-3, 1e-2, 1.0, 5.0):
         data.qpos[:] = random.uniform(-0.3, 0.3, 6)
@@ -43,14 +43,14 @@ def check_the_servo_law(lab: Lab, model: Model, data: Data) -> None:
 
 
 def servo(model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Array:
-    """The position servo's force (nu,) [N·m], of an arm whose joints are its actuators'."""
+    """Return the position servo's force (nu,) [N·m], of an arm whose joints are its actuators'."""
     goal = np.clip(ctrl, *model.actuator_ctrlrange.T)
     force = model.actuator_kp * (goal - qpos) - model.actuator_kv * qvel
     return np.clip(force, *model.actuator_forcerange.T)
 
 
 def check_ctrl_is_clamped_inside(lab: Lab) -> None:
-    """A ctrl beyond its range acts as at the range; the array keeps what was written."""
+    """Check that a ctrl beyond its range acts as at the range; the array keeps what was written."""
     model = lab.arm
     ends = []
     for excess in (0.0, 5.0):
@@ -66,7 +66,9 @@ def check_ctrl_is_clamped_inside(lab: Lab) -> None:
 
 @check("position servo", "gravity", on="scene", after=400)
 def check_forces_balance_at_rest(lab: Lab, model: Model, data: Data) -> None:
-    """Held by its servos, the arm's forces sum to zero; parts add up to the constraint."""
+    """Check that held by its servos, the arm's forces sum to zero; parts add up to the
+    constraint.
+    """
     total = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - data.qfrc_bias
     require_close(total, np.zeros(model.nv), 1e-6, "sum of the forces at rest")
     _parts_add_up(data)
@@ -83,7 +85,7 @@ def _parts_add_up(data: Data) -> None:
 
 @check(on="arm")
 def check_dry_friction_saturates(lab: Lab, model: Model, data: Data) -> None:
-    """A joint in fast motion feels its full dry friction, against the motion."""
+    """Check that a joint in fast motion feels its full dry friction, against the motion."""
     for sign in (1.0, -1.0):
         data.qvel[:] = sign * 3.0
         forward(model, data)
@@ -93,7 +95,7 @@ def check_dry_friction_saturates(lab: Lab, model: Model, data: Data) -> None:
 
 @check("gravity")
 def check_limits_stop_a_joint(lab: Lab) -> None:
-    """Pushed by gravity, a joint stops at its limit; with limits off it goes on."""
+    """Check that a joint, pushed by gravity, stops at its limit, and with limits off goes on."""
     limp = lab.arm.replace(actuation=False)
     free = limp.replace(limits=False)
     joint = limp.joint_id("shoulder_lift")
@@ -107,7 +109,9 @@ def check_limits_stop_a_joint(lab: Lab) -> None:
 
 @check("gravity", on="box")
 def check_free_fall(lab: Lab, model: Model, data: Data) -> None:
-    """A free body falls g·t²/2, within the g·t·h of one timestep; sideways not at all."""
+    """Check that a free body falls g·t²/2, within the g·t·h of one timestep; sideways not at
+    all.
+    """
     start, dof, _ = lab.box_at
     data.qpos[start : start + 3] = (1.0, 1.0, 2.0)
     step(model, data, 60)
@@ -120,7 +124,7 @@ def check_free_fall(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="box", gravity=[0, 0, 0])
 def check_free_body_velocity_conventions(lab: Lab, model: Model, data: Data) -> None:
-    """Linear velocity is in world axes; angular velocity in the body's own axes."""
+    """Check that linear velocity is in world axes; angular velocity in the body's own axes."""
     start, dof, _ = lab.box_at
     quat = np.array([np.cos(0.6), np.sin(0.6), 0.0, 0.0])  # turned about x by 1.2 rad
     rate, velocity = 0.8, np.array([0.3, -0.2, 0.1])
@@ -137,7 +141,7 @@ def check_free_body_velocity_conventions(lab: Lab, model: Model, data: Data) -> 
 
 @check("gravity", on="box", after=300)
 def check_contact_carries_the_weight(lab: Lab, model: Model, data: Data) -> None:
-    """Under a resting box: four or more contacts, normals up, forces that sum to m·g."""
+    """Check that a resting box has four or more contacts, normals up, whose forces sum to m·g."""
     _, dof, body = lab.box_at
     total, touching, normals = force_on(model, data, body)
     require(len(touching) >= 3, f"the box rests on {len(touching)} points")
@@ -150,7 +154,7 @@ def check_contact_carries_the_weight(lab: Lab, model: Model, data: Data) -> None
 
 @check(on="box", after=300, gravity=_PUSH)
 def check_contact_forces_lean_against_a_push(lab: Lab, model: Model, data: Data) -> None:
-    """Under slanted gravity the floor's force on a box is -m·g, its tangent part too."""
+    """Check that under slanted gravity the floor's force on a box is -m·g, its tangent part too."""
     _, _, body = lab.box_at
     total, touching, _ = force_on(model, data, body)
     place = data.contacts.pos[touching].mean(axis=0)
@@ -164,7 +168,7 @@ def check_contact_forces_lean_against_a_push(lab: Lab, model: Model, data: Data)
 
 @check(on="box")
 def check_depth_of_a_contact(lab: Lab, model: Model, data: Data) -> None:
-    """Of a box one millimetre in the floor, every contact's distance is minus that."""
+    """Check that of a box one millimetre in the floor, every contact's distance is minus that."""
     start, _, body = lab.box_at
     data.qpos[start + 2] = 0.029
     forward(model, data)
@@ -176,7 +180,7 @@ def check_depth_of_a_contact(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="arm", timestep=1e-6)
 def check_acceleration_is_the_rate_of_velocity(lab: Lab, model: Model, data: Data) -> None:
-    """Qacc is what a very short step does to qvel, in the air and under servo force."""
+    """Check that qacc is what a very short step does to qvel, in the air and under servo force."""
     random = np.random.default_rng(21)
     for _ in range(4):
         data.qpos[:] = random.uniform(-0.5, 0.5, 6)
@@ -191,7 +195,7 @@ def check_acceleration_is_the_rate_of_velocity(lab: Lab, model: Model, data: Dat
 
 @check("position servo", on="arm", armature=_HEAVY, gravity=[0, 0, 0], frictionloss=0.0)
 def check_a_force_accelerates_by_the_armature(lab: Lab, model: Model, data: Data) -> None:
-    """With an armature far beyond the links' inertia, qacc is force over armature."""
+    """Check that with an armature far beyond the links' inertia, qacc is force over armature."""
     data.ctrl[:] = 0.001
     forward(model, data)
     expected = servo(model, data.qpos, data.qvel, data.ctrl) / _HEAVY
@@ -200,7 +204,7 @@ def check_a_force_accelerates_by_the_armature(lab: Lab, model: Model, data: Data
 
 
 def check_facts_are_the_files(lab: Lab) -> None:
-    """Ranges, gains and joint parameters of the Model are those that the file states."""
+    """Check that ranges, gains and joint parameters of the Model are those that the file states."""
     model = lab.arm
     root = ElementTree.parse(resolve("so101")).getroot()
     ranges = [joint.get("range", "").split() for joint in root.findall(".//worldbody//joint")]
@@ -224,7 +228,7 @@ def check_facts_are_the_files(lab: Lab) -> None:
 
 @check("position servo", on="box", keyframe=0)
 def check_the_box_is_held(lab: Lab, model: Model, data: Data) -> None:
-    """From keyframe 0, under a command that moves the arm, both jaws keep the box."""
+    """Check that from keyframe 0, under a command that moves the arm, both jaws keep the box."""
     box, jaws = model.body_id("box"), {model.body_id(n) for n in ("gripper", "moving_jaw_so101_v1")}
     data.ctrl[:2] += (0.4, -0.2)
     start = data.qpos.copy()
@@ -239,7 +243,9 @@ def check_the_box_is_held(lab: Lab, model: Model, data: Data) -> None:
 
 @check("gravity")
 def check_options_do_what_they_say(lab: Lab) -> None:
-    """Each option that the capability record lists has its effect, and no other Model's."""
+    """Check that each option that the capability record lists has its effect, and no other
+    Model's.
+    """
     base, options = lab.scene, lab.scene.capabilities.options
     limp = base.replace(actuation=False)
 
@@ -273,7 +279,9 @@ def check_options_do_what_they_say(lab: Lab) -> None:
 
 
 def check_unsupported_is_said(lab: Lab) -> None:
-    """What the capability record does not list raises UnsupportedError, with the facts."""
+    """Check that what the capability record does not list raises UnsupportedError, with the
+    facts.
+    """
     model = lab.arm
     for name in {"armature", "substeps", "limits"} - set(model.capabilities.options):
         error = require_raises(UnsupportedError, lambda n=name: model.replace(**{n: 1}))

@@ -27,7 +27,9 @@ _ONE_BY_ONE = (1,) * 100  # as many calls of one step
 
 @check(on="arm")
 def check_time_passes_only_in_step(lab: Lab, model: Model, data: Data) -> None:
-    """`time` grows by timestep × nstep in a step, by nothing elsewhere; it can be set."""
+    """Check that `time` grows by timestep × nstep in a step, by nothing elsewhere; it can be
+    set.
+    """
     require(data.time == 0.0, "a fresh Data is not at time 0")
     step(model, data)
     step(model, data, 9)
@@ -41,7 +43,7 @@ def check_time_passes_only_in_step(lab: Lab, model: Model, data: Data) -> None:
 
 
 def check_steps_add_up(lab: Lab) -> None:
-    """step(n) is n times step(1), bit for bit, mid-contact too."""
+    """Check that step(n) is n times step(1), bit for bit, mid-contact too."""
     one_by_one = run_on(lab.moving(), *_ONE_BY_ONE)
     for calls in ((100,), (7, 1, 22) * 3):
         after = np.concatenate(([0], np.cumsum(calls)))
@@ -50,7 +52,9 @@ def check_steps_add_up(lab: Lab) -> None:
 
 @check(on="box")
 def check_replay_is_bit_identical(lab: Lab, model: Model, used: Data) -> None:
-    """Same keyframe, same commands: same bits, in a used Data and in a new one."""
+    """Check that the same keyframe and commands give the same bits, in a used Data and in a new
+    one.
+    """
     run_ctrl(model, used, 30, seed=3)
     runs = []
     for data in (used, used, lab.data(model)):
@@ -61,7 +65,9 @@ def check_replay_is_bit_identical(lab: Lab, model: Model, used: Data) -> None:
 
 @check(on="box")
 def check_keyframes_are_taken_whole(lab: Lab, model: Model, data: Data) -> None:
-    """reset(keyframe) sets time, qpos, qvel and ctrl to the file's, by number or name."""
+    """Check that reset(keyframe) sets time, qpos, qvel and ctrl to the file's, by number or
+    name.
+    """
     require(len(model.keyframes) == 2, "scene_box has two keyframes")
     for number, frame in enumerate(model.keyframes):
         for key in (number, frame.name):
@@ -77,7 +83,9 @@ def check_keyframes_are_taken_whole(lab: Lab, model: Model, data: Data) -> None:
 
 @check("position servo", on="held")
 def check_a_state_restores_the_inputs(lab: Lab, model: Model, data: Data) -> None:
-    """set_state gives back time, qpos, qvel and ctrl, in any Data, and of a pickled State."""
+    """Check that set_state gives back time, qpos, qvel and ctrl, in any Data, and of a pickled
+    State.
+    """
     state = get_state(model, data)
     expected = inputs_of(model, data)
     other = lab.data(model)
@@ -90,7 +98,9 @@ def check_a_state_restores_the_inputs(lab: Lab, model: Model, data: Data) -> Non
 
 
 def check_restored_futures_agree(lab: Lab) -> None:
-    """Restores of one State have the same bits ever after; the run's own, if that is promised."""
+    """Check that restores of one State have the same bits ever after; the run's own, if that is
+    promised.
+    """
     data = lab.moving()
     state = get_state(lab.box, data)
     going_on = run_on(data, *_ONE_BY_ONE)
@@ -107,7 +117,7 @@ def check_restored_futures_agree(lab: Lab) -> None:
 
 @check(on="arm")
 def check_a_state_is_a_copy(lab: Lab, model: Model, data: Data) -> None:
-    """A State does not change with its Data, and cannot be written into."""
+    """Check that a State does not change with its Data, and cannot be written into."""
     state = get_state(model, data)
     before = state.vector.copy()
     run_ctrl(model, data, 5, seed=10)
@@ -118,7 +128,7 @@ def check_a_state_is_a_copy(lab: Lab, model: Model, data: Data) -> None:
 
 @check(on="scene")
 def check_a_state_moves_between_variants(lab: Lab, model: Model, data: Data) -> None:
-    """A State fits every variant that `replace` makes of a Model."""
+    """Check that a State fits every variant that `replace` makes of a Model."""
     run_ctrl(model, data, 20, seed=11)
     state = get_state(model, data)
     variant = model.replace(gravity=[0.0, 0.0, -1.6])
@@ -130,7 +140,9 @@ def check_a_state_moves_between_variants(lab: Lab, model: Model, data: Data) -> 
 
 @check(on="arm")
 def check_foreign_states_are_refused(lab: Lab, model: Model, data: Data) -> None:
-    """Another layout, another backend, a cut or a bad State: refused, Data unchanged."""
+    """Check that a State of another layout or backend, a cut or a bad one is refused, and the
+    Data unchanged.
+    """
     run_ctrl(model, data, 5, seed=12)
     good = get_state(model, data)
     boxed = get_state(lab.box, lab.data(lab.box))

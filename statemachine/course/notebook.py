@@ -38,7 +38,7 @@ from ..show.html.diagram import figure
 from ..show.pictures import Bars, Diagram, Picture, Pipeline, RobotPicture, Slots, Traces
 from ..show.terminal import judged
 from ..show.text_blocks import together
-from .lessons import LESSONS, Lesson, module
+from .lessons import LESSONS, Lesson, check_lesson, module
 from .lessons.pictures import with_picture
 from .lessons.session import fitted, page_of_lesson, take
 from .quiz import answer_of, lettered
@@ -117,7 +117,7 @@ def lesson(name: str, backend: str = DEFAULT, prediction: str = "", **options: A
         MissingEngineError: The engine is not installed here.
         BadInputError: A prediction is not a letter of its question.
     """
-    check_name("lesson", name, LESSONS)
+    check_lesson(name)
     defaults = LESSONS[name].defaults
     for key in options:
         check_name("option", key, defaults)
@@ -365,7 +365,9 @@ def _folded(inside: list[str], summary: str = "What the run says") -> str:
 def _table(block: Table) -> str:
     title = f"*{_escaped(block.title)}*\n\n" if block.title else ""
     marks = [":--" if k in block.words else "--:" for k in range(len(block.headers))]
-    lines = [_row([_escaped(header) for header in block.headers]), _row(marks)]
+    # In a terminal a heading may have two lines; a line of Markdown is a row.
+    headers = [_escaped(" ".join(header.splitlines())) for header in block.headers]
+    lines = [_row(headers), _row(marks)]
     for k, cells in enumerate(block.rows):
         texts = [_escaped(cell) for cell in cells]
         if k in block.emphasis:

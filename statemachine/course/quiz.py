@@ -20,6 +20,7 @@ from typing import NamedTuple
 from .. import __version__
 from ..atomic_files import replace_text
 from ..show.blocks import LETTERS, Question
+from ..show.terminal import UNDECIDED
 from .asking import Stopped
 from .grading import KIND, answers_in
 
@@ -35,6 +36,8 @@ def lettered(question: Question) -> list[str]:
 
 def answer_of(question: Question) -> str:
     """Return the choice that the run gave."""
+    if question.undecided:
+        return UNDECIDED
     return "none of them" if question.right is None else lettered(question)[question.right]
 
 
@@ -133,8 +136,8 @@ class RecordedReader(Reader):
     def ask(self, question: Question) -> int | None:
         """Ask, and keep the answer."""
         choice = super().ask(question)
-        if choice is None:
-            return None
+        if choice is None or question.undecided:
+            return choice
         right, predicted = question.right, question.choices[choice]
         answer = {
             "lesson": self.lesson,

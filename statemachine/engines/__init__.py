@@ -27,7 +27,7 @@ _ROOMS: dict[str, str] = {
 
 
 def room_names() -> list[str]:
-    """Names of the engines that may have a room, whether or not they are installed."""
+    """Return the names of the engines that may have a room, whether or not they are installed."""
     for entry in importlib.metadata.entry_points(group="statemachine.engines"):
         _ROOMS.setdefault(entry.name, entry.value)
     return list(_ROOMS)
@@ -51,7 +51,7 @@ def register(name: str, kind: str) -> None:
 
 
 def room(engine: str | None) -> RawEngine:
-    """The room of an engine; an empty one if it has none.
+    """Return the room of an engine; an empty one if it has none.
 
     Args:
         engine: Its name; None for no engine.
@@ -74,7 +74,9 @@ def room(engine: str | None) -> RawEngine:
 
 
 def rooms_with(method: str) -> list[str]:
-    """Names of the engines whose rooms have a method of their own; none of them is imported."""
+    """Return the names of the engines whose rooms define a method themselves; none of them is
+    imported.
+    """
     rooms = []
     for engine in room_names():
         with suppress(MissingEngineError):

@@ -62,28 +62,30 @@ class WatchedObject(ABC):
 
     @property
     def thing(self) -> Any:
-        """The object; None if it is gone."""
+        """Return the object; None if it no longer exists."""
         return self._thing()
 
     @property
     def gone(self) -> bool:
-        """Whether it is no more."""
+        """Tell whether the object no longer exists."""
         return self.thing is None
 
     def lead(self, label: str) -> None:
-        """A variable leads here; the first that does gives the label."""
+        """Note that a variable leads here; the first that does gives the label."""
         if not self.named:
             self.label, self.named = label, True
 
     @property
     def title(self) -> str:
-        """Its label, or what there is to say of one that no variable ever led to."""
+        """Return the object's label, or its kind where no variable ever led to it."""
         return (
             self.label or f"{self.kind} {'that is gone again' if self.gone else 'without a name'}"
         )
 
     def look_again(self, thoroughly: bool = False) -> dict[str, str]:
-        """What differs from the last look: fields, and which of their entries; `CLOSED` if gone."""
+        """Return what differs from the last look: fields, and which of their entries; `CLOSED`
+        if gone.
+        """
         if self.gone:
             return {CLOSED: CLOSED}
         before, now = self._seen, self.contents(thoroughly)
@@ -95,22 +97,24 @@ class WatchedObject(ABC):
 
     @abstractmethod
     def contents(self, thoroughly: bool) -> Contents:
-        """All that is in it, which is there; large things only if it is to be thorough."""
+        """Return the contents of an existing object; large ones only if the look is to be
+        thorough.
+        """
 
     @abstractmethod
     def spelled(self, field: str) -> str:
-        """A field as code would spell it."""
+        """Return a field as code would spell it."""
 
     def differing(self, before: Contents, now: Contents) -> list[str]:
-        """The fields of both looks that differ."""
+        """Return the fields of both looks that differ."""
         return [field for field, value in now.items() if before.get(field, value) != value]
 
     def due(self) -> bool:
-        """Whether, since it was last asked, all that is derived became something to compute."""
+        """Tell whether all derived values became outdated since this was last asked."""
         return False
 
     def entry(self, field: str, before: bytes, after: bytes) -> str:
-        """A field, or which entries of it differ."""
+        """Return a field, or which entries of it differ."""
         return field
 
 
@@ -126,30 +130,34 @@ class CallWatch(ABC):
     module: Any
 
     def functions(self) -> Iterator[tuple[Any, str, str]]:
-        """Owner and attribute of every function to be replaced, and its name for a reader."""
+        """Yield the owner and attribute of every function to be replaced, and its name for a
+        reader.
+        """
         for name, value in vars(self.module).items():
             if isinstance(value, _FUNCTIONS) and not name.startswith("_"):
                 yield self.module, name, name
 
     @abstractmethod
     def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
-        """The objects that a call is about, the first of them foremost; None: not ours."""
+        """Return the objects that a call is about, the foremost first; None where it concerns
+        none of ours.
+        """
 
     @abstractmethod
     def created(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
-        """The object that a call has made."""
+        """Return the object that a call has made."""
 
     @abstractmethod
     def name(self, namespace: Mapping[str, Any]) -> None:
-        """Label the objects that variables lead to; nothing led to any of them before."""
+        """Label the objects that variables lead to, where nothing led to one before."""
 
     @abstractmethod
     def living(self) -> Sequence[WatchedObject]:
-        """The objects that are still there."""
+        """Return the objects that still exist."""
 
 
 def entries(field: str, before: bytes, after: bytes, size: int) -> str:
-    """Which entries of a flat array of items of a size differ: "qpos[1]", "ctrl[0:2]"."""
+    """Return which entries of a flat array of items of a size differ: "qpos[1]", "ctrl[0:2]"."""
     if len(before) != len(after):
         return field
     was, now = (np.frombuffer(contents, np.uint8).reshape(-1, size) for contents in (before, after))
@@ -161,7 +169,7 @@ def entries(field: str, before: bytes, after: bytes, size: int) -> str:
 
 
 def named(namespace: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Names and values, Models first; what is in a list, tuple or dict too."""
+    """Yield the names and values, Models first; what is in a list, tuple or dict too."""
     variables: list[tuple[str, Any]] = []
     for name, value in namespace.items():
         if not name.startswith("__"):

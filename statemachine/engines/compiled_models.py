@@ -32,7 +32,8 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def read(self, path: Path) -> ModelReading:
-        """What it makes of a file with its own defaults, as a compiled model; see `read_robot`.
+        """Return the compiled model that an engine makes of a file with its own defaults; see
+        `read_robot`.
 
         Raises:
             MissingEngineError: It is not installed here.
@@ -42,7 +43,7 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def read_file(self, path: Path, comparable: Comparable | None = None) -> ModelReading:
-        """A file as it says itself, as a compiled model.
+        """Return a file as it is written, as a compiled model.
 
         Args:
             path: An MJCF, URDF or MJB file.
@@ -57,7 +58,7 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def read_robot(self, robot: Robot, path: Path) -> ModelReading:
-        """What another engine made of a file, as a compiled model.
+        """Return what another engine made of a file, as a compiled model.
 
         Args:
             robot: What the engine made of it.
@@ -70,24 +71,28 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def element_names(self, raw: Any) -> dict[str, list[str]]:
-        """The names of all elements of a compiled model by their kind, in their order."""
+        """Return the names of all elements of a compiled model by their kind, in their order."""
 
     @mandatory
     @abstractmethod
     def moment_arms(self, raw: Any) -> tuple[dict[str, float], ...]:
-        """The moment arms of each actuator of a compiled model on hinges and slides, by joint."""
+        """Return the moment arms of each actuator of a compiled model on hinges and slides, by
+        joint.
+        """
 
     @mandatory
     @abstractmethod
     def describe(self, compiled: Any, name: str) -> Robot:
-        """The description in a compiled model; its joints are in the order of the model's."""
+        """Return the description in a compiled model; its joints are in the order of the
+        model's.
+        """
 
     @mandatory
     @abstractmethod
     def differences(
         self, left: Any, right: Any, pairs: Counterparts, *, world: bool = True
     ) -> tuple[ModelDifference, ...]:
-        """All that two compiled models differ in and that can change a motion.
+        """Return all differences of two compiled models that can change a motion.
 
         Args:
             left: A compiled model.
@@ -99,24 +104,28 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def sensors(self, left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
-        """What the sensors of two compiled models differ in, which only a controller reads."""
+        """Return the differences of the sensors of two compiled models, which only a controller
+        reads.
+        """
 
     @mandatory
     @abstractmethod
     def readable(self, left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
-        """What two compiled models differ in that the engine does not use: user and custom data."""
+        """Return the differences that the engine does not use: user and custom data."""
 
     @mandatory
     @abstractmethod
     def shown_elements(
         self, left: Any, right: Any, pairs: Counterparts
     ) -> dict[str, list[tuple[int, int]]]:
-        """Pairs of geoms, tendons and actuators, and of places in sensordata, by kind."""
+        """Return the pairs of geoms, tendons and actuators, and of places in sensordata, by
+        kind.
+        """
 
     @mandatory
     @abstractmethod
     def data_in_other_order(self, model: Model, elements: Mapping[str, Any]) -> Any:
-        """A Data of a Model that shows what a Data of another one has.
+        """Return a Data of a Model that shows what a Data of another one has.
 
         Args:
             model: In whose order it is shown.
@@ -126,7 +135,7 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def entries(self, right: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
-        """A difference by its single entries, or itself where it is of one piece.
+        """Return a difference by its single entries, or itself where it is of one piece.
 
         Args:
             right: The compiled model that its edits are of.
@@ -136,22 +145,24 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def integrator(self, raw: Any) -> str:
-        """The name of the integrator of a compiled model: "euler", "rk4", …"""
+        """Return the name of the integrator of a compiled model: "euler", "rk4", …"""
 
     @mandatory
     @abstractmethod
     def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
-        """A copy of a compiled model with these edits, and all that follows from them."""
+        """Return a copy of a compiled model with these edits, and all that follows from them."""
 
     @mandatory
     @abstractmethod
     def can_be_respecified(self, path: Path) -> bool:
-        """Whether a file has a description that can be compiled anew; a binary one has none."""
+        """Tell whether a file has a description that can be compiled anew; a binary one has
+        none.
+        """
 
     @mandatory
     @abstractmethod
     def respecified(self, path: Path, raw: Any, edits: Sequence[SpecEdit]) -> Any:
-        """The compiled model of a file with some elements set otherwise.
+        """Return the compiled model of a file with some elements set otherwise.
 
         Args:
             path: The file.
@@ -167,7 +178,7 @@ class CompiledModels:
     def file_form(
         self, source: XmlSource, raw: Any, other_path: Path, other: Any, geoms: Mapping[int, int]
     ) -> FileForm:
-        """What writes differences as attributes of a file.
+        """Return the writer of differences as attributes of a file.
 
         Args:
             source: The file.
@@ -183,12 +194,12 @@ class CompiledModels:
     @mandatory
     @abstractmethod
     def in_places_of(self, before: Any, after: Any, edits: Iterable[Edit]) -> tuple[Edit, ...]:
-        """Edits of one compiled model as those of another, from `respecified`."""
+        """Return the edits of one compiled model as those of another, from `respecified`."""
 
     @mandatory
     @abstractmethod
     def counts(self, compiled: Any) -> dict[str, int]:
-        """How many "actuators" a compiled model has, and how many planes are its "floor"."""
+        """Return how many "actuators" a compiled model has, and how many planes are its "floor"."""
 
     @mandatory
     @abstractmethod
@@ -200,7 +211,7 @@ class CompiledModels:
         names: Mapping[str, Mapping[str, str]],
         options: ReadOptions,
     ) -> Any:
-        """The compiled model of a file that has parts of another one instead of its own.
+        """Return the compiled model of a file, with elements of another one instead of its own.
 
         Args:
             taker: The file.
@@ -222,7 +233,7 @@ class CompiledModels:
         qvel: Array,
         made: Callable[[Model], AbstractContextManager[Data]],
     ) -> Array:
-        """Kinetic and potential energy (n, 2) [J] of states.
+        """Return the kinetic and potential energy (n, 2) [J] of states.
 
         Args:
             model: A model on this engine.

@@ -92,11 +92,13 @@ class Phrases:
 
 
 def accelerated(timestep: float) -> tuple[float, float]:
-    """Angle and speed after one semi-implicit step from rest, under the cells' torque."""
+    """Return the angle and speed after one semi-implicit step from rest, under the cells'
+    torque.
+    """
     speed = timestep * acceleration(ANGLE, TORQUE)
     return ANGLE + timestep * speed, speed
 
 
 def near(left: Any, right: Any, error: float) -> bool:
-    """Whether numbers, or arrays of them, are that near each other."""
+    """Tell whether numbers, or arrays of them, are equal within a tolerance."""
     return bool(np.all(np.abs(np.subtract(left, right)) <= error))

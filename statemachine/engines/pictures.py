@@ -54,7 +54,7 @@ class Renderer:
 
 
 def renderers() -> list[str]:
-    """Names of the engines that draw, whether or not they can here; the best first."""
+    """Return the names of the engines that draw, whether or not they can here; the best first."""
     return rooms_with("drawer")
 
 
@@ -101,7 +101,7 @@ class LivePictures(PipedChild):
         self._send(poses)
 
     def take(self) -> Pixels:
-        """The picture (height, width, 3) uint8 that was asked for first.
+        """Return the picture (height, width, 3) uint8 that was asked for first.
 
         Raises:
             EngineError: The process gave up.
@@ -126,7 +126,7 @@ class LivePictures(PipedChild):
 def drawn(
     sides: Sequence[Motion], size: tuple[int, int], camera: Camera, renderer: Renderer
 ) -> Generator[Pixels]:
-    """Pictures (height, width, 3) uint8 of one motion, or of two in one place.
+    """Yield pictures (height, width, 3) uint8 of one motion, or of two in one place.
 
     The first is solid, in the model's own colours; the second a violet ghost where it parts from
     the first. Bodies are where the motions say, so that any engine's run is drawn.
@@ -178,7 +178,7 @@ def _draw() -> None:
 
 
 def _asked() -> SimpleQueue[Any]:
-    """Poses from standard input, then None; read in a thread, so that no writer waits."""
+    """Yield the poses from standard input, then None; read in a thread, so that no writer waits."""
     asked: SimpleQueue[Any] = SimpleQueue()
 
     def listen() -> None:

@@ -41,16 +41,16 @@ class Pile(ABC):
     @classmethod
     @abstractmethod
     def fresh(cls) -> AbstractContextManager[Pile]:
-        """A new world."""
+        """Return a new world."""
 
     @property
     @abstractmethod
     def timestep(self) -> float:
-        """The engine's own step [s]."""
+        """Return the engine's own step [s]."""
 
     @abstractmethod
     def bodies(self) -> int:
-        """How many there are."""
+        """Return how many bodies there are."""
 
     @abstractmethod
     def run(self, steps: int) -> Array:
@@ -61,12 +61,12 @@ class Pile(ABC):
         self.quantities[quantity][0](self, _OTHER)
 
     def refilled(self) -> Pile:
-        """With the bodies in it, if a way to the start takes them away."""
+        """Return this world with the bodies in it, if a way to the start takes them away."""
         return self
 
     @classmethod
     def _survives(cls, quantity: str, act: Callable[[Any], object]) -> bool:
-        """Whether a number that was written is there after something was done."""
+        """Tell whether a number that was written is there after something was done."""
         write, read = cls.quantities[quantity]
         with cls.fresh() as scene:
             write(scene, _WRITTEN)
@@ -75,7 +75,7 @@ class Pile(ABC):
 
     @classmethod
     def reset(cls) -> dict[str, dict[str, bool]]:
-        """Which quantities are, for each way to reset, still what was written before."""
+        """Measure which quantities are, for each way to reset, still what was written before."""
         survivors: dict[str, dict[str, bool]] = {}
         for name, way in cls.resets.items():
             survivors[name] = cls._survivors(way)
@@ -92,7 +92,7 @@ class Pile(ABC):
 
     @classmethod
     def save(cls) -> dict[str, dict[str, bool]]:
-        """Which quantities a restore brings back, for each way to save."""
+        """Measure which quantities a restore brings back, for each way to save."""
 
         def there_and_back(quantity: str, save: Save, scene: Pile) -> None:
             with save(scene) as restore:
@@ -109,7 +109,9 @@ class Pile(ABC):
 
     @classmethod
     def future(cls, moments: Sequence[float], steps: int) -> dict[str, list[Futures]]:
-        """The two futures of each trial, set back to the start or to moments [s] in the middle."""
+        """Measure the two futures of each trial, set back to the start or to moments [s] in the
+        middle.
+        """
 
         def start(way: Callable[[Any], object]) -> Futures:
             with cls.fresh() as scene:

@@ -50,11 +50,11 @@ class RawEngine(CompiledModels):
         self.name = name
 
     def can(self, method: str) -> bool:
-        """Whether its room has a method of its own."""
+        """Tell whether the engine's room defines a method."""
         return getattr(type(self), method) is not getattr(RawEngine, method)
 
     def ignored(self, model: Model) -> list[str]:
-        """What of a Model's file its backend leaves out, each in a few words."""
+        """Return what of a Model's file its backend leaves out, each in a few words."""
         return []
 
     def read_otherwise(self, left: Model, right: Model) -> list[str]:
@@ -99,11 +99,14 @@ class RawEngine(CompiledModels):
         return False
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
-        """What can be set between the engine as it comes and the contract; None of any other."""
+        """Return the dials between the engine as it comes and the contract; None for any other
+        Model.
+        """
         return None
 
     def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
-        """A file as the engine's own users run it, where the interface promises the same bits.
+        """Return a run of a file as the engine's own users run it, where the interface promises the
+        same bits.
 
         Args:
             path: The file.
@@ -119,11 +122,13 @@ class RawEngine(CompiledModels):
     # What it takes for granted, and what it runs.
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
-        """What measures the answer to a question of `probes.conventions`; None if nothing does."""
+        """Return what measures the answer to a question of `probes.conventions`; None if nothing
+        does.
+        """
         return None
 
     def phrases(self) -> Phrases:
-        """Which of its calls does what, as lines to type."""
+        """Return which of its calls does what, as lines to type."""
         from .measured import Phrases
 
         return Phrases(("", ""), {})
@@ -133,7 +138,8 @@ class RawEngine(CompiledModels):
     def stepper(
         self, model: Model, qpos: Array, qvel: Array, ctrl: Array
     ) -> AbstractContextManager[Callable[[int], object]]:
-        """What advances a simulation of it by so many steps, by its own functions alone.
+        """Return a function that advances a simulation by so many steps, by the engine's own
+        functions alone.
 
         Args:
             model: A Model on this engine.
@@ -145,12 +151,12 @@ class RawEngine(CompiledModels):
     @mandatory
     @abstractmethod
     def call_watch(self) -> CallWatch:
-        """Which of its functions can be watched, and what they change."""
+        """Return which of its functions can be watched, and what they change."""
 
     # One step from a given state, past the interface.
 
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
-        """The engine's mass matrix (nv, nv) at a pose, armature included; NaN if not told.
+        """Return the engine's mass matrix (nv, nv) at a pose, armature included; NaN if not told.
 
         Args:
             model: A Model on this engine.
@@ -176,7 +182,8 @@ class RawEngine(CompiledModels):
     @mandatory
     @abstractmethod
     def opengl(self) -> str:
-        """The OpenGL that it draws with here; "" for its own choice, or where none is needed.
+        """Return the OpenGL that it draws with here; "" for its own choice, or where none is
+        needed.
 
         Raises:
             MissingEngineError: It cannot draw here; the message says why, and what to do.
@@ -185,7 +192,7 @@ class RawEngine(CompiledModels):
     @mandatory
     @abstractmethod
     def drawn_by(self, opengl: str) -> str:
-        """What a reader is told of what draws."""
+        """Return what a reader is told of what draws."""
 
     @mandatory
     @abstractmethod
@@ -203,29 +210,35 @@ class RawEngine(CompiledModels):
     @mandatory
     @abstractmethod
     def drawing_environment(self, opengl: str, known: dict[str, str]) -> dict[str, str]:
-        """The environment of a process in which the engine takes this OpenGL."""
+        """Return the environment of a process in which the engine takes this OpenGL."""
 
     @mandatory
     @abstractmethod
     def drawing_diagnosis(self) -> tuple[bool, str, str]:
-        """Whether it draws here, what was found, and the next step if there is one."""
+        """Tell whether it draws here, what was found, and the next step if there is one."""
 
     # What a student can do with it past the interface, and where a fault is seeded.
 
     def watched_data(self) -> type[Data] | None:
-        """The backend's Data whose verbs call `steps` and `forwards`; None: nothing is watched."""
+        """Return the backend's Data whose verbs call `steps` and `forwards`; None: nothing is
+        watched.
+        """
         return None
 
     @mandatory
     @abstractmethod
     def origin(self, raw: Any) -> object:
-        """What an engine's own model and its copies have in common, and no other."""
+        """Return an object that an engine's own model and its copies have in common, and no
+        other.
+        """
 
     def settings(self, raw: Any) -> dict[str, list[float]]:
-        """What of an engine's own model a student can change, by name."""
+        """Return the settings of an engine's own model that a student can change, by name."""
         return {}
 
     @mandatory
     @abstractmethod
     def backend(self) -> ModuleType:
-        """The backend's module, with `compile_file`, `facts` and `edited`, to put a fault in."""
+        """Return the backend's module, with `compile_file`, `facts` and `edited`, to put a fault
+        in.
+        """

@@ -83,18 +83,18 @@ class Dials(ABC):
     words: Mapping[str, str]
 
     def __init__(self, model: Model, emulated: Model) -> None:
-        """Of a Model as it comes, and of its file behind the contract."""
+        """Take a Model as it comes, and that of its file behind the contract."""
         self.model, self.emulated = model, emulated
         self.self_pairs = 0
 
     @property
     @abstractmethod
     def frictions(self) -> Array:
-        """(nsolid,) friction that the engine tells of each body that touches."""
+        """Return the friction (nsolid,) that the engine reports of each body that touches."""
 
     @abstractmethod
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
-        """A Model with some of them turned."""
+        """Return a Model with some of the dials turned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ class ModelDifference:
 
     @property
     def title(self) -> str:
-        """What it is, and of what."""
+        """Return the name of the dial, and what it is of."""
         return f"{self.subject} of {self.where}" if self.where else self.subject
 
 

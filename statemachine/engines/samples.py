@@ -38,17 +38,19 @@ RATE = TORQUE / (MASS * REACH**2 + INERTIA)  # the acceleration of letting go [r
 
 
 def tip_at(angle: float) -> tuple[float, float, float]:
-    """Where the tip is [m]."""
+    """Return where the tip is [m]."""
     return TIP * math.cos(angle), 0.0, -TIP * math.sin(angle)
 
 
 def acceleration(angle: float, torque: float) -> float:
-    """Of the joint under a torque [N·m], without friction [rad/s²]."""
+    """Return the acceleration of the joint under a torque [N·m], without friction [rad/s²]."""
     return RATE * math.cos(angle) + torque / (MASS * REACH**2 + INERTIA)
 
 
 def limp(seconds: float, pieces: int = 20_000) -> float:
-    """The angle to which it falls from rest [rad], by Verlet's method: right to nine digits."""
+    """Return the angle to which the joint falls from rest [rad], by Verlet's method: right to
+    nine digits.
+    """
     angle = speed = 0.0
     h = seconds / pieces
     for _ in range(pieces):
@@ -119,7 +121,7 @@ _TREE_INERTIAL = (
 
 
 def _link(joint: str) -> str:
-    """The link under a joint: its name backwards, whose alphabet is another one."""
+    """Return the link under a joint: its name backwards, whose alphabet is another one."""
     return joint if joint == "base" else joint[::-1]
 
 
@@ -146,7 +148,7 @@ TREE_URDF = (
 
 
 def _mjcf(parent: str) -> str:
-    """The bodies below one, with their joints; a fixed joint is a body without one."""
+    """Return the bodies below one, with their joints; a fixed joint is a body without one."""
     return "".join(
         f'<body name="{name}"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
         + (f'<joint name="{name}"/>' if kind == "hinge" else "")

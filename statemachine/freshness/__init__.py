@@ -28,7 +28,8 @@ __all__ = ["Freshness", "Row", "StaleRead", "Watch", "freshness", "watch_freshne
 
 
 def freshness(model: Model, data: Data) -> Freshness:
-    """Of which moment is each derived array of `data`, and how wrong is it by now?
+    """Return, of each derived array of `data`, which moment it belongs to and how wrong it is by
+    now.
 
     It needs no preparation and changes nothing: what the arrays would be now is computed in
     another Data. An array is of now if `forward` would leave every number of it as it is.

@@ -49,7 +49,7 @@ class Scratch:
         self._now: tuple[State | None, Readings] = None, {}
 
     def now(self, state: State) -> Readings:
-        """All that `forward` would compute in a state."""
+        """Return all that `forward` would compute in a state."""
         if self._now[0] != state:
             set_state(self._model, self._data, state)
             forward(self._model, self._data)
@@ -57,7 +57,7 @@ class Scratch:
         return self._now[1]
 
     def one_step_back(self, state: State) -> Array:
-        """The poses (nbody, 7) of the bodies in the state that a step led to this one from.
+        """Return the poses (nbody, 7) of the bodies in the state from which a step led to this one.
 
         The engines integrate semi-implicitly: the new velocity moves the old position, and
         moves the new one back. The velocity of that state cannot be found so.
@@ -111,7 +111,8 @@ def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
 
 
 def back(model: Model, qpos: Array, qvel: Array, seconds: float) -> Array:
-    """Positions (nq,) that would move to `qpos` in a time, at the velocities `qvel` (nv,).
+    """Return the positions (nq,) that would move to `qpos` in a time, at the velocities `qvel`
+    (nv,).
 
     The inverse of `mj_integratePos`: a quaternion turns about an axis of the body.
     """
@@ -138,5 +139,5 @@ def _poses(values: Mapping[str, Any]) -> Array:
 
 
 def engine_step(model: Model) -> float:
-    """Simulated time of one step of the engine [s]."""
+    """Return the simulated time of one step of the engine [s]."""
     return model.timestep / model.substeps

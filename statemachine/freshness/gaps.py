@@ -15,7 +15,7 @@ from ..rotations import angle_between, matrix_from_quat
 
 
 def gaps(model: Model, name: str, held: Array | Contacts, now: Array | Contacts) -> tuple[Gap, ...]:
-    """How far a derived array is from what it would be now, which is not the same.
+    """Return how far a derived array is from its present value, where the two differ.
 
     Args:
         model: Whose bodies, sites and joints they are.
@@ -35,7 +35,7 @@ def gaps(model: Model, name: str, held: Array | Contacts, now: Array | Contacts)
 
 
 def same(held: Array | Contacts, now: Array | Contacts) -> bool:
-    """Whether two readings are equal in every number."""
+    """Tell whether two readings are equal in every number."""
     if isinstance(held, Contacts) or isinstance(now, Contacts):
         return all(np.array_equal(array, getattr(now, part)) for part, array in vars(held).items())
     return np.array_equal(held, now)
@@ -49,7 +49,8 @@ def _rotated(name: str, held: Array, now: Array, owners: Sequence[str]) -> Gap:
 
 
 def _by_unit(model: Model, name: str, change: Array) -> Iterator[Gap]:
-    """The worst joint in metres and in radians, of what has an entry for each degree of freedom.
+    """Yield the worst joint in metres and in radians, of an array with an entry for each degree of
+    freedom.
 
     The three entries of a free or a ball joint that belong together are one vector.
     """

@@ -69,7 +69,7 @@ class Freshness:
 
     @property
     def stale(self) -> tuple[str, ...]:
-        """Names of the arrays that are not of now."""
+        """Return the names of the arrays that are stale."""
         return tuple(row.name for row in self.rows if not row.now)
 
     def __bool__(self) -> bool:

@@ -59,7 +59,9 @@ class Watch:
 
     @property
     def stale_reads(self) -> tuple[StaleRead, ...]:
-        """What was read while it was stale: by array, line and moment, in order of appearance."""
+        """Return what was read while it was stale: by array, line and moment, in order of
+        appearance.
+        """
         return tuple(self._stale.values())
 
     def __str__(self) -> str:
@@ -96,7 +98,7 @@ class Watch:
 
     @contextmanager
     def aside(self) -> Iterator[None]:
-        """Reads that are not the watched program's."""
+        """Let reads that are not the watched program's go uncounted."""
         before, self._aside = self._aside, True
         try:
             yield
@@ -138,14 +140,14 @@ class Watch:
         self._stale[key] = replace(known, count=known.count + 1, gaps=worst)
 
     def _state(self) -> State | None:
-        """The present state; None where what was written is not a number: there is no now."""
+        """Return the present state; None where an input is not a number, so that there is none."""
         try:
             return get_state(self._model, self._data)
         except BadInputError:
             return None
 
     def begin(self, steps: int | None, never: bool = False, present: bool = False) -> None:
-        """From here on things are counted.
+        """Begin to count.
 
         Args:
             steps: How many steps ago derived values are of.
@@ -159,7 +161,7 @@ class Watch:
         self._writes: dict[str, int] = dict.fromkeys(INPUTS, 0)
 
     def _entries(self) -> Iterator[str]:
-        """Entries of the inputs that are others than when the arrays were computed."""
+        """Yield the entries of the inputs that have changed since the arrays were computed."""
         if self._steps is None:
             return
         for name, before in self._at.items():
@@ -172,7 +174,7 @@ _SLOTS: Mapping[str, Any] = {name: vars(Data)[name] for name in INPUTS}
 
 
 def _after(function: Callable[..., Any], tell: Callable[..., None]) -> Callable[..., Any]:
-    """A function that tells what it gave and was given."""
+    """Return a function that reports its results and arguments."""
 
     def hook(*arguments: Any) -> Any:
         value = function(*arguments)
@@ -183,7 +185,7 @@ def _after(function: Callable[..., Any], tell: Callable[..., None]) -> Callable[
 
 
 def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
-    """A subclass whose instances tell a Watch what is done with them."""
+    """Return a subclass whose instances report to a Watch what is done with them."""
 
     def seen(slot: Any) -> property:
         def get(self: Any) -> Array:
@@ -240,7 +242,7 @@ def _worst(before: tuple[Gap, ...], now: tuple[Gap, ...]) -> tuple[Gap, ...]:
 
 
 def _place() -> str:
-    """File and line of the program that reads."""
+    """Return the file and line of the program that reads."""
     frame: Any = sys._getframe(1)
     while frame is not None and os.path.abspath(frame.f_code.co_filename).startswith(_PACKAGE):
         frame = frame.f_back

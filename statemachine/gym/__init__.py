@@ -17,10 +17,11 @@ from __future__ import annotations
 from importlib.util import find_spec as _find_spec
 
 from ..errors import MissingEngineError as _MissingEngineError
+from ..program import install_command as _install_command
 
 if _find_spec("gymnasium") is None:
     raise _MissingEngineError(
-        "statemachine.gym needs Gymnasium: pip install 'statemachine-sim[gym]'", engine="gymnasium"
+        f"statemachine.gym needs Gymnasium: {_install_command('gym')}", engine="gymnasium"
     )
 
 from .env import RobotEnv, make_env

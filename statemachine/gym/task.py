@@ -53,67 +53,69 @@ class WorldView:
 
     @property
     def time(self) -> float:
-        """Simulated time since the episode began, or that of its keyframe and since [s]."""
+        """Return the simulated time since the episode began, or that of its keyframe and since
+        [s].
+        """
         return float(self._read("time"))
 
     @property
     def qpos(self) -> Array:
-        """Positions (nq,) [rad or m]."""
+        """Return the positions (nq,) [rad or m]."""
         return self._read("qpos")
 
     @property
     def qvel(self) -> Array:
-        """Velocities (nv,) [rad/s or m/s]."""
+        """Return the velocities (nv,) [rad/s or m/s]."""
         return self._read("qvel")
 
     @property
     def ctrl(self) -> Array:
-        """Commands (nu,) of the control step that ended now [unit of the actuator]."""
+        """Return the commands (nu,) of the control step that ended now [unit of the actuator]."""
         return self._read("ctrl")
 
     @property
     def xpos(self) -> Array:
-        """Origins (nbody, 3) of the bodies [m]."""
+        """Return the origins (nbody, 3) of the bodies [m]."""
         return self._read("xpos")
 
     @property
     def xquat(self) -> Array:
-        """Rotations (nbody, 4) of the bodies, wxyz."""
+        """Return the rotations (nbody, 4) of the bodies, wxyz."""
         return self._read("xquat")
 
     @property
     def site_xpos(self) -> Array:
-        """Positions (nsite, 3) of the sites [m]."""
+        """Return the positions (nsite, 3) of the sites [m]."""
         return self._read("site_xpos")
 
     @property
     def site_xmat(self) -> Array:
-        """Rotation matrices (nsite, 9) of the sites, row by row."""
+        """Return the rotation matrices (nsite, 9) of the sites, row by row."""
         return self._read("site_xmat")
 
     @property
     def qacc(self) -> Array:
-        """Accelerations (nv,) [rad/s² or m/s²]."""
+        """Return the accelerations (nv,) [rad/s² or m/s²]."""
         return self._read("qacc")
 
     @property
     def qfrc_bias(self) -> Array:
-        """Coriolis, centrifugal and gravity forces (nv,) [N·m or N]."""
+        """Return the Coriolis, centrifugal and gravity forces (nv,) [N·m or N]."""
         return self._read("qfrc_bias")
 
     @property
     def qfrc_actuator(self) -> Array:
-        """Forces (nv,) of the actuators [N·m or N]."""
+        """Return the forces (nv,) of the actuators [N·m or N]."""
         return self._read("qfrc_actuator")
 
     @property
     def qfrc_passive(self) -> Array:
-        """Forces (nv,) of springs and dampers [N·m or N]."""
+        """Return the forces (nv,) of springs and dampers [N·m or N]."""
         return self._read("qfrc_passive")
 
     @property
     def qfrc_constraint(self) -> Array:
-        """Forces (nv,) of contacts, limits, friction and equalities [N·m or N]."""
+        """Return the forces (nv,) of contacts, limits, friction and equalities [N·m or N]."""
         return self._read("qfrc_constraint")
 
 
@@ -226,7 +228,7 @@ class Task:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """What Gymnasium is told: as many pictures a second as there are control steps."""
+        """Return what Gymnasium is told: as many pictures a second as there are control steps."""
         fps = round(1 / (self.model.timestep * self.frame_skip))
         return {"render_modes": list(RENDER_MODES), "render_fps": max(fps, 1)}
 

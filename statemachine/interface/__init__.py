@@ -10,7 +10,7 @@ A simulator is a state machine. A `Model` never changes; a `Data` holds all that
 - `read_options`: which options act only while a file is read
 - `sites`: which site stands for the fingertip
 - `model`: the constants of a simulation
-- `turns`: one thread at a time
+- `exclusive_access`: one thread at a time
 - `data`: what changes, and what follows from it
 - `verbs`: what a user calls
 """

@@ -29,7 +29,11 @@ _LATE = ("given", "history")  # parts of a State with the commands that are on t
 
 
 def as_count(value: Any, name: str) -> int:
-    """`value` as a whole number of at least 1, or BadInputError."""
+    """Return `value` as a whole number of at least 1.
+
+    Raises:
+        BadInputError: It is none, or too large for a C int.
+    """
     number = whole_number(value)
     if number is None or number < 1:
         raise BadInputError(f"{name} must be a whole number of at least 1; got {shown(value)}")
@@ -39,14 +43,18 @@ def as_count(value: Any, name: str) -> int:
 
 
 def engine_steps(nstep: int, substeps: int) -> int:
-    """The steps that an engine takes in a call, or BadInputError."""
+    """Return how many steps an engine takes in a call.
+
+    Raises:
+        BadInputError: It is more than a C int holds.
+    """
     if nstep * substeps >= 2**31:
         raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
     return nstep * substeps
 
 
 def whole_number(value: Any) -> int | None:
-    """`value` as an int if it is a whole number by type (True is not), else None."""
+    """Return `value` as an int if it is a whole number by type (True is not), else None."""
     if isinstance(value, (bool, np.bool_)):
         return None
     try:
@@ -56,19 +64,31 @@ def whole_number(value: Any) -> int | None:
 
 
 def as_switch(value: Any, name: str) -> bool:
-    """`value` as a bool, or BadInputError."""
+    """Return `value` as a bool.
+
+    Raises:
+        BadInputError: It is neither True nor False.
+    """
     if not isinstance(value, (bool, np.bool_)):
         raise BadInputError(f"{name} must be True or False; got {shown(value)}")
     return bool(value)
 
 
 def as_scalar(value: ArrayLike, name: str) -> float:
-    """`value` as one finite float, or BadInputError."""
+    """Return `value` as one finite float.
+
+    Raises:
+        BadInputError: It is no real number, or not finite.
+    """
     return float(as_vector(value, (), name))
 
 
 def as_vector(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    """`value` as finite float64 of exactly this shape, in a new array, or BadInputError."""
+    """Return `value` as finite float64 of exactly this shape, in a new array.
+
+    Raises:
+        BadInputError: It has another shape, or an entry that is not a finite number.
+    """
     array = as_numbers(value, name)
     if array.shape != shape:
         wanted = f"{math.prod(shape)} numbers, shape {shape}" if shape else "one number"
@@ -79,7 +99,11 @@ def as_vector(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
 
 
 def as_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
-    """`value` as an array of real numbers of whatever shape, or BadInputError."""
+    """Return `value` as an array of real numbers, of any shape.
+
+    Raises:
+        BadInputError: It is a ragged list, or holds something else than real numbers.
+    """
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError) as error:  # a ragged list
@@ -163,14 +187,18 @@ def check_vector(vector: Array, layout: Sizes, model: Any) -> None:
 
 
 def index_of(kind: str, name: str, names: Sequence[str]) -> int:
-    """Place of a name among the names of its kind, or UnknownNameError."""
+    """Return the index of a name among the names of its kind.
+
+    Raises:
+        UnknownNameError: There is no such name.
+    """
     if name and name in names:
         return names.index(name)
     raise unknown_name(kind, name, (known for known in names if known))
 
 
 def kind_of(value: object) -> str:
-    """What a value is, for messages: "a Data" of any backend, else its type."""
+    """Return what a value is, for messages: "a Data" of any backend, else its type."""
     for kind in type(value).__mro__:
         if kind.__module__.startswith("statemachine.interface."):
             return f"a {kind.__name__}"

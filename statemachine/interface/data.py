@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import ClosedDataError, DivergedError, ReadOnlyError, no_attribute
 from .checks import as_scalar, as_vector, check_writable
+from .exclusive_access import Closable, Owner, refuse_other_thread, with_exclusive_access
 from .model import Model
 from .records import INPUTS, MOCAP, Array, Contacts, State, StateLayout, read_only
-from .turns import Closable, Turn, alone, refuse_unless_held
 
 # By name, so that type checkers take the inputs for the descriptors below.
 _WRITABLE = (*INPUTS, *MOCAP)
-_ENGINE = ("_advance", "_raw_model", "_raw", "_warned", "_told")
-_SLOTS = ("__weakref__", "_home", "_turn", "_trouble", "_layout", *_ENGINE, *_WRITABLE)
+_ENGINE = ("_advance", "_raw_model", "_raw", "_pending_warnings", "_seen_warnings")
+_SLOTS = ("__weakref__", "_model", "_owner", "_unusable", "_layout", *_ENGINE, *_WRITABLE)
 
 if TYPE_CHECKING:
 
@@ -45,10 +45,10 @@ if TYPE_CHECKING:
 
 
 def _derived(name: str, says: str) -> _Derived:
-    """A property of a Data: one of its derived arrays, and what is said of it."""
+    """Return a property of Data that reads one of its derived arrays."""
 
     def get(data: Data) -> Array:
-        return alone(data, data._derive, name)
+        return with_exclusive_access(data, data._derive, name)
 
     return cast("_Derived", property(get, doc=says))
 
@@ -85,15 +85,15 @@ class Data(Closable, ABC):
 
     __slots__ = _SLOTS
 
-    _home: Model  # the owner
-    _turn: Turn
-    _trouble: str  # why the Data refuses; "" if it does not
+    _model: Model
+    _owner: Owner
+    _unusable: str  # the reason why it is unusable; "" if it is usable
     _layout: StateLayout  # fingerprint and layout of its States
     _advance: Any  # the engine's own step: (_raw_model, _raw, nstep=1)
     _raw_model: Any  # what that takes; all of `_ENGINE` is None once closed
     _raw: Any
-    _warned: Any  # differs from `_told` when the engine has something to say
-    _told: Any
+    _pending_warnings: Any  # differs from `_seen_warnings` when the engine has something to say
+    _seen_warnings: Any
     if TYPE_CHECKING:
         qpos = InputArray()
         qvel = InputArray()
@@ -106,7 +106,7 @@ class Data(Closable, ABC):
         @property
         @abstractmethod
         def time(self) -> float:
-            """Simulated time [s]; may be assigned to."""
+            """Return the simulated time [s]; it may be assigned to."""
 
     def __init__(
         self,
@@ -125,21 +125,21 @@ class Data(Closable, ABC):
             inputs: The arrays qpos, qvel, ctrl, mocap_pos and mocap_quat, the same for the whole
                 life.
             warnings: Two things of the engine's; when they differ after a step, the verb
-                calls `_attend`.
+                calls `_raise_pending_warnings`.
             engine: The engine's model and data, or whatever `advance` takes first.
         """
-        self._home, self._advance = model, advance
-        self._turn = Turn(self)
+        self._model, self._advance = model, advance
+        self._owner = Owner(self)
         self._raw_model, self._raw = engine
-        self._warned, self._told = warnings
+        self._pending_warnings, self._seen_warnings = warnings
         for name in _WRITABLE:
             super().__setattr__(name, inputs[name])
-        self._recover()
+        self._make_usable()
 
     @property
     @abstractmethod
     def raw(self) -> Any:
-        """The engine's own object, for what this interface does not offer."""
+        """Return the engine's own object, for what this interface does not offer."""
 
     xpos = _derived("xpos", "(nbody, 3) body origins in world axes [m].")
     xquat = _derived("xquat", "(nbody, 4) body orientations, wxyz.")
@@ -165,16 +165,16 @@ class Data(Closable, ABC):
 
     @property
     def contacts(self) -> Contacts:
-        """The contacts; see `Contacts`."""
-        return alone(self, self._derive, "contacts")
+        """Return the contacts of the state that derived values belong to; see `Contacts`."""
+        return with_exclusive_access(self, self._derive, "contacts")
 
     @property
     def model(self) -> Model:
-        """The Model that made this Data."""
-        return self._home
+        """Return the Model that made this Data."""
+        return self._model
 
-    def _shut(self) -> None:
-        self._give_up("closed")
+    def _close_once(self) -> None:
+        self._make_unusable("closed")
         for name in _WRITABLE:
             # The last values stay readable, apart from the engine's memory, which a view
             # would keep alive; a view that the caller kept can no longer be written into.
@@ -187,15 +187,15 @@ class Data(Closable, ABC):
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in _WRITABLE:
-            self._refuse_if_troubled()
+            self._refuse_if_unusable()
             self._check_writable()
             target = getattr(self, name)
             checked = as_vector(value, target.shape, name)
             if name == "qpos":
-                self._home._check_quaternions(checked)
+                self._model._check_quaternions(checked)
             target[:] = checked
         elif name == "time":
-            self._refuse_if_troubled()
+            self._refuse_if_unusable()
             self._set_time(as_scalar(value, "time"))
         elif name.startswith("_"):  # what a backend keeps, and Python its class
             super().__setattr__(name, value)
@@ -217,31 +217,33 @@ class Data(Closable, ABC):
         raise TypeError("a Data is a live simulation: copy or pickle get_state(model, data)")
 
     def __repr__(self) -> str:
-        if self._trouble:
-            return f"<Data of {self._home!r}: {self._trouble}>"
-        return f"<Data of {self._home!r} at {self.time:g} s>"
+        if self._unusable:
+            return f"<Data of {self._model!r}: {self._unusable}>"
+        return f"<Data of {self._model!r} at {self.time:g} s>"
 
-    def _refuse_if_troubled(self) -> None:
-        if self._trouble == "closed":
+    def _refuse_if_unusable(self) -> None:
+        if self._unusable == "closed":
             raise ClosedDataError("this Data is closed: make another with make_data")
-        if self._trouble and not hasattr(self._turn, "free"):
-            refuse_unless_held(self)  # or another thread is in the middle of a reset
-        if why := self._trouble:
-            raise DivergedError(f"this Data is not usable any more ({why}): reset it, or set_state")
+        if self._unusable:
+            refuse_other_thread(self)  # which may be in the middle of a reset
+        if reason := self._unusable:
+            raise DivergedError(
+                f"this Data is not usable any more ({reason}): reset it, or set_state"
+            )
 
     def _check_writable(self) -> None:
         """Raise ReadOnlyError where the caller made an input read-only."""
         for name in _WRITABLE:
             check_writable(getattr(self, name), name)
 
-    def _give_up(self, why: str) -> None:
+    def _make_unusable(self, why: str) -> None:
         """Refuse everything but `reset` and `set_state`, once the verb that runs has ended."""
-        self._trouble = why
+        self._unusable = why
 
-    def _recover(self) -> None:
-        self._trouble = ""
+    def _make_usable(self) -> None:
+        self._unusable = ""
 
-    def _attend(self) -> None:
+    def _raise_pending_warnings(self) -> None:
         """Raise, or pass on, what the engine warned of since the last time."""
 
     def _failed(self, error: Exception) -> None:
@@ -249,7 +251,7 @@ class Data(Closable, ABC):
 
     @abstractmethod
     def _derive(self, name: str) -> Any:
-        """A read-only array of `records.DERIVED`, or Contacts; not called while it refuses."""
+        """Return a read-only array of `records.DERIVED`, or Contacts; `data` is usable."""
 
     @abstractmethod
     def _recompute(self) -> None: ...

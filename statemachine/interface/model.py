@@ -163,7 +163,7 @@ class Model(ABC):
 
     @property
     def compiled(self) -> Any:
-        """The mjModel that the file was compiled to, where the backend starts from one.
+        """Return the mjModel that the file was compiled to, where the backend starts from one.
 
         It is not to be written to. None where there is none.
         """
@@ -171,34 +171,34 @@ class Model(ABC):
 
     @property
     def moving_sites(self) -> tuple[bool, ...]:
-        """Whether joints move each site."""
+        """Tell of each site whether joints move it."""
         from .sites import moving_sites
 
         parents, jointed = self.body_parentid.tolist(), self.jnt_bodyid.tolist()
         return moving_sites(self.site_bodyid.tolist(), parents, jointed)
 
     def body_id(self, name: str) -> int:
-        """Id of a body."""
+        """Return the id of a body, its row in `xpos` and `xquat`."""
         return index_of("body", name, self.body_names)
 
     def joint_id(self, name: str) -> int:
-        """Id of a joint; its address in qpos is `jnt_qposadr[id]`."""
+        """Return the id of a joint; its address in qpos is `jnt_qposadr[id]`."""
         return index_of("joint", name, self.joint_names)
 
     def site_id(self, name: str) -> int:
-        """Id of a site."""
+        """Return the id of a site, its row in `site_xpos` and `site_xmat`."""
         return index_of("site", name, self.site_names)
 
     def geom_id(self, name: str) -> int:
-        """Id of a geom."""
+        """Return the id of a geom, as in `Contacts.geoms`."""
         return index_of("geom", name, self.geom_names)
 
     def actuator_id(self, name: str) -> int:
-        """Id of an actuator, its place in ctrl."""
+        """Return the id of an actuator, its index in ctrl."""
         return index_of("actuator", name, self.actuator_names)
 
     def key_id(self, key: int | str) -> int:
-        """Number of a keyframe, given by number or name.
+        """Return the number of a keyframe, given by its number or name.
 
         Raises:
             UnknownNameError: There is no such keyframe.
@@ -212,7 +212,7 @@ class Model(ABC):
         return number
 
     def replace(self, **options: Any) -> Model:
-        """Another Model that differs in the named options; this one stays as it is.
+        """Return another Model that differs in the named options; this one stays as it is.
 
         Args:
             **options: Some of
@@ -246,12 +246,12 @@ class Model(ABC):
 
             options = without_read_options(self, options)
         checked = checked_options(self, options)
-        replaced = self._replace(checked)._started_as(self, checked)
+        replaced = self._replace(checked)._inherit_start(self, checked)
         vars(replaced)["options"] = {**self.options, **deepcopy(options)}
         return replaced
 
     def with_compiled(self, compiled: Any) -> Model:
-        """Another Model of the same engine and file, from another compiled model.
+        """Return another Model of the same engine and file, made from another compiled model.
 
         Args:
             compiled: An edited copy of `compiled`; its timestep is that of an engine step.
@@ -262,8 +262,8 @@ class Model(ABC):
         """
         raise unsupported(self, "compiled", "it does not start from a compiled model")
 
-    def _started_as(self, before: Model, options: Mapping[str, Any]) -> Self:
-        """Itself, made of another Model by some options: how it starts and was read is told on."""
+    def _inherit_start(self, before: Model, options: Mapping[str, Any]) -> Self:
+        """Take over the start and the read options of the Model that this one was made from."""
         vars(self)["_holds_start"] = before._holds_start or "latency" in options
         for name in ("read_options", "defaults", "options"):
             vars(self)[name] = getattr(before, name)
@@ -277,14 +277,14 @@ class Model(ABC):
                 raise self._zero_quaternion(joint, start)
 
     def _zero_quaternion(self, joint: int, start: int) -> BadInputError:
-        """The error for a quaternion of a joint that is not a rotation."""
+        """Return the error for a quaternion of a joint that is not a rotation."""
         return BadInputError(
             f"qpos[{start}:{start + 4}], the quaternion of joint {self.joint_names[joint]!r}, "
             "is zero: it names no rotation; the identity is 1 0 0 0"
         )
 
     def _coordinate_name(self, array: str, index: int) -> str:
-        """' (elbow_flex)' for an entry of qpos, qvel, qacc or ctrl; '' if it has no name."""
+        """Return ' (elbow_flex)' for an entry of qpos, qvel, qacc or ctrl; '' if it has no name."""
         label = ""
         if array == "ctrl":
             label = self.actuator_names[index]
@@ -294,14 +294,14 @@ class Model(ABC):
         return f" ({label})" if label else ""
 
     def _acting(self, name: str, array: Array) -> Array:
-        """What acts of an input: of ctrl (…, nu) each number within its range, if infinite too."""
+        """Return an input as it acts: each number of ctrl (…, nu) clamped to its range."""
         if name != "ctrl" or not self._clamps:
             return array
         low, high = self.actuator_ctrlrange.T
         return np.minimum(np.maximum(array, low), high)
 
     def _with_fingerprint(self, layout: Sizes) -> StateLayout:
-        """The layout of this Model's States, after a digest of it and of what it belongs to."""
+        """Return the layout of this Model's States, preceded by their fingerprint."""
         identity = (
             self.backend,
             layout,
@@ -314,12 +314,12 @@ class Model(ABC):
 
     @abstractmethod
     def _make_data(self) -> Any:
-        """A new Data of this Model."""
+        """Return a new Data of this Model."""
 
     def _make_worlds(
         self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
     ) -> Any:
-        """`Worlds` of the engine's own way, or None where it has none.
+        """Return `Worlds` of the engine's own, or None where it has none.
 
         Args:
             n: Number of worlds.
@@ -331,7 +331,7 @@ class Model(ABC):
 
     @abstractmethod
     def _replace(self, options: dict[str, Any]) -> Model:
-        """Another Model; `options` are checked: bools, floats and arrays of whole length."""
+        """Return another Model; `options` are checked: bools, floats and arrays of full length."""
 
 
 def _quaternions(types: Ints, addresses: Ints) -> list[tuple[int, int]]:

@@ -34,7 +34,7 @@ DERIVED = (*POSES, "qacc", *FORCES, *PARTS)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """A read-only copy of an array."""
+    """Return a read-only copy of an array."""
     copy = np.array(array)
     copy.setflags(write=False)
     return copy
@@ -50,12 +50,12 @@ class JointType(IntEnum):
 
     @property
     def nq(self) -> int:
-        """Numbers that a joint of this type has in qpos."""
+        """Return how many numbers a joint of this type has in qpos."""
         return {JointType.FREE: 7, JointType.BALL: 4}.get(self, 1)
 
     @property
     def nv(self) -> int:
-        """Numbers that it has in qvel."""
+        """Return how many numbers a joint of this type has in qvel."""
         return {JointType.FREE: 6, JointType.BALL: 3}.get(self, 1)
 
 
@@ -262,7 +262,7 @@ class State:
 
     @property
     def vector(self) -> Array:
-        """All parts in one read-only array."""
+        """Return all parts in one read-only array."""
         return np.frombuffer(self.blob, dtype=np.float64)
 
     def __getitem__(self, part: str) -> Array:
@@ -274,11 +274,11 @@ class State:
         raise unknown_name("part of the State", part, (name for name, _ in self.layout))
 
     def with_parts(self, **parts: Array) -> State:
-        """The same with some parts in place of its own; what it has no part for is left out."""
+        """Return this State with some parts replaced; a part that it does not have is ignored."""
         arrays = [parts.get(name, self[name]) for name, _ in self.layout]
         return replace(self, blob=np.concatenate(arrays, dtype=np.float64).tobytes())
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """Return the simulated time [s]."""
         return float(self["time"][0])

@@ -8,20 +8,21 @@ interrupts it finds the Data as it was, or as it was to be, or refusing.
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import get_ident
 from typing import Any
 
 from ..errors import BadInputError, ForeignDataError
 from .checks import as_count, check_entries, check_state, kind_of
 from .data import Data
+from .exclusive_access import with_exclusive_access
 from .model import Model
 from .records import INPUTS, MOCAP, State
-from .turns import HOLDERS, alone
 
 _ONE = 1
 
 
 def make_data(model: Model) -> Data:
-    """A new Data of `model`, at its zero or default pose; nothing derived yet.
+    """Return a new Data of `model`, at its zero or default pose; nothing is derived yet.
 
     Raises:
         TypeError: `model` is not a Model.
@@ -55,40 +56,37 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         EngineError: The engine gave up.
         ClosedDataError: `data` is closed.
     """
+    me = get_ident()
     held = False
-    try:  # as `alone`, but in line, which is faster
-        turn = data._turn
-        if turn.free is model: del turn.free; held = True  # fmt: skip  # noqa: E701, E702
+    try:  # as `with_exclusive_access`, but in line, which is faster
+        owner = data._owner
+        if data._model is model and not data._unusable:  # noqa: SIM102
+            if not owner.thread: owner.thread = me; held = True  # fmt: skip  # noqa: E701, E702
         if held:
             if nstep is _ONE:  # by identity, which True and 1.0 do not pass
                 data._advance(data._raw_model, data._raw)
             else:
                 nstep = as_count(nstep, "nstep")
                 data._advance(data._raw_model, data._raw, nstep)
-            if data._warned != data._told:
-                data._attend()
-            held = False; turn.free = data._trouble or model  # fmt: skip  # noqa: E702
+            if data._pending_warnings != data._seen_warnings:
+                data._raise_pending_warnings()
             return
-    except BaseException as error:
+    except Exception as error:
         if held:
-            try:
-                if isinstance(error, Exception):
-                    data._failed(error)
-            finally:
-                turn.free = data._trouble or model  # pyright: ignore[reportPossiblyUnboundVariable]
+            data._failed(error)
             raise
         if not isinstance(error, AttributeError):
             raise
+    finally:
+        if held:
+            owner.thread = 0  # pyright: ignore[reportPossiblyUnboundVariable]
     _admit(model, data)
-    alone(data, _step, data, as_count(nstep, "nstep"))
+    with_exclusive_access(data, _step, data, as_count(nstep, "nstep"))
 
 
 def _step(data: Data, nstep: int) -> None:
     data._advance(data._raw_model, data._raw, nstep)
-    data._attend()
-
-
-HOLDERS.add(step.__code__)
+    data._raise_pending_warnings()
 
 
 def forward(model: Model, data: Data) -> None:
@@ -106,7 +104,7 @@ def forward(model: Model, data: Data) -> None:
         ClosedDataError: `data` is closed.
     """
     _admit(model, data)
-    alone(data, _forward, model, data)
+    with_exclusive_access(data, _forward, model, data)
 
 
 def _forward(model: Model, data: Data) -> None:
@@ -131,11 +129,11 @@ def reset(model: Model, data: Data, keyframe: int | str | None = None) -> None:
     """
     _admit(model, data)
     key = None if keyframe is None else model.key_id(keyframe)
-    alone(data, _overwrite, data, "reset", data._reset, key, even_troubled=True)
+    with_exclusive_access(data, _overwrite, data, "reset", data._reset, key, even_unusable=True)
 
 
 def get_state(model: Model, data: Data) -> State:
-    """A copy of what the engine exposes of all that decides the future of `data`.
+    """Return a copy of what the engine exposes of all that decides the future of `data`.
 
     Two restores of one State have the same future, bit for bit; where the record says
     `exact_restore`, it is also the future of `data` itself.
@@ -148,7 +146,7 @@ def get_state(model: Model, data: Data) -> State:
         ClosedDataError: `data` is closed.
     """
     _admit(model, data)
-    return alone(data, _get_state, model, data)
+    return with_exclusive_access(data, _get_state, model, data)
 
 
 def _get_state(model: Model, data: Data) -> State:
@@ -171,20 +169,22 @@ def set_state(model: Model, data: Data, state: State) -> None:
     """
     _admit(model, data)
     check_state(state, model, *data._layout)
-    alone(data, _overwrite, data, "set_state", data._set_state, state, even_troubled=True)
+    with_exclusive_access(
+        data, _overwrite, data, "set_state", data._set_state, state, even_unusable=True
+    )
 
 
 def _overwrite(data: Data, verb: str, change: Callable[[Any], None], to: Any) -> None:
     """Change the whole state: between the beginning and the end, the Data refuses."""
     data._check_writable()
-    before = data._trouble
-    data._give_up(f"{verb} was interrupted")
+    before = data._unusable
+    data._make_unusable(f"{verb} was interrupted")
     try:
         change(to)
     except BadInputError:  # raised before anything is changed
-        data._give_up(before)
+        data._make_unusable(before)
         raise
-    data._recover()
+    data._make_usable()
 
 
 def _check_inputs(model: Model, data: Data) -> None:
@@ -200,10 +200,10 @@ def _admit(model: Model, data: Data) -> None:
             "the first two arguments are a Model and a Data; "
             f"got {kind_of(model)} and {kind_of(data)}"
         )
-    if data._home is not model:
+    if data._model is not model:
         from .told_apart import told_apart
 
-        maker, other = told_apart(data._home, model)
+        maker, other = told_apart(data._model, model)
         raise ForeignDataError(
             f"this Data was made by {maker}, and is used with {other}: a Data belongs to the Model "
             "that made it; a State moves between them"

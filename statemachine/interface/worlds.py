@@ -20,6 +20,7 @@ from ..errors import (
 )
 from ..processes import free_memory
 from .checks import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable, whole_number
+from .exclusive_access import Closable, Owner
 from .model import Model
 from .records import (
     FORCES,
@@ -33,7 +34,6 @@ from .records import (
     StateLayout,
     read_only,
 )
-from .turns import Closable, Turn
 
 if TYPE_CHECKING:
     from .data import InputArray
@@ -44,7 +44,7 @@ _SPARE = 0.95  # of the memory that is free, what worlds may take
 
 
 def without(ids: Ints, ended: Collection[int]) -> Ints:
-    """Numbers of worlds, less those that have ended."""
+    """Return the numbers of worlds, less those that have ended."""
     return ids[~np.isin(ids, list(ended))] if ended else ids
 
 
@@ -81,9 +81,9 @@ class Worlds(Closable, ABC):
     _errors: Errors
     _numbers: Ints
     _process: int
-    _home: Model
-    _turn: Turn
-    _trouble: str
+    _model: Model
+    _owner: Owner
+    _unusable: str
     if TYPE_CHECKING:
         qpos = InputArray()
         qvel = InputArray()
@@ -131,31 +131,31 @@ class Worlds(Closable, ABC):
             _errors={},
             _numbers=np.arange(n),
             _process=os.getpid(),
-            # What `alone` asks of what it guards, as of a Data.
-            _home=model,
-            _trouble="",
+            # What `with_exclusive_access` asks of what it guards, as of a Data.
+            _model=model,
+            _unusable="",
         )
-        self._turn = Turn(self)
+        self._owner = Owner(self)
 
     @property
     def diverged(self) -> Mapping[int, Exception]:
-        """The error of each world that is left out, by its number."""
+        """Return the error of each world that is left out, by its number."""
         return MappingProxyType(self._errors)
 
     def model_of(self, world: int) -> Model:
-        """The Model of one world: `model`, with the options that were given for this world.
+        """Return the Model of one world: `model`, with the options that were given for this world.
 
         Raises:
             BadInputError: There is no such world.
             ClosedDataError: The Worlds are closed.
         """
-        self._refuse_if_troubled()
+        self._refuse_if_unusable()
         return self._model_of(self._world(world))
 
-    def _shut(self) -> None:
+    def _close_once(self) -> None:
         # Copies: a view would keep the memory of the engine alive, or outlive it.
         own = vars(self)
-        own["_trouble"] = "closed"
+        own["_unusable"] = "closed"
         for name in self.derived:
             own.pop(name, None)
         for name in WRITABLE:
@@ -172,7 +172,7 @@ class Worlds(Closable, ABC):
 
     @abstractmethod
     def _model_of(self, world: int) -> Model:
-        """The Model of a world that there is."""
+        """Return the Model of a world that exists."""
 
     @abstractmethod
     def _close(self) -> None:
@@ -195,7 +195,7 @@ class Worlds(Closable, ABC):
 
     @abstractmethod
     def _get_states(self, ids: Ints) -> list[State]:
-        """The States of these worlds, of checked inputs."""
+        """Return the States of these worlds, whose inputs are checked."""
 
     @abstractmethod
     def _set_states(self, ids: Ints, states: Sequence[State]) -> None:
@@ -203,7 +203,7 @@ class Worlds(Closable, ABC):
 
     @abstractmethod
     def _state_layout(self, world: int) -> StateLayout:
-        """Fingerprint and layout of the States of one world, as a Data of its Model has them."""
+        """Return the fingerprint and layout of the States of one world."""
 
     @abstractmethod
     def _record(
@@ -224,12 +224,12 @@ class Worlds(Closable, ABC):
     def _failed(self, error: Exception) -> None:
         """Raise what `error`, out of a hook, means for all worlds, if it means more."""
 
-    def _refuse_if_troubled(self) -> None:
-        if self._trouble:
+    def _refuse_if_unusable(self) -> None:
+        if self._unusable:
             raise ClosedDataError("these Worlds are closed: make others with make_worlds")
 
     def _world(self, world: int) -> int:
-        """The number of one world, or BadInputError."""
+        """Return the number of one world."""
         number = whole_number(world)
         if number is None or not 0 <= number < self.n:
             raise BadInputError(f"there is no world {shown(world)}: they are 0 to {self.n - 1}")
@@ -249,7 +249,7 @@ class Worlds(Closable, ABC):
             raise error
 
     def _zero_quaternions(self, qpos: Array, ids: Ints) -> dict[int, BadInputError]:
-        """The error of each world whose row of `qpos` (len(ids), nq) has a zero quaternion."""
+        """Return the error of each world whose `qpos`, (len(ids), nq), has a zero quaternion."""
         errors: dict[int, BadInputError] = {}
         for joint, start in self.model._quaternions:
             quats = qpos[:, start : start + 4]
@@ -261,8 +261,8 @@ class Worlds(Closable, ABC):
         return errors
 
     def __getattr__(self, name: str) -> Any:  # only for what is not there
-        if name in BATCHED and "_trouble" in vars(self):
-            self._refuse_if_troubled()
+        if name in BATCHED and "_unusable" in vars(self):
+            self._refuse_if_unusable()
             raise AttributeError(
                 f"these Worlds do not keep {name!r}: name it in make_worlds(…, derived=…)"
             )
@@ -272,7 +272,7 @@ class Worlds(Closable, ABC):
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in WRITABLE:
-            self._refuse_if_troubled()
+            self._refuse_if_unusable()
             for array in WRITABLE:
                 check_writable(getattr(self, array), array, "worlds")
             target = getattr(self, name)
@@ -298,7 +298,7 @@ class Worlds(Closable, ABC):
         return self.n
 
     def __repr__(self) -> str:
-        about = self._trouble or (f"{len(self._errors)} diverged" if self._errors else "")
+        about = self._unusable or (f"{len(self._errors)} diverged" if self._errors else "")
         return f"<Worlds: {self.n} of {self.model!r}{about and f': {about}'}>"
 
     def __reduce__(self) -> NoReturn:
@@ -306,7 +306,7 @@ class Worlds(Closable, ABC):
 
 
 def in_world(world: int, error: StateMachineError) -> Any:
-    """The same error, saying which of many worlds it is of."""
+    """Return the same error, with the number of its world."""
     return type(error)(f"world {world}: {error}", **{**vars(error), "world": world})
 
 

@@ -29,7 +29,7 @@ class ContactNames:
         geom_bodyid: Sequence[int],
         body_parentid: Sequence[int],
     ) -> None:
-        """Of names by id, "" for none; the body of each geom, and the parent of each body."""
+        """Take names by id, "" for none; the body of each geom, and the parent of each body."""
         self._bodies = [name or f"body {k}" for k, name in enumerate(bodies)]
         self._geoms = list(geoms)
         self._body_of = [int(body) for body in geom_bodyid]
@@ -38,7 +38,7 @@ class ContactNames:
 
     @classmethod
     def of(cls, model: Model) -> ContactNames:
-        """The names of a Model, made once."""
+        """Return the names of a Model, which are made once."""
         if model not in _OF:
             _OF[model] = cls(
                 model.body_names,
@@ -49,15 +49,15 @@ class ContactNames:
         return _OF[model]
 
     def pair(self, left: int, right: int) -> str:
-        """The bodies of two geoms that touch: "gripper on floor"."""
+        """Return the names of the bodies of two geoms in contact: "gripper on floor"."""
         return self._names(left, right)[0]
 
     def geoms(self, left: int, right: int) -> str:
-        """The same, and which of a body's geoms it is: "gripper on floor (fixed_stud_1)"."""
+        """Return those of the bodies and of the geoms: "gripper on floor (fixed_stud_1)"."""
         return self._names(left, right)[1]
 
     def _names(self, left: int, right: int) -> tuple[str, str]:
-        """Both, worked out once: a contact lasts for many steps."""
+        """Return both texts, which are cached: a contact lasts for many steps."""
         if (left, right) not in self._pairs:
             upper, lower = sorted((left, right), key=self._distance, reverse=True)
             pair = f"{self._owner(upper)} on {self._owner(lower)}"
@@ -91,7 +91,7 @@ _OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
 
 
 def together(contacts: Iterable[str]) -> str:
-    """Contacts in a list, the geoms of one pair of bodies behind it: "a on b (c, d), e on f"."""
+    """List contacts, the geoms of a pair of bodies in brackets: "a on b (c, d), e on f"."""
     parts = (contact.partition(" (") for contact in contacts)
     geoms = grouped((pair, shapes.removesuffix(")")) for pair, _, shapes in parts)
     pairs = []
@@ -102,7 +102,9 @@ def together(contacts: Iterable[str]) -> str:
 
 
 def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
-    """Shapes inside each other by more than 1 mm, the deepest first: "gripper on box by 151 mm".
+    """List shapes inside each other by more than 1 mm: "gripper on box by 151 mm".
+
+    The deepest comes first.
 
     Args:
         names: What contacts are called.
@@ -119,7 +121,7 @@ def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
 
 
 def same_pairs(left: Mapping[str, _T], right: Mapping[str, _T]) -> dict[str, _T]:
-    """What `right` has by pair of bodies, the pairs called as in `left`.
+    """Return the entries of `right` by pair of bodies, each pair named as in `left`.
 
     Two models may number the same bodies in another order.
     """

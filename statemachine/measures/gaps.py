@@ -30,7 +30,7 @@ class Gap:
 
     @classmethod
     def of(cls, sizes: Array, unit: str, names: Sequence[str]) -> Gap:
-        """The largest of some sizes (n,) [unit], which are of what the names say."""
+        """Return the largest of some sizes (n,) [unit], with its name."""
         size, place = largest(sizes)
         return cls(size, unit, names[place])
 
@@ -71,7 +71,7 @@ class Deviation:
 
     @classmethod
     def of(cls, sizes: Array, time: Array, unit: str) -> Deviation:
-        """Of distances (n,) [unit] at moments (n,) [s]."""
+        """Return the deviation of distances (n,) [unit] at moments (n,) [s]."""
         worst, row = largest(sizes)
         rms = float(np.sqrt(np.mean(sizes**2)))
         return cls(unit, worst, float(time[row]), rms, float(sizes[-1]))
@@ -95,7 +95,7 @@ class JointPlaces:
 
     @classmethod
     def of(cls, types: Sequence[int] | Ints, addresses: Sequence[int] | Ints) -> JointPlaces:
-        """Of joints (n,) by their `JointType` and their place in qpos."""
+        """Return the addresses of joints (n,) of each `JointType` in qpos."""
         kinds, places = np.asarray(types), np.asarray(addresses, dtype=np.int64)
         of = {kind: places[kinds == int(kind)] for kind in JointType}
         hinges, slides = of[JointType.HINGE], of[JointType.SLIDE]

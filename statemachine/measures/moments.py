@@ -29,7 +29,7 @@ class Common:
 
 
 def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Common:
-    """Rows of the same moment: nothing is interpolated.
+    """Return the rows of the same moments in two runs: nothing is interpolated.
 
     Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
 
@@ -55,14 +55,14 @@ def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Com
 
 
 def nearest(time: Array, wanted: Array) -> Ints:
-    """The row of the time (n,), ascending, that is nearest to each that is wanted (k,)."""
+    """Return the row of the ascending times (n,) that is nearest to each wanted one (k,)."""
     near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
     near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
     return near
 
 
 def at_moments(time: Array, values: Array, wanted: Array, slack: float) -> Array:
-    """Values (n, k) of ascending moments (n,) at others (m,).
+    """Return the values (n, k) of ascending moments (n,) at other moments (m,).
 
     Those of the run itself where it has the moment, to within `slack` [s]; else on the line
     between two of them.

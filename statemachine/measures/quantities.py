@@ -273,7 +273,7 @@ _SUFFIXES = (
 
 
 def amount(text: str) -> tuple[float, str]:
-    """A size above zero [SI] and its SI unit, of words like "0.5deg"; NaN for other words."""
+    """Parse a size above zero like "0.5deg": value [SI] and SI unit; NaN for other words."""
     for suffix, factor, unit in _SUFFIXES:
         if text.endswith(suffix):
             try:
@@ -285,7 +285,7 @@ def amount(text: str) -> tuple[float, str]:
 
 
 def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
-    """Tolerances [SI] by kind, from words like "joint=0.5deg", "tip=2mm", "energy=0.01J".
+    """Parse tolerances like "joint=0.5deg", "tip=2mm", "energy=0.01J": [SI] by kind.
 
     Raises:
         BadInputError: A word is invalid.
@@ -311,7 +311,7 @@ Readings = Mapping[str, "Array | Contacts"]
 
 
 def readings(data: Data, copied: bool = False) -> dict[str, Array | Contacts]:
-    """Everything derived that the backend of a Data yields: arrays by name, and "contacts".
+    """Return all derived arrays that the backend of a Data can compute, by name, and "contacts".
 
     Args:
         data: Read, and not touched.

@@ -17,18 +17,18 @@ _READ = {"rad": (180.0 / math.pi, "°"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 
 
 def reading(unit: str) -> tuple[float, str]:
-    """From an SI unit to the one that is read: the factor, and the unit as it follows a figure."""
+    """Return the factor from an SI unit to the one that is read, and that unit behind a figure."""
     factor, name = _READ.get(unit, (1.0, unit))
     return factor, after(name)
 
 
 def after(unit: str) -> str:
-    """A unit as it follows a figure: " mm", "°"."""
+    """Return a unit as it follows a figure: " mm", "°"."""
     return unit if unit in ("", "°") else f" {unit}"
 
 
 def quantity(value: float | None, unit: str) -> str:
-    """A value [SI unit] with three significant digits, in the unit that is read."""
+    """Format a value [SI unit] with three significant digits, in the unit that is read."""
     if value is None:
         return NONE
     if math.isnan(value):
@@ -38,19 +38,19 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def rounded(value: float, unit: str, digits: int = 3) -> str:
-    """A value [SI unit] to some significant digits, without zeros at the end."""
+    """Format a value [SI unit] with some significant digits, without zeros at the end."""
     factor, name = reading(unit)
     return f"{significant(value * factor, digits)}{name}"
 
 
 def distance(size: float, unit: str, digits: int = 3) -> str:
-    """The same of a size; what is below a millionth is only called so."""
+    """Format a size as `rounded` does; what is below a millionth is only called so."""
     factor, name = reading(unit)
     return rounded(size, unit, digits) if size * factor >= TINY else f"below {TINY:g}{name}"
 
 
 def rough(value: float, unit: str = "") -> str:
-    """A size [SI unit] to two digits, or its order of magnitude where it is tiny."""
+    """Format a size [SI unit] with two digits, or its order of magnitude where it is tiny."""
     factor, name = reading(unit)
     value *= factor
     if not math.isfinite(value):
@@ -61,7 +61,7 @@ def rough(value: float, unit: str = "") -> str:
 
 
 def figure(value: float) -> str:
-    """A number with three significant digits; tiny ones with their power of ten."""
+    """Format a number with three significant digits; tiny ones with their power of ten."""
     if not math.isfinite(value):
         return "no number" if math.isnan(value) else str(value)
     size = abs(value)
@@ -72,18 +72,18 @@ def figure(value: float) -> str:
 
 
 def significant(value: float, digits: int = 4) -> str:
-    """A number to some significant digits, without a power of ten below a million."""
+    """Format a number with some significant digits, without a power of ten below a million."""
     text = f"{value:z.{digits}g}"
     return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e6 else text
 
 
 def fixed(value: float, decimals: int) -> str:
-    """A number to some decimals; what rounds to zero has no sign."""
+    """Format a number with some decimals; what rounds to zero has no sign."""
     return f"{value:z.{decimals}f}"
 
 
 def signed(value: float | None, decimals: int = 4) -> str:
-    """A number with its sign; what rounds to zero has none."""
+    """Format a number with its sign; what rounds to zero has none."""
     if value is None:
         return NONE
     text = f"{value:+.{decimals}f}"
@@ -91,47 +91,47 @@ def signed(value: float | None, decimals: int = 4) -> str:
 
 
 def vector(values: Iterable[float], decimals: int = 4) -> str:
-    """Components in brackets; what rounds to zero has no sign."""
+    """Format components in brackets; what rounds to zero has no sign."""
     return "[" + " ".join(fixed(float(value), decimals) for value in values) + "]"
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers in a row, as short as they are exact to six digits."""
+    """Format numbers in a row, as short as they are exact to six digits."""
     return " ".join(f"{value:g}" for value in values)
 
 
 def apart(size: float, slide: bool) -> str:
-    """A difference of a joint's positions [rad; of a slide, m]."""
+    """Format a difference of a joint's positions [rad; of a slide, m]."""
     return distance(size, "m" if slide else "rad", 2)
 
 
 def degrees(radians: float, decimals: int = 2) -> str:
-    """An angle in degrees."""
+    """Format an angle [rad] in degrees."""
     return f"{fixed(math.degrees(radians), decimals)}°"
 
 
 def millimetres(metres: float, decimals: int = 2) -> str:
-    """A length in millimetres."""
+    """Format a length [m] in millimetres."""
     return f"{fixed(metres * 1e3, decimals)} mm"
 
 
 def position(value: float, slide: bool, decimals: int = 2) -> str:
-    """A joint's position: a hinge's [rad] in degrees, a slide's [m] in millimetres."""
+    """Format a joint's position: a hinge's [rad] in degrees, a slide's [m] in millimetres."""
     return millimetres(value, decimals) if slide else degrees(value, decimals)
 
 
 def milliseconds(seconds: float, digits: int = 4) -> str:
-    """A timestep, to some significant digits."""
+    """Format a timestep [s] in milliseconds, to some significant digits."""
     return f"{significant(1000 * seconds, digits)} ms"
 
 
 def short_time(seconds: float) -> str:
-    """A time of a run, to the millisecond."""
+    """Format a time of a run [s], to the millisecond."""
     return f"{seconds:.3f} s"
 
 
 def duration(seconds: float) -> str:
-    """A wall time in the unit that reads best."""
+    """Format a wall time [s] in the unit that reads best."""
     for factor, unit in ((1e6, "µs"), (1e3, "ms")):
         if seconds * factor < 1000:
             return f"{seconds * factor:.3g} {unit}"
@@ -139,7 +139,7 @@ def duration(seconds: float) -> str:
 
 
 def percent(part: float | None) -> str:
-    """A part of a whole; of a small one only that it is small."""
+    """Format a fraction of a whole as a percentage; of a small one only that it is small."""
     if part is None:
         return NONE
     value = 100 * part
@@ -151,7 +151,7 @@ def percent(part: float | None) -> str:
 
 
 def count(number: int, thing: str, zero: str = "0") -> str:
-    """A number of things: "1 step", "2,000 steps"."""
+    """Format a number of things: "1 step", "2,000 steps"."""
     things = thing if number == 1 else f"{thing}s"
     return f"{number:,} {things}" if number else f"{zero} {things}"
 
@@ -162,14 +162,14 @@ def versions_of(versions: Mapping[str, str]) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words in a row: "a, b and c"."""
+    """Join words: "a, b and c"."""
     if len(words) < 2:
         return "".join(words)
     return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """What goes with each key, keys in the order in which they first come."""
+    """Group values by key, keys in the order in which they first come."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)
@@ -177,31 +177,31 @@ def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
 
 
 def few(words: Sequence[str], most: int = 3, between: str = ", ") -> str:
-    """The first of some words, and how many there are more: "a, b, c and 4 more"."""
+    """Join the first of some words, and how many more there are: "a, b, c and 4 more"."""
     more = f" and {len(words) - most} more" if len(words) > most else ""
     return between.join(words[:most]) + more
 
 
 def on(label: str) -> str:
-    """Where something is seen: on an engine or a file, with an option."""
+    """Return where something is seen: "on " an engine or a file, with an option."""
     return f"{'with' if '=' in label else 'on'} {label}"
 
 
 def capital(text: str) -> str:
-    """A text that begins with a capital; the name of an engine or a file is left as it is."""
+    """Capitalize a text; the name of an engine or a file is left as it is."""
     first = text.partition(" ")[0].rstrip(",:")
     is_name = first in ENGINES or not first.replace("-", "").isalpha()
     return text if is_name else text[:1].upper() + text[1:]
 
 
 def sentence(text: str) -> str:
-    """A text with a capital first and a full stop last."""
+    """Return a text with a capital first and a full stop last."""
     text = capital(text)
     return text if text.endswith(".") else f"{text}."
 
 
 def command(words: Iterable[str], *options: tuple[str, object, object]) -> str:
-    """A command as one types it.
+    """Return a command as one types it.
 
     Args:
         words: What stands in any case.

@@ -29,7 +29,8 @@ _WATCH = 1.0  # seconds between two looks at whether the parent is still there
 
 
 def fresh_python(function: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
-    """Command and environment that call a function in a fresh Python, which finds what this does.
+    """Return the command and environment that call a function in a fresh Python with the same
+    import paths.
 
     Args:
         function: "package.module:function", by full name.
@@ -45,7 +46,7 @@ def fresh_python(function: str, *arguments: str) -> tuple[list[str], dict[str, s
 
 
 def end_with_parent() -> None:
-    """From now on this process ends, within a second, with the one that started it."""
+    """Let this process end, within a second, with the one that started it."""
     parent = os.getppid()
 
     def watch() -> None:
@@ -58,7 +59,8 @@ def end_with_parent() -> None:
 
 
 def checked_jobs(jobs: int | None, processors: int = 1) -> int:
-    """How many at once: as asked for, or one for so many processors that this process may use.
+    """Return how many processes run at once: as asked for, or one for each processor that may be
+    used.
 
     Raises:
         BadInputError: It is less than 1.
@@ -72,7 +74,8 @@ def checked_jobs(jobs: int | None, processors: int = 1) -> int:
 
 
 def free_memory() -> int | None:
-    """Bytes that processes may still take before the kernel ends one; None where unknown.
+    """Return the bytes that processes may still take before the kernel ends one; None where
+    unknown.
 
     What Linux calls available, what is left to the control groups (containers) of this process,
     and what its own limit of addresses (`ulimit -v`) leaves it.
@@ -87,7 +90,7 @@ def free_memory() -> int | None:
 
 
 def _left_of_addresses() -> Iterator[int]:
-    """Bytes that this process may still map, where it has a limit of its own."""
+    """Yield the bytes that this process may still map, where it has a limit of its own."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
@@ -103,7 +106,9 @@ _VERSIONS = {
 
 
 def _left_to_groups() -> Iterator[int]:
-    """Bytes that each control group with a limit, of those that this process is in, has left."""
+    """Yield the bytes that each control group with a limit, of those that this process is in,
+    has left.
+    """
     try:
         lines = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -125,7 +130,9 @@ def _left_to_groups() -> Iterator[int]:
 
 
 def resident_memory() -> int:
-    """Bytes of memory that this process and its `SERVERS` hold; 0 where it is not told."""
+    """Return the bytes of memory that this process and its `SERVERS` hold; 0 where that is
+    unknown.
+    """
     pids = ["self", *(server.pid for server in SERVERS)]
     try:
         pages = [int(Path(f"/proc/{pid}/statm").read_text("ascii").split()[1]) for pid in pids]
@@ -171,7 +178,9 @@ class PipedChild:
         SERVERS.add(self)
 
     def how_it_ended(self, seconds: float = _ENDS_IN) -> str:
-        """In a few words, of one that has ended, or does so in this time; "" of one that lives."""
+        """Return in a few words how a process ended, now or within this time; "" of one that
+        lives.
+        """
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(seconds)
         code = self._process.returncode
@@ -204,7 +213,7 @@ class PipedChild:
 
 
 def signal_name(number: int) -> str:
-    """The name of the signal that ended a process."""
+    """Return the name of the signal that ended a process."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -212,7 +221,7 @@ def signal_name(number: int) -> str:
 
 
 def last_line(said: bytes, code: int) -> str:
-    """The last thing that a process said, which may be its error; or its exit code."""
+    """Return the last line that a process printed, which may be its error, or its exit code."""
     lines = said.decode(errors="replace").strip().splitlines()
     return lines[-1] if lines else f"exit code {code}"
 

@@ -86,7 +86,7 @@ def in_parallel(
 
 @contextmanager
 def worker_processes(jobs: int) -> Iterator[list[Callable[..., Future[Any]]]]:
-    """A function for each of several processes, which submits a call to it.
+    """Yield a function for each of several processes, which submits a call to it.
 
     The processes end with the context. They are joblib's, which need no `if __name__ ==
     "__main__"` of the user. Each computes on one processor. Where one ends, what was submitted to
@@ -150,7 +150,8 @@ def _restore(handlers: dict[int, Any]) -> None:
 
 @contextmanager
 def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
-    """SIGTERM, SIGHUP and SIGINT let what is inside clean up, and then end the process as ever.
+    """Let SIGTERM, SIGHUP and SIGINT first unwind what is inside, and then end the process as
+    usual.
 
     A second one does not disturb the cleaning up. One that is ignored (nohup) stays so. Only in
     the main thread, where Python takes signals.
@@ -193,7 +194,7 @@ def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
 
 
 def forks_for(number: int, seconds: float, jobs: int | None) -> int:
-    """How many forks are to share some runs; 1 means that this process makes them itself.
+    """Return how many forks are to share some runs; 1 means that this process makes them itself.
 
     There are none on Windows and macOS, nor, unless asked for, beside other threads or for work
     that is done sooner than shared.
@@ -266,7 +267,9 @@ def _shared(
     limit: float,
     meanwhile: Callable[[], None],
 ) -> dict[int, tuple[BaseException | None, Any]]:
-    """The error or the result of what forks did, by number; until nothing comes for `limit` [s]."""
+    """Yield the error or the result of each run of the forks, by number; until none comes for
+    `limit` [s].
+    """
     pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), settle)
     futures: dict[Future[Any], int] = {}
     try:
@@ -301,7 +304,7 @@ def _shared(
 
 
 def settle() -> None:
-    """In a process of ours nothing is shown, and it ends with its parent."""
+    """Silence a child process of ours, and let it end with its parent."""
     faulthandler.disable()
     nothing = open(os.devnull, "r+", encoding="utf-8")  # noqa: SIM115  (until it ends)
     sys.stdout = sys.stderr = nothing

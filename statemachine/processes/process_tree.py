@@ -17,7 +17,7 @@ PATIENCE = 2.0  # seconds to end what a command left behind
 
 
 def cpu_of(process: subprocess.Popen[bytes]) -> float:
-    """How long a process and those that it started have computed so far [s]."""
+    """Return how long a process and those that it started have computed so far [s]."""
     import psutil
 
     total = 0.0
@@ -36,7 +36,7 @@ def wait(
     enough: Callable[[], str],
     stop: threading.Event,
 ) -> str:
-    """What ends the waiting: "code", "clock" (or `stop`), or what `enough` says."""
+    """Wait, and return the reason for the end: "code", "clock" (or `stop`), or that of `enough`."""
     pause = 0.001
     while True:
         ended = _has_ended(process)
@@ -49,7 +49,7 @@ def wait(
 
 
 def _has_ended(process: subprocess.Popen[bytes]) -> bool:
-    """Whether it has. On POSIX it is not reaped yet then.
+    """Tell whether the process has ended. On POSIX it is not reaped yet then.
 
     So that its number, and that of its group, is nobody else's when the group is killed.
     """
@@ -91,7 +91,9 @@ def end_all(process: subprocess.Popen[bytes], token: str) -> None:
 
 
 def relatives(leader: int, token: str) -> set[Path]:
-    """Living processes of the session, or that carry the token, in /proc; without it, none."""
+    """Return the living processes of the session, or that carry the token, in /proc; without it,
+    none.
+    """
     mark = f"{TOKEN}={token}".encode()
     living = set[Path]()
     for entry in Path("/proc").glob("[0-9]*"):

@@ -98,6 +98,7 @@ class Question:
         right: Number of the one that the run gave; None if it gave another.
         because: What the run showed, in a sentence.
         always: Whether its text is shown even where nobody can answer.
+        undecided: Whether the runs cannot tell which choice is right; no prediction is scored then.
     """
 
     text: str
@@ -105,6 +106,7 @@ class Question:
     right: int | None
     because: str
     always: bool = False
+    undecided: bool = False
 
 
 class TableCell(str):

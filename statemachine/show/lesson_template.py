@@ -9,19 +9,24 @@ A template is Markdown with named slots. Its paragraphs become the blocks of a p
     ✓ {same}: Both are the same.      a verdict, and whether it holds
     <small>Left: the gap.</small>     a note to what stands above it
     - One of several.                 an item of a list
+    | here | in the engine |          a table; a first line without "|" is its title
     <!-- if moved -->                 what follows stands only where the slot `moved` is true, up to
     <!-- else -->, <!-- end -->       these; "if not moved" is the contrary
     <!-- lessons/hold.md -->          any other comment is left out
+    <!-- words -->                    what follows up to the end are titles and labels of the
+    costs: What each part costs       tables that the code makes, by name: see `Words`
 
-A slot takes a number with its unit or a name. On the page of a lesson a paragraph is filled in for
-each engine. It stands there once for all engines of which it says the same, under their names if
-not for all. The pages of reports have more rules: see `report_template.py`.
+A slot takes a number with its unit or a name. The value of a question is the number of the right
+choice, None if it is none of them, or "undecided". On the page of a lesson a paragraph is filled in
+for each engine. It stands there once for all engines of which it says the same, under their names
+if not for all. The pages of reports have more rules: see `report_template.py`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cached_property
 from importlib import resources
 from typing import Any, Protocol, TypeVar
 
@@ -81,6 +86,9 @@ class HasProvenance(Protocol):
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
 _COMMENT = re.compile(r"<!--.*-->")
 _PARTS = re.compile(r"^(?:[a-h]\)|>|-) ", re.MULTILINE)  # choices, a reason, items of a list
+_ALONE = re.compile(r"(?:[a-h]\)|>|-|\|) ")  # how a line begins that is not joined to that before
+_WORDS = "<!-- words -->"
+UNDECIDED = "undecided"  # value of a question that the runs cannot decide
 _MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)
 
 
@@ -134,7 +142,7 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
     conditions: list[bool] = []
     paragraphs: dict[int, str] = {}
     number = 0
-    for line in template.splitlines():
+    for line in template.partition(_WORDS)[0].splitlines():
         condition = _CONDITION.fullmatch(line)
         if condition is None and _COMMENT.fullmatch(line):
             continue
@@ -142,7 +150,7 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
             number += 1
         elif condition is None and all(conditions):
             line = line.format_map(slots)  # noqa: PLW2901
-            between = "\n" if _PARTS.match(line) else " "
+            between = "\n" if _ALONE.match(line) else " "
             paragraphs[number] = f"{paragraphs.get(number, '')}{between}{line}".strip()
         elif condition and condition["name"]:
             holds = all(conditions) and bool(slots[condition["name"]])
@@ -175,6 +183,8 @@ def blocks_of(
         return [Heading(text.removeprefix("## "))]
     if text.startswith("- "):
         return [Items([item.strip() for item in _PARTS.split(text)[1:]])]
+    if text.endswith("|"):
+        return [_table_of(text)]
     marked = _MARKED.fullmatch(text)
     if marked is None:
         note = text.removeprefix("<small>").removesuffix("</small>").strip()
@@ -183,7 +193,48 @@ def blocks_of(
     if sign == "✓":
         return [Verdict(prefix + said, value == "True")]
     asked, *choices, because = (part.strip() for part in _PARTS.split(said))
-    return [Question(asked, choices, None if value == "None" else int(value), because, always)]
+    undecided = value == UNDECIDED
+    right = None if undecided or value == "None" else int(value)
+    return [Question(asked, choices, right, because, always, undecided)]
+
+
+def _table_of(text: str) -> Table:
+    """Return the table that a paragraph is: its title, if any, and lines of cells."""
+    title, *lines = text.splitlines() if not text.startswith("|") else ("", *text.splitlines())
+    rows: list[list[str]] = []
+    for line in lines:
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    headers, *cells = rows
+    return Table(headers, cells, title, words=frozenset(range(len(headers))))
+
+
+class Words:
+    """Titles and labels of a lesson's tables, which stand at the end of its template.
+
+    say = Words("course/lessons/objects")
+    say("title", joint="elbow")  # the text behind "title:", its slots filled
+    """
+
+    def __init__(self, template: str) -> None:
+        self._template = template
+
+    @cached_property
+    def _texts(self) -> dict[str, str]:
+        texts: dict[str, str] = {}
+        for line in text_of(self._template).partition(_WORDS)[2].split("\n"):
+            name, _, text = line.partition(": ")
+            if text:
+                texts[name] = text
+        return texts
+
+    def __call__(self, name: str, **slots: object) -> str:
+        """Return the text of a name.
+
+        Args:
+            name: Of the text.
+            **slots: What its slots take.
+        """
+        return self._texts[name].format_map(slots)
 
 
 def origin(results: Mapping[str, HasProvenance]) -> str:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 
 WIDTH_PIPED = 80
+UNDECIDED = "cannot be told on this machine now"  # of a question that the runs do not decide
 _WIDTH_MOST = 100
 
 
@@ -55,7 +56,8 @@ def show(page: Page, footer: str = "", reader: Audience | None = None) -> None:
         page: The page.
         footer: The last line.
         reader: Somebody who answers its questions, and is shown a screenful at a time; the
-            rest of the page waits for each answer. Without, questions are left out.
+            rest of the page waits for each answer. Without, questions are left out but
+            those that are for everybody, which stand there with their choices and the answer.
     """
     printer = Printer(_terminal, reader.read if reader else _print, reader)
     printer.page(page, footer)
@@ -98,7 +100,7 @@ class Printer:
         self._console = console
         self._reader = reader
         self._tell = tell
-        self._predicted: list[Block] = []  # the last answer, until the run has said its part
+        self._predicted: list[Block] = []  # what became of them, until the run has said its part
         self._answered: list[bool] = []
         self._headings: list[Block] = []  # which stay with what is under them
 
@@ -133,14 +135,12 @@ class Printer:
         """Let the reader predict; without one, answer a question that is for everybody."""
         choice = self._reader.ask(question) if self._reader else None
         if choice is not None:
-            self._answered.append(choice == question.right)
-            self._predicted = [judged(question, choice)]
+            self._predicted.append(judged(question, choice))
+            if not question.undecided:
+                self._answered.append(choice == question.right)
         elif question.always:
-            right = "none of the above"
-            if question.right is not None:
-                right = question.choices[question.right]
-            answer = Text(f"Answer: {right}. {question.because}")
-            self.write([answer] if self._reader else [Text(question.text), answer])
+            answer = Text(f"Answer: {lettered_answer(question)}. {question.because}")
+            self.write([answer] if self._reader else [question, answer])
 
     def show(self, block: Block, following: Block | None) -> None:
         """Print a block, with what became of the prediction before it."""
@@ -153,7 +153,7 @@ class Printer:
         self.write([*self._headings, *shown])
         self._headings.clear()
         if self._reader and self._predicted:
-            self._predicted = []
+            self._predicted.clear()
             if following and not isinstance(following, Question):
                 self._reader.go_on()
 
@@ -164,7 +164,7 @@ class Printer:
             right = sum(self._answered)
             last.append(Text(f"You had {right} of {len(self._answered)} right."))
         if self._reader and views and find_spec("viser"):  # else nothing here can show it
-            last.append(Text(f"To look at it: {views[0]}"))
+            last += [Text("To look at it, in a second terminal:"), Code([views[0]])]
         if footer:
             last.append(Text(footer))
         self.write(last)
@@ -182,8 +182,19 @@ def spelled(error: Any) -> tuple[str, int]:
     return lacking.encode("ascii", "replace").decode(), error.end
 
 
+def lettered_answer(question: Question) -> str:
+    """Return the choice that the run gave, with its letter."""
+    if question.undecided:
+        return UNDECIDED
+    if question.right is None:
+        return "none of them"
+    return f"{LETTERS[question.right]}) {question.choices[question.right]}"
+
+
 def judged(question: Question, choice: int) -> Text:
     """What became of a prediction; the marks of a verdict are for what the run claims."""
+    if question.undecided:
+        return Text(f"You predicted {LETTERS[choice]}; it {UNDECIDED}. {question.because}")
     if choice == question.right:
         return Text(f"You predicted it: {LETTERS[choice]}. {question.because}")
     right = "none of them" if question.right is None else LETTERS[question.right]

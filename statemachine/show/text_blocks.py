@@ -8,7 +8,20 @@ from collections.abc import Container, Mapping, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from .blocks import Block, Code, Heading, Items, Page, Printed, Table, Text, Verdict
+from ..program import NAME, as_called, command_as_called
+from .blocks import (
+    LETTERS,
+    Block,
+    Code,
+    Heading,
+    Items,
+    Page,
+    Printed,
+    Question,
+    Table,
+    Text,
+    Verdict,
+)
 from .pictures import Diagram
 
 if TYPE_CHECKING:
@@ -109,15 +122,16 @@ def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[Ren
         case Items(texts, ordered):
             marks = (f"{k}." if ordered else "-" for k in itertools.count(1))
             return ["", *map(_hanging, marks, map(coded, texts))]
+        case Question(text, choices):
+            letters = [f"{letter})" for letter in LETTERS[: len(choices)]]
+            return ["", coded(text), "", *map(_hanging, letters, map(coded, choices))]
         case Code(lines):
-            return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in lines)]
+            typed = [as_called(line) for line in lines]
+            if not typed:
+                return []
+            return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in typed)]
         case Printed(by_engine):
-            printed: list[RenderableType] = []
-            for names, text in together(by_engine):
-                printed += ["", RichText(f"Printed by {', '.join(names)}:", "dim")]
-                for line in text.splitlines() or ["(nothing)"]:
-                    printed.append(f"    {_shown(line, plain)}")
-            return printed
+            return _printed(by_engine, plain)
         case Table():
             title = [RichText(_shown(block.title, plain), "italic")] if block.title else []
             return ["", *title, _grid(block.narrow(), plain, width)]
@@ -127,6 +141,18 @@ def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[Ren
         case Diagram():
             return ["", *_diagram(block, plain, width)]
     return []
+
+
+def _printed(by_engine: Mapping[str, str], plain: bool) -> list[RenderableType]:
+    """Return what engines printed, each text under the names of those that printed it."""
+    from rich.text import Text as RichText
+
+    printed: list[RenderableType] = []
+    for names, text in together(by_engine):
+        printed += ["", RichText(f"Printed by {', '.join(names)}:", "dim")]
+        for line in text.splitlines() or ["(nothing)"]:
+            printed.append(f"    {_shown(line, plain)}")
+    return printed
 
 
 # How a terminal shows what is no plain text.
@@ -141,11 +167,20 @@ def _coded(text: str, plain: bool, piped: bool, style: str) -> RichText:
 
     line = RichText(style=style)
     for span in spans(text):
-        shown = _shown(span.text, plain)
+        shown = _shown(_as_typed(span.text, span.kind == "code"), plain)
         if piped and span.kind == "code":
             shown = f"`{shown}`"
         line.append(shown, _LOOKS[span.kind])
     return line
+
+
+def _as_typed(text: str, is_code: bool) -> str:
+    """Return a part of a text with its commands as the user types them, each on one line."""
+    if not is_code:
+        return as_called(text)
+    if text.startswith((f"{NAME} ", "python ")):
+        return command_as_called(text).replace(" ", NO_BREAK)
+    return text
 
 
 # Colours of what a diagram is about; no colour says anything alone.
@@ -202,7 +237,7 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
     )
     rows: list[list[str]] = []
     for row in (block.headers, *block.rows):
-        rows.append([_shown(_loud(cell), plain) for cell in row])
+        rows.append([_shown(as_called(_loud(cell)), plain) for cell in row])
     widths = _widths(rows, block.words, width)
     headers, *rows = [list(map(_broken, row, widths)) for row in rows]
     for k, cells in enumerate(widths):

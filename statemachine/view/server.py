@@ -42,13 +42,13 @@ class Door:
     """
 
     def __init__(self, host: str) -> None:
-        """For a server that listens on this host, by name or by address."""
+        """Make the door of a server that listens on this host, given by name or by address."""
         self.token = secrets.token_urlsafe(16)
         machine = socket.gethostname().lower()
         self._names = {host.lower().strip("[]"), "localhost", machine, f"{machine}.local"}
 
     def refusal(self, path: str, headers: Any, port: int) -> str:
-        """Why a request is refused, or "".
+        """Return the reason why a request is refused, or "".
 
         Args:
             path: Its path and query.
@@ -69,11 +69,13 @@ class Door:
         return ""
 
     def cookie(self, port: int) -> str:
-        """The header Set-Cookie with which a page that was opened keeps the token."""
+        """Return the header Set-Cookie with which a page that was opened keeps the token."""
         return f"{_name(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
 
     def _is_ours(self, host: str) -> bool:
-        """Whether a header Host names this machine: no name that a stranger may point to it."""
+        """Tell whether a header Host names this machine: no name that a stranger may point to
+        it.
+        """
         try:
             name = urlsplit(f"//{host}").hostname or ""
             if name not in self._names:
@@ -90,7 +92,9 @@ class Door:
         return tokens
 
     def guard(self, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        """A `process_request` of websockets that asks here first, then the one that is given."""
+        """Return a `process_request` of websockets that asks this door first, then the given
+        one.
+        """
 
         def process(connection: Any, request: Any) -> Any:
             port = connection.local_address[1]
@@ -112,7 +116,7 @@ def _name(port: int) -> str:
 
 
 def require_viser() -> ModuleType:
-    """The package viser.
+    """Return the package viser.
 
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
@@ -121,7 +125,7 @@ def require_viser() -> ModuleType:
 
 
 def free_port(host: str, port: int) -> int:
-    """The first free port from this one on; 0 stands for any.
+    """Return the first free port from this one on; 0 stands for any.
 
     Raises:
         BadInputError: It is not a port, the host is not an address of this machine, or all near it
@@ -191,7 +195,7 @@ def stop(server: viser.ViserServer) -> None:
 
 @contextmanager
 def _guarded(door: Door) -> Iterator[list[Any]]:
-    """While viser opens its server, put a door before it.
+    """Put a door before viser's server while viser opens it.
 
     viser answers requests in a function that it hands to websockets, and offers no place for
     another. So the call that opens the server is replaced for as long as viser makes it.

@@ -65,7 +65,7 @@ class TraceSession(Session):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What made each of them."""
+        """Return the label of each trace."""
         return tuple(trace.header.label.removesuffix(", recorded") for trace in self._traces)
 
     def play(self) -> None:

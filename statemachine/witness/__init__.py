@@ -53,12 +53,12 @@ class Segment(NamedTuple):
 
     @property
     def nq(self) -> int:
-        """Its length in qpos, in MuJoCo's layout."""
+        """Return the joint's length in qpos, in MuJoCo's layout."""
         return SIZES[self.kind][0]
 
     @property
     def nv(self) -> int:
-        """Its length in qvel."""
+        """Return the joint's length in qvel."""
         return SIZES[self.kind][1]
 
 
@@ -85,7 +85,7 @@ class RobotReading:
 
 
 def labels(kind: str, names: Iterable[str]) -> list[str]:
-    """What bodies or sites are called: their names, or "body 7" and "site 3" without one."""
+    """Return the labels of bodies or sites: their names, or "body 7" and "site 3" without one."""
     given = list(names)
     called = []
     for number, name in enumerate(given):
@@ -301,7 +301,7 @@ def _read_urdf(pin: Any, path: Path) -> RobotReading:
 
 
 def _reason(error: Exception) -> str:
-    """One line of an error of Pinocchio's: the C++ location lines are left out."""
+    """Return one line of an error of Pinocchio's: the C++ location lines are left out."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     plain = [line for line in lines if not line.startswith(("From file:", "in function:"))]
     return (plain or lines or [type(error).__name__])[0]

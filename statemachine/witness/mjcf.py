@@ -212,7 +212,7 @@ class PlainMjcf:
             self._write(worldbody, target, body, inside, sites)
 
     def _copies(self, element: Element, around: _Surroundings) -> Iterator[_Surroundings]:
-        """The surroundings within a <frame>, or within each copy of a <replicate>."""
+        """Yield the surroundings within a <frame>, or within each copy of a <replicate>."""
         childclass = element.get("childclass") or around.childclass
         if element.tag == "frame":
             place = own_place(element.attrib, around.source.compiler)
@@ -296,7 +296,7 @@ class PlainMjcf:
             self._done["unit" if unit else name] += 1
 
     def _resolved(self, element: Element, tag: str, around: _Surroundings) -> dict[str, str]:
-        """Attributes of a joint or a site, those from its class included."""
+        """Return the attributes of a joint or a site, those from its class included."""
         own = {name: text for name, text in element.items() if name in _KINEMATIC[tag]}
         if element.tag == "freejoint":
             return own

@@ -30,7 +30,7 @@ class Compiler(NamedTuple):
     aligned: bool
 
     def radians(self, angle: float) -> float:
-        """An angle of the file [rad]."""
+        """Return an angle of the file [rad]."""
         return float(np.deg2rad(angle)) if self.degrees else angle
 
 
@@ -112,7 +112,7 @@ def body_of(source: MjcfSource, name: str) -> tuple[Element, str]:
 
 
 def parse(path: Path) -> Element:
-    """The root element of a file.
+    """Return the root element of a file.
 
     Raises:
         ModelError: It is not XML.
@@ -124,7 +124,7 @@ def parse(path: Path) -> Element:
 
 
 def with_includes(root: Element, path: Path) -> tuple[Element, int]:
-    """A file with each <include> replaced by what it names, and how many there were.
+    """Return a file with each <include> replaced by what it names, and the number of those.
 
     Raises:
         ModelError: An included file is not there, is not XML, or is included twice.
@@ -153,7 +153,7 @@ def with_includes(root: Element, path: Path) -> tuple[Element, int]:
 
 
 def compiler_of(root: Element, path: Path) -> Compiler:
-    """The settings of all <compiler> elements; of one that is given twice, the last.
+    """Return the settings of all <compiler> elements; of one that is given twice, the last.
 
     Raises:
         ModelError: They have a meaning that is not that of MuJoCo today.
@@ -173,7 +173,8 @@ def compiler_of(root: Element, path: Path) -> Compiler:
 
 
 def classes(root: Element, path: Path, done: Counter[str]) -> Classes:
-    """Attributes that each default class gives to each element, those of its parents included.
+    """Return the attributes that each default class gives to each element, those of its parents
+    included.
 
     A class starts with what its parent has by then: a later block of <default> adds to the
     main class, and not to the classes that an earlier block made.
@@ -210,12 +211,12 @@ def classes(root: Element, path: Path, done: Counter[str]) -> Classes:
 
 
 def numbers(text: str, count: int) -> Array:
-    """The numbers of an attribute."""
+    """Return the numbers of an attribute."""
     return np.array(models.numbers(text, count, "an attribute of the file"))
 
 
 def own_place(given: Mapping[str, str], compiler: Compiler) -> Placement:
-    """The place that an element's attributes give it.
+    """Return the place that an element's attributes give it.
 
     Args:
         given: pos; one of quat, axisangle, euler, xyaxes and zaxis; or fromto, whose place
@@ -247,7 +248,7 @@ def own_place(given: Mapping[str, str], compiler: Compiler) -> Placement:
 
 
 def _z_along(direction: Array) -> Array:
-    """The shortest turn that takes z to a direction; the opposite of z, about x."""
+    """Return the shortest turn that takes z to a direction; the opposite of z, about x."""
     x, y, z = _unit(direction)
     sine = float(np.hypot(x, y))
     axis = np.array([-y / sine, x / sine, 0.0]) if sine > 1e-10 else HERE.mat[0]

@@ -77,7 +77,7 @@ class Uniform:
             raise BadInputError(f"a range wants 0 ≤ low ≤ high; got {low:g} and {high:g}")
 
     def at(self, parts: Array) -> Array:
-        """The numbers at these parts (n, k) of the range, which are drawn from 0 to 1."""
+        """Return the numbers at these fractions (n, k) of the range, drawn from 0 to 1."""
         return np.minimum(self.low + (self.high - self.low) * parts, self.high)
 
 
@@ -100,7 +100,7 @@ class LogUniform(Uniform):
 def draw(
     model: Model, n: int, *, seed: int, **ranges: Uniform | tuple[float, float]
 ) -> dict[str, Any]:
-    """Options for `make_worlds`, drawn for n worlds.
+    """Return options for `make_worlds`, drawn for n worlds.
 
     A world's values depend on the seed, its number and the option alone: not on `n`, nor on
     what else is drawn. An entry that is zero stays zero (a body without mass), and one that is

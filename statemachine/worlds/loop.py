@@ -26,8 +26,8 @@ from ..interface import (
     set_state,
     step,
 )
+from ..interface.exclusive_access import with_exclusive_access
 from ..interface.records import Errors, StateLayout
-from ..interface.turns import alone
 from ..interface.worlds import WRITABLE, Worlds, check_memory, without
 from ..processes import resident_memory
 
@@ -148,7 +148,7 @@ class LoopWorlds(Worlds):
                 self._take(world)
 
     def _forget_derived(self) -> None:
-        """What was read of derived arrays is of the past."""
+        """Forget the derived arrays that were read: they belong to a state that has passed."""
         self._fresh = []
         for name in self.derived:
             vars(self).pop(name, None)
@@ -156,13 +156,13 @@ class LoopWorlds(Worlds):
     def __getattr__(self, name: str) -> Any:  # only for what is not there
         if name not in vars(self).get("_derived_arrays", ()):
             return super().__getattr__(name)
-        self._refuse_if_troubled()
+        self._refuse_if_unusable()
         if self._process != os.getpid():
             raise BusyDataError(f"{name!r} of these Worlds is known to the process that made them")
-        return alone(self, self._fetched, name)
+        return with_exclusive_access(self, self._fetched, name)
 
     def _fetched(self, name: str) -> Array:
-        """A derived array as it is now; the rows of worlds that have diverged stay."""
+        """Return a derived array as it is now; the rows of worlds that have diverged stay."""
         if name not in self._fresh:
             for world in without(self._numbers, self._errors).tolist():
                 self._writable[name][world] = getattr(self._data[world], name)
@@ -209,7 +209,7 @@ class LoopWorlds(Worlds):
 
 
 def _arrays_of(model: Model, n: int, derived: Sequence[str]) -> dict[str, Array]:
-    """Zeros for the inputs, the time and the derived arrays of n worlds."""
+    """Return zeros for the inputs, the time and the derived arrays of n worlds."""
     sizes = {
         **{"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()},
         **{"mocap_pos": (model.nmocap, 3), "mocap_quat": (model.nmocap, 4)},

@@ -21,9 +21,9 @@ from ..errors import (
 )
 from ..interface import Ints, Model, State
 from ..interface.checks import as_count, as_vector, check_state, kind_of
+from ..interface.exclusive_access import with_exclusive_access
 from ..interface.options import checked_options
 from ..interface.records import Arrays, Errors
-from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world, without
 from ..processes import checked_jobs, free_memory
 from .loop import LoopWorlds
@@ -131,7 +131,7 @@ def reset(
     """
     _admit(worlds)
     key = None if keyframe is None else worlds.model.key_id(keyframe)
-    alone(worlds, _begin_anew, worlds, worlds._reset, _numbers(worlds, ids), key)
+    with_exclusive_access(worlds, _begin_anew, worlds, worlds._reset, _numbers(worlds, ids), key)
 
 
 def _begin_anew(worlds: Worlds, call: Callable[[Ints, Any], None], ids: Ints, start: Any) -> None:
@@ -142,7 +142,7 @@ def _begin_anew(worlds: Worlds, call: Callable[[Ints, Any], None], ids: Ints, st
 
 
 def get_state(worlds: Worlds, world: int) -> State:
-    """The State of one world; a single Data of the same Model takes it, and the other way.
+    """Return the State of one world; a single Data of the same Model takes it, and the reverse.
 
     Raises:
         BadInputError: There is no such world, or an input of it is not finite.
@@ -158,11 +158,11 @@ def get_state(worlds: Worlds, world: int) -> State:
             world=number,
         )
     ids = worlds._numbers[number : number + 1]
-    return alone(worlds, _with_inputs, worlds, worlds._get_states, ids)[0]
+    return with_exclusive_access(worlds, _with_inputs, worlds, worlds._get_states, ids)[0]
 
 
 def get_states(worlds: Worlds, ids: ArrayLike | None = None) -> dict[int, State]:
-    """The States of worlds, by their numbers; those that have diverged are left out.
+    """Return the States of worlds, by their numbers; those that have diverged are left out.
 
     Args:
         worlds: From `make_worlds`.
@@ -174,7 +174,7 @@ def get_states(worlds: Worlds, ids: ArrayLike | None = None) -> dict[int, State]
     """
     _admit(worlds)
     numbers = _chosen(worlds, ids)
-    states = alone(worlds, _with_inputs, worlds, worlds._get_states, numbers)
+    states = with_exclusive_access(worlds, _with_inputs, worlds, worlds._get_states, numbers)
     return dict(zip(numbers.tolist(), states, strict=True))
 
 
@@ -205,7 +205,7 @@ def set_states(worlds: Worlds, states: Mapping[int, State]) -> None:
         check_state(state, worlds.model, *worlds._state_layout(world))
     numbers = np.array(sorted(checked), dtype=np.int64)
     in_order = [checked[world] for world in numbers.tolist()]
-    alone(worlds, _begin_anew, worlds, worlds._set_states, numbers, in_order)
+    with_exclusive_access(worlds, _begin_anew, worlds, worlds._set_states, numbers, in_order)
 
 
 def record(
@@ -259,7 +259,7 @@ def record(
 
 def _run(worlds: Worlds, call: Any, ids: Ints, *args: Any) -> None:
     """Call a hook, and tell of the worlds that are left out from now on."""
-    errors = alone(worlds, _checked_call, worlds, call, ids, args)
+    errors = with_exclusive_access(worlds, _checked_call, worlds, call, ids, args)
     if errors:
         warnings.warn(_warning_text(worlds, errors), DivergedWarning, stacklevel=3)
 
@@ -279,7 +279,7 @@ def _checked_call(worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]) -
 
 
 def _warning_text(worlds: Worlds, errors: Errors) -> str:
-    """'3 of 1024 worlds diverged and are left out: 17 (qpos[2] (elbow) at 0.34 s), …'."""
+    """Return '3 of 1024 worlds diverged and are left out: 17 (qpos[2] (elbow) at 0.34 s), …'."""
     entries = [f"{world} ({_entry(worlds, errors[world])})" for world in sorted(errors)]
     more = f" and {len(entries) - _SHOWN} more" if len(entries) > _SHOWN else ""
     return (
@@ -289,7 +289,7 @@ def _warning_text(worlds: Worlds, errors: Errors) -> str:
 
 
 def _entry(worlds: Worlds, error: Exception) -> str:
-    """What one world ended of, shortly: 'qpos[2] (elbow) at 0.34 s'."""
+    """Return how one world ended, in short: 'qpos[2] (elbow) at 0.34 s'."""
     quantity, index = getattr(error, "quantity", None), getattr(error, "index", None)
     if quantity is None or index is None:
         return shown(str(error)).strip("'\"")
@@ -302,7 +302,7 @@ def _admit(worlds: Worlds) -> None:
     """Raise unless these are usable Worlds of this process."""
     if not isinstance(worlds, Worlds):
         raise TypeError(f"the first argument is Worlds, from make_worlds; got {kind_of(worlds)}")
-    worlds._refuse_if_troubled()
+    worlds._refuse_if_unusable()
     if worlds._process != os.getpid():
         raise BusyDataError(
             "these Worlds belong to another process, which made them: make others here"
@@ -310,12 +310,12 @@ def _admit(worlds: Worlds) -> None:
 
 
 def _chosen(worlds: Worlds, ids: ArrayLike | None) -> Ints:
-    """The worlds that are meant and have not diverged."""
+    """Return the worlds that are meant and have not diverged."""
     return without(_numbers(worlds, ids), worlds._errors)
 
 
 def _numbers(worlds: Worlds, ids: ArrayLike | None) -> Ints:
-    """The worlds that are meant, each once and in order."""
+    """Return the worlds that are meant, each once and in order."""
     if ids is None:
         return worlds._numbers
     wanted = f"ids wants numbers of worlds, each once, or a mask ({worlds.n},) of bools"
@@ -338,7 +338,7 @@ def _numbers(worlds: Worlds, ids: ArrayLike | None) -> Ints:
 
 
 def _names(names: Sequence[str], kind: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """Names that are known, each once, as given."""
+    """Return the names that are known, each once, as given."""
     if not isinstance(names, Iterable):
         raise BadInputError(
             f"names of {kind}s are wanted, of {', '.join(known)}; got {shown(names)}"
@@ -350,7 +350,7 @@ def _names(names: Sequence[str], kind: str, known: tuple[str, ...]) -> tuple[str
 
 
 def _options(model: Model, n: int, options: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Each option of `Model.replace` as a checked value for each world."""
+    """Return each option of `Model.replace` as a checked value for each world."""
     checked = {}
     for name, values in options.items():
         listed = isinstance(values, Sequence) and not isinstance(values, str | bytes)

@@ -17,19 +17,19 @@ HALF = math.sqrt(0.5)  # cosine and sine of 45 degrees: half of a quarter turn
 
 
 def place_of(model, joint):
-    """Where a joint's numbers begin in qpos and in qvel."""
+    """Return where a joint's numbers begin in qpos and in qvel."""
     number = model.joint_id(joint)
     return model.jnt_qposadr[number], model.jnt_dofadr[number]
 
 
 def fingertip(model, data):
-    """A copy: what `data.site_xpos` shows changes with the next step."""
+    """Return a copy: what `data.site_xpos` shows changes with the next step."""
     return data.site_xpos[model.site_id("gripperframe")].copy()
 
 
 @pytest.fixture
 def weightless(model):
-    """The scene without gravity, where a spin lasts."""
+    """Return the scene without gravity, where a spin lasts."""
     return model.replace(gravity=[0, 0, 0])
 
 

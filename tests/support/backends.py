@@ -19,7 +19,7 @@ from statemachine.interface import Behaviour
 
 @contextmanager
 def registered(name: str, loader: str) -> Iterator[str]:
-    """A backend of another package, known under a name for a while."""
+    """Register a backend of another package under a name for a while."""
     backends.register(name, loader)
     try:
         yield name
@@ -28,7 +28,7 @@ def registered(name: str, loader: str) -> Iterator[str]:
 
 
 def bullet_clients() -> set[int]:
-    """The worlds of PyBullet in this process that nobody closed or lost."""
+    """Return the worlds of PyBullet in this process that nobody closed or lost."""
     gc.collect()
     pb: Any = require("pybullet")
     return {client for client in range(1024) if pb.isConnected(client)}
@@ -39,12 +39,12 @@ RELEASES = ("mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={engine_version('mujoco'
 
 
 def process_of(model: Any) -> int:
-    """The number of the process in which the engine of a Model runs."""
+    """Return the number of the process in which the engine of a Model runs."""
     return Server.of(model._reading.engine).pid
 
 
 def load_made_up(path: Path, defaults: Any = "model") -> Any:
-    """A backend of another package, whose engine is in a Python of its own."""
+    """Load a backend of another package, whose engine is in a Python of its own."""
     engine = ServedEngine(
         "made up",
         str(releases.python_of(RELEASES[-1])),

@@ -117,7 +117,7 @@ def _playwright() -> Iterator[Any]:
 def browser(
     width: int = 1280, height: int = 800, offline: bool = False, **context: Any
 ) -> Iterator[Tab]:
-    """A browser with a new profile, and an empty tab in it.
+    """Open a browser with a new profile, and an empty tab in it.
 
     Args:
         width: Of a tab [px].

@@ -21,17 +21,17 @@ overlapping = pytest.mark.filterwarnings(
 
 
 def assert_in(whole: Container[Any], *parts: object) -> None:
-    """All of these are in it; a failure lists those that are not."""
+    """Assert that all of these are in it; a failure lists those that are not."""
     assert not [part for part in parts if part not in whole], f"not in {whole}"
 
 
 def assert_not_in(whole: Container[Any], *parts: object) -> None:
-    """None of these is in it; a failure lists those that are."""
+    """Assert that none of these is in it; a failure lists those that are."""
     assert not [part for part in parts if part in whole], f"in {whole}"
 
 
 def assert_has(record: Any, **fields: object) -> None:
-    """Fields of a record, or entries of a dict, are these; a failure lists those that are not."""
+    """Assert fields of a record, or entries of a dict; a failure lists those that differ."""
     of = record.__getitem__ if isinstance(record, dict) else partial(getattr, record)
     assert {name: of(name) for name in fields} == fields
 
@@ -39,7 +39,7 @@ def assert_has(record: Any, **fields: object) -> None:
 def refused(
     *cases: tuple[type[BaseException] | tuple[type[BaseException], ...], str, Callable[[], object]],
 ) -> Any:
-    """Every call raises its error, with its pattern in the text; one of ours is one line.
+    """Assert that every call raises its error, its pattern in the text; one of ours is one line.
 
     Returns:
         The error of the last.
@@ -55,7 +55,7 @@ def refused(
 
 
 def warnings_of(call: Callable[[], T]) -> tuple[T, str]:
-    """What a call gives, and what we warned of in it; nobody else warned."""
+    """Return what a call gives, and what we warned of in it; nobody else warned."""
     with warnings.catch_warnings(record=True, action="always") as told:
         result = call()
     assert {warning.category for warning in told} <= {EngineWarning}

@@ -48,7 +48,7 @@ RUN = "sm.step(model, data, nstep)"
 
 
 def _ordered(acts: str) -> Changes:
-    """Forward's acts in another order."""
+    """Put the acts of forward into another order."""
     _, _, rest = _SOURCES["forward"].partition("    tips = [")
     body, _, _ = rest.partition("    return")
     lines = "".join(f"    {ACTS[act]}\n" for act in acts)

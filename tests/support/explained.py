@@ -97,7 +97,7 @@ SWING = Scenario(
 def explained(
     folder: Path, left: str, right: str, *, engines: tuple[str, str] = ("mujoco", "mujoco"), **more
 ) -> Explanation:
-    """Why two texts of models differ."""
+    """Explain why two texts of models differ."""
     models = [
         sm.load(written(folder / f"{side}.xml", text), backend=engine)
         for side, text, engine in zip(("left", "right"), (left, right), engines, strict=True)
@@ -106,7 +106,7 @@ def explained(
 
 
 def with_changes(text: str, changes: Iterable[tuple[str, str]]) -> str:
-    """A text with changes, each of a piece that is there once."""
+    """Apply changes to a text, each of a piece that is there once."""
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -114,7 +114,7 @@ def with_changes(text: str, changes: Iterable[tuple[str, str]]) -> str:
 
 
 def changed(text: str, *cases: Case) -> str:
-    """A text with the changes of cases."""
+    """Apply the changes of cases to a text."""
     return with_changes(text, ((case.old, case.new) for case in cases))
 
 
@@ -128,17 +128,17 @@ FLOOR = '<geom name="floor" type="plane" size="2 2 0.1"/>'
 
 
 def _more(old: str, more: str, cause: str, quantity: str = "joints") -> Case:
-    """Something added behind a piece of the text."""
+    """Add something behind a piece of the text."""
     return Case(old, f"{old} {more}", cause, quantity)
 
 
 def _before(old: str, more: str, cause: str, quantity: str = "joints") -> Case:
-    """Something added before a piece of the text."""
+    """Add something before a piece of the text."""
     return Case(old, f"{more}{old}", cause, quantity)
 
 
 def _in(tag: str, inner: str, cause: str, quantity: str = "joints") -> Case:
-    """A section of its own, before that of the actuators."""
+    """Add a section before that of the actuators."""
     return _before("<actuator>", f"<{tag}>{inner}</{tag}>", cause, quantity)
 
 
@@ -242,19 +242,19 @@ SERVO = """
 
 
 def servo(mass: float = 1.0, load: float = 1.0, kp: float = 200.0) -> str:
-    """A slide that a servo holds against its weight: it sags by (mass + load) g / kp."""
+    """Return a slide that a servo holds against its weight: it sags by (mass + load) g / kp."""
     return SERVO.format(mass=mass, load=load, kp=kp, kv=2 * (kp * (mass + load)) ** 0.5)
 
 
 def mesh(**more: Any) -> str:
-    """The arm with a ball that is a mesh; `more` as for `_asset`."""
+    """Return the arm with a ball that is a mesh; `more` as for `_asset`."""
     return ARM.replace("<worldbody>", f"<asset>{_asset('m', **more)}</asset><worldbody>").replace(
         f'{_BALL} size="0.05"', f'{_BALL} type="mesh" mesh="m"'
     )
 
 
 def balls(*meshes: str, **assets: dict[str, Any]) -> str:
-    """The arm with two balls that are meshes.
+    """Return the arm with two balls that are meshes.
 
     Args:
         meshes: The name of the mesh of each ball.
@@ -280,7 +280,7 @@ def balls(*meshes: str, **assets: dict[str, Any]) -> str:
 def _asset(
     name: str, size: float = 0.05, order: int | None = None, corners: int = 20, noise: float = 0
 ) -> str:
-    """A mesh whose corners on a sphere are drawn by a seed, in an order of choice."""
+    """Return a mesh whose corners on a sphere are drawn by a seed, in an order of choice."""
     random = np.random.default_rng(0)
     points = random.normal(size=(corners, 3))
     points *= size / np.linalg.norm(points, axis=1)[:, None]
@@ -291,7 +291,7 @@ def _asset(
 
 
 def hills(wave: float = 1.0, points: int = 9) -> str:
-    """The arm above a height field instead of a floor."""
+    """Return the arm above a height field instead of a floor."""
     text = " ".join(f"{each:.4f}" for each in np.abs(np.sin(wave * np.arange(points * points))))
     asset = (
         f'<asset><hfield name="h" nrow="{points}" ncol="{points}" size="2 2 0.05 0.1" '
@@ -302,12 +302,12 @@ def hills(wave: float = 1.0, points: int = 9) -> str:
 
 
 def equality(text: str) -> str:
-    """The arm with an equality."""
+    """Return the arm with an equality."""
     return ARM.replace("<actuator>", f"<equality>{text}</equality><actuator>")
 
 
 def ledge(words: str) -> str:
-    """The arm with a ledge under the ball, of a body that does not move."""
+    """Return the arm with a ledge under the ball, of a body that does not move."""
     body = (
         f'<body name="ledge" pos="0.6 0 0.02" {words}><geom name="ledge" type="box" '
         'size="0.1 0.1 0.02"/></body><body name="ball"'
@@ -316,7 +316,7 @@ def ledge(words: str) -> str:
 
 
 def lowered(text: str) -> str:
-    """The same arm with the frame of its second link put 5 cm down on it."""
+    """Return the same arm with the frame of its second link put 5 cm down on it."""
     return with_changes(
         text,
         [

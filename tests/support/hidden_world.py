@@ -47,30 +47,30 @@ class ExampleWorld(HiddenWorld):
         (self.raw.qacc_warmstart[:],) = memory
 
     def command(self, ctrl: Array) -> None:
-        """Once for all steps until the next command."""
+        """Take the command once for all steps until the next one."""
         self._ctrl = self._data.ctrl = ctrl.copy()
 
     def step(self) -> None:
-        """One step of the engine."""
+        """Advance the engine by one step."""
         step(self._model, self._data)
 
     def read(self) -> tuple[Array, Array]:
-        """Copies: the engine's memory changes with the next step."""
+        """Return copies: the engine's memory changes with the next step."""
         return self._data.qpos.copy(), self._data.qvel.copy()
 
     def look(self, moment: Moment) -> None:
-        """This engine can compute what is derived without a step."""
+        """Compute nothing: this engine can compute what is derived without a step."""
         self.place(moment.qpos, moment.qvel, moment.memory)
         self.command(moment.ctrl)
         forward(self._model, self._data)
 
     def derive(self, name: str, moment: Moment, read: Any) -> dict[str, Any]:
-        """All at once; a dearer engine computes what was asked for."""
+        """Compute everything at once; a dearer engine computes what was asked for."""
         values = {name: np.array(getattr(self._data, name)) for name in DERIVED}
         return {**values, "contacts": self._data.contacts}
 
     def close(self) -> None:
-        """Once is enough, more often does no harm."""
+        """Free the world; more often than once does no harm."""
         self._data.close()
 
     @property

@@ -19,7 +19,7 @@ Game = tuple[str, str, dict[str, float]]
 
 
 def at_70_to_30(seed: int) -> Game:
-    """Two servos under weights that differ by 70 and 30 parts: a servo sags by their sum."""
+    """Return two servos under weights that differ by 70 and 30 parts: one sags by their sum."""
     size = np.random.default_rng(seed).uniform(0.2, 0.6)
     left, right = servo(), servo(1.0 + 0.7 * size, 1.0 + 0.3 * size)
     parts = {"mass of slider": 0.7, "mass of load": 0.3, "gap": 9.81 * size / 200}
@@ -27,7 +27,7 @@ def at_70_to_30(seed: int) -> Game:
 
 
 def that_interact(seed: int) -> Game:
-    """Two servos that differ in weight and in gain: a servo sags by weight over gain."""
+    """Return two servos that differ in weight and in gain: one sags by weight over gain."""
     random = np.random.default_rng(seed)
     mass, kp = random.uniform(2, 3), random.uniform(80, 140)
 
@@ -97,13 +97,13 @@ SAME = {
 
 
 def with_actuators_swapped(text: str) -> str:
-    """The two actuators in the other order."""
+    """Return the model with the two actuators in the other order."""
     lines = [f'<position name="{n}" joint="{n}" kp="20" kv="1"/>' for n in ("shoulder", "elbow")]
     return text.replace(lines[0], "@").replace(lines[1], lines[0]).replace("@", lines[1])
 
 
 def said_otherwise(name: str) -> str:
-    """The arm in other words."""
+    """Return the arm in other words."""
     right = with_changes(ARM, SAME[name])
     if name == "permuted bodies":  # and with them the order of qpos
         start, end = right.index('<body name="ball"'), right.index('<body name="weight"')

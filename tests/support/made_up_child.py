@@ -30,7 +30,7 @@ def load(file, text, names):
 
 
 def edit(model, edits, flags):
-    """Other numbers; it has no flags."""
+    """Make a model with other numbers; it has no flags."""
     for name, values in edits.items():
         place, field = place_of(model, name)
         now = getattr(place, field)
@@ -38,7 +38,7 @@ def edit(model, edits, flags):
 
 
 def place_of(model, name):
-    """Whose attribute a number is."""
+    """Return the attribute that holds a number."""
     place, _, field = name.rpartition(".")
     return (model.opt if place else model), field
 

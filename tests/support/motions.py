@@ -21,7 +21,7 @@ def opened(
     derived: bool = False,
     **inputs: Any,
 ) -> Iterator[tuple[Model, Data]]:
-    """A Model and a Data of it, in a keyframe or in the default state, or some steps later.
+    """Yield a Model and a Data of it, in a keyframe or the default state, or some steps later.
 
     The inputs, `qpos`, `qvel` or `ctrl`, are written before those steps. `derived` says whether
     what follows from the state is computed then.
@@ -40,19 +40,19 @@ def opened(
 
 @contextmanager
 def started(model: Model) -> Iterator[Data]:
-    """A Data in keyframe 0."""
+    """Yield a Data in keyframe 0."""
     with opened(model, 0) as (_, data):
         yield data
 
 
 def after(model: Model, nstep: int, keyframe: int | str | None = None, **inputs: Any) -> np.ndarray:
-    """qpos (nq,) after so many steps from the default state or a keyframe, with such inputs."""
+    """Return qpos (nq,) after some steps from the default state or a keyframe, with such inputs."""
     with opened(model, keyframe, nstep=nstep, **inputs) as (_, data):
         return data.qpos.copy()
 
 
 def path(model: Model, nstep: int, keyframe: int | str | None = None, **inputs: Any) -> np.ndarray:
-    """qpos (nstep + 1, nq) before and after every step, with such inputs at first."""
+    """Return qpos (nstep + 1, nq) before and after every step, with such inputs at first."""
     with opened(model, keyframe, **inputs) as (_, data):
         rows = [data.qpos.copy()]
         for _ in range(nstep):
@@ -62,7 +62,7 @@ def path(model: Model, nstep: int, keyframe: int | str | None = None, **inputs: 
 
 
 def bits(data: Data) -> list[bytes]:
-    """Everything that a Data says."""
+    """Return the bits of everything that a Data has."""
     return [
         np.array(part).tobytes()
         for value in readings(data).values()

@@ -15,30 +15,30 @@ from statemachine.show.blocks import Page
 T = TypeVar("T")
 # Options with which a lesson of many steps is a short one.
 QUICK = {
-    "worlds": ("--most", "4"),
-    "speed": ("--steps", "200"),
+    "objects": ("--most", "4"),
+    "time": ("--steps", "200"),
     "gravity": ("--longer", "0"),
     "replay": ("--steps", "100"),
 }
 
 
 def lesson_result(name: str, model: Model, **options: Any) -> Any:
-    """What a lesson finds on a Model."""
+    """Return the result of a lesson on a Model."""
     return take(LESSONS[name], model, model.backend, options).result
 
 
 def shown(page: Page) -> str:
-    """A page as a terminal of 80 columns shows it."""
+    """Return a page as a terminal of 80 columns shows it."""
     with redirect_stdout(io.StringIO()) as said:
         terminal.show(page)
     return said.getvalue()
 
 
 def blocks(page: Page, kind: type[T]) -> list[T]:
-    """The blocks of one kind on a page."""
+    """Return the blocks of one kind on a page."""
     return [block for block in page.blocks if isinstance(block, kind)]
 
 
 def with_figures(figures: Any, **others: Any) -> Any:
-    """Figures of which some are others."""
+    """Return figures of which some are others."""
     return type(figures)(**vars(figures) | others)

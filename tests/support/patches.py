@@ -15,7 +15,7 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
-    """A fault that puts a function around another: it gets the right one, then its arguments.
+    """Put a function around another: it gets the right one, then its arguments.
 
     Args:
         owner: What has the other; or a function that gives that, where it cannot be imported yet.
@@ -37,7 +37,7 @@ def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
 
 
 def followed_by(owner: Any, name: str, act: Callable[..., object]) -> Patch:
-    """A fault at the end of a function: what is done then, with its arguments. See `around`."""
+    """Add a fault at the end of a function: what is done then, with its arguments. See `around`."""
 
     @around(owner, name)
     def faulty(right: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
@@ -49,7 +49,7 @@ def followed_by(owner: Any, name: str, act: Callable[..., object]) -> Patch:
 
 
 def interrupted_at(at: int, call: Callable[[], object], among: str) -> str:
-    """Ctrl-C before the at-th line of files of such a name: where that was, or "" if it ended."""
+    """Raise Ctrl-C before the at-th line of files of such a name; return where, "" if it ended."""
     lines, place = iter(range(1, at + 1)), ""
 
     def trace(frame: Any, event: str, _: object) -> Any:

@@ -17,6 +17,10 @@ from .requirements import ROOT
 _ESTIMATE = re.compile(r"^.*: about [\d.e+]+ (?:s|min) more\n", re.MULTILINE)
 
 
+# As of a shell in which this environment is activated: commands are printed as it finds them.
+_PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+
+
 def without_estimates(stderr: str) -> str:
     """Return standard error without the line that says how long a slow command may take.
 
@@ -28,7 +32,7 @@ def without_estimates(stderr: str) -> str:
 def of_python(
     *words: object, folder: Path = ROOT, code: int | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Python with such words in a process of its own, which has this checkout.
+    """Run Python with such words in a process of its own, which has this checkout.
 
     `code` is the exit code that it must have, if that is all that is asked of it. Its standard
     error is without the line that depends on speed (`without_estimates`).
@@ -39,7 +43,7 @@ def of_python(
         text=True,
         timeout=600,  # of a busy machine
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        env={**os.environ, "PATH": _PATH, "PYTHONPATH": str(ROOT), **environment},
         check=False,
     )
     done.stderr = without_estimates(done.stderr)
@@ -48,13 +52,13 @@ def of_python(
 
 
 def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Code that was run in a folder by a Python of its own, which has this checkout."""
+    """Run code in a folder by a Python of its own, which has this checkout."""
     # Of a fork beside threads, from 3.12.
     return of_python("-W", "ignore:This process:DeprecationWarning", "-c", code, folder=folder)
 
 
 def runs_in_silence(code: str, folder: Path, printed: str = "") -> None:
-    """Code ends well in a Python of its own, and prints nothing but this."""
+    """Assert that code ends well in a Python of its own, and prints nothing but this."""
     done = in_its_own_python(code, folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, printed, "")
 
@@ -63,7 +67,7 @@ Cli = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -> None:
-    """A command was refused, in one line that says why."""
+    """Assert that a command was refused, in one line that says why."""
     assert (done.returncode, done.stdout) == (code, ""), done.stderr
     (line,) = done.stderr.splitlines()
     assert line.startswith("statemachine")
@@ -71,7 +75,7 @@ def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -
 
 
 def lives(pid: int) -> bool:
-    """Whether a process has not ended; zombies have."""
+    """Return whether a process has not ended; zombies have."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     except OSError:
@@ -101,7 +105,7 @@ def files_below(folder: Path, pattern: str) -> list[Path]:
 
 
 def processes_with(part: object) -> list[int]:
-    """Processes in whose command line something stands."""
+    """Return the processes in whose command line something stands."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
@@ -111,5 +115,5 @@ def processes_with(part: object) -> list[int]:
 
 
 def memory_of(pid: int | str = "self") -> float:
-    """Resident memory of a process [MB]."""
+    """Return the resident memory of a process [MB]."""
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * mmap.PAGESIZE / 1e6

@@ -15,7 +15,7 @@ from .small_models import forward_at_one_state, largest_gap, mjcf, model_of, on_
 
 
 def gap(models: list[sm.Model], close: float = 1e-5) -> float:
-    """The largest gap of qpos under random commands; `forward` agrees at the end.
+    """Return the largest gap of qpos under random commands; `forward` agrees at the end.
 
     Closed forms are as close as is asked for; accelerations are sums over sweeps.
     """
@@ -31,12 +31,12 @@ def gap(models: list[sm.Model], close: float = 1e-5) -> float:
 
 
 def moves_as_on_mujoco(folder: Path, text: str, most: float) -> None:
-    """A model moves as on MuJoCo, under random commands, within so much [rad or m]."""
+    """Assert that a model moves as on MuJoCo, under random commands, within `most` [rad or m]."""
     assert gap(on_both(written(folder / "m.xml", f"<mujoco>{text}</mujoco>")), 1e-10) < most
 
 
 def two_free_bodies_are_two(folder: Path) -> None:
-    """Two balls have the mass and the size of each."""
+    """Assert that two balls have the mass and the size of each."""
     from statemachine.backends.bullet.client import pb
 
     balls = "".join(

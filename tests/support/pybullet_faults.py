@@ -24,7 +24,7 @@ from .small_models import TREES
 
 
 def _parts() -> Any:
-    """The modules of the backend, which need the engine to be imported."""
+    """Return the modules of the backend, which need the engine to be imported."""
     from statemachine.backends import hidden_data as _hidden_data
     from statemachine.backends import hidden_world as _hidden_world
     from statemachine.backends import pybullet_backend
@@ -43,7 +43,7 @@ def _parts() -> Any:
 
 
 def around(where: str, name: str) -> Callable[[Callable[..., Any]], Patch]:
-    """As of `patches`; `where` is a path from `_parts`, as "shared.Shared"."""
+    """Put a function around another, as in `patches`; `where` is a path from `_parts`."""
     return patches.around(lambda: functools.reduce(getattr, where.split("."), _parts()), name)
 
 

@@ -30,7 +30,7 @@ VIEWS = ((90, -5), (180, -10), (135, -30), (160, -80))
 
 
 def rendering_environment() -> dict[str, str]:
-    """Environment in which MuJoCo renders; skips without one, or fails where CI wants it."""
+    """Return an environment in which MuJoCo renders; skip, or fail where CI wants one."""
     works, how, _ = room(DEFAULT).drawing_diagnosis()
     if not works:
         absent("render", how)
@@ -39,7 +39,7 @@ def rendering_environment() -> dict[str, str]:
 
 
 def seen_by(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
-    """Where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
+    """Return where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
     right, up, depth = np.array(camera.axes) @ (points - camera.eye).T
     half = np.tan(np.radians(camera.fovy) / 2)
     return np.stack([right / (half * aspect), up / half], axis=1) / depth[:, None]
@@ -48,7 +48,7 @@ def seen_by(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
 def silhouettes(
     model: str | Path, shots: Sequence[tuple[Any, Camera]], size: Sequence[int], at: Path
 ) -> np.ndarray:
-    """Where a robot is seen in poses qpos, each by its camera, drawn by MuJoCo: boolean masks."""
+    """Draw the silhouette of a robot in poses qpos by MuJoCo, each by its camera: boolean masks."""
     job = {
         "model": str(model),
         "size": list(size),
@@ -67,7 +67,7 @@ def silhouettes(
 
 
 def overlaps_of_silhouettes(one: sm.Model, other: str | Path, at: Path) -> np.ndarray:
-    """Intersection over union of two arms' silhouettes, from several sides, in poses."""
+    """Return intersection over union of two arms' silhouettes, from several sides, in poses."""
     shots = []
     for qpos in POSES:
         with opened(one, qpos=qpos, derived=True) as (_, data):

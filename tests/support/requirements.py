@@ -32,7 +32,7 @@ def need_engine(name: str) -> None:
 
 
 def shared(path: Path) -> Path:
-    """Data of the public model, which are not part of the project: skip without them."""
+    """Return data of the public model, which are not part of the project; skip without them."""
     if not path.exists():
         absent("shared", f"no {path.relative_to(SHARED.parent)} beside the checkout")
     return path

@@ -16,12 +16,12 @@ IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 
 
 def mjcf(worldbody: str, rest: str = "", option: str = "") -> str:
-    """An MJCF text: what stands in its world, behind that, and before."""
+    """Return an MJCF text: what stands in its world, behind that, and before."""
     return f"<mujoco>{option}<worldbody>{worldbody}</worldbody>{rest}</mujoco>"
 
 
 def model_of(folder: Path, text: str, name: str = "m.xml", **options: Any) -> sm.Model:
-    """A model of a text."""
+    """Load a model of a text."""
     return sm.load(written(folder / name, text), **options)
 
 
@@ -34,26 +34,26 @@ def loaded(
     name: str = "m.xml",
     **options: Any,
 ) -> sm.Model:
-    """A model of what stands in its world, behind that and before."""
+    """Load a model of what stands in its world, behind that and before."""
     return model_of(folder, mjcf(worldbody, rest, option), name, **options)
 
 
 def on_both(source: str | Path, **options: Any) -> list[sm.Model]:
-    """A model on MuJoCo, and on PyBullet."""
+    """Load a model on MuJoCo, and on PyBullet."""
     return [sm.load(source, backend=backend, **options) for backend in ("mujoco", "pybullet")]
 
 
 def both(
     folder: Path, worldbody: str, rest: str = "", option: str = IMPLICIT, **options: Any
 ) -> list[sm.Model]:
-    """A model of what stands in its world and behind that, on MuJoCo and on PyBullet."""
+    """Load a model of what stands in its world and behind that, on MuJoCo and on PyBullet."""
     return on_both(written(folder / "m.xml", mjcf(worldbody, rest, option)), **options)
 
 
 def largest_gap(
     models: Sequence[sm.Model], data: Sequence[sm.Data], steps: int, every: int, most: float = 1.0
 ) -> float:
-    """The largest gap of qpos under random commands, each for `every` steps, which move them."""
+    """Return the largest gap of qpos under random commands, each held for `every` steps."""
     random, gap, fastest = np.random.default_rng(0), 0.0, 0.0
     left, right = data
     for k in range(steps):
@@ -68,7 +68,7 @@ def largest_gap(
 
 
 def forward_at_one_state(models: Sequence[sm.Model], data: Sequence[sm.Data]) -> None:
-    """What follows from the state of the first, on each."""
+    """Bring all to the state of the first, and compute what follows from it."""
     left, right = data
     right.qpos, right.qvel = left.qpos, left.qvel
     sm.forward(models[0], left)
@@ -76,7 +76,7 @@ def forward_at_one_state(models: Sequence[sm.Model], data: Sequence[sm.Data]) ->
 
 
 def crowded(folder: Path, boxes: int, memory: str) -> sm.Model:
-    """A model that has not enough memory for the contacts of so many boxes."""
+    """Load a model that has not enough memory for the contacts of so many boxes."""
     rows = "".join(
         f"<body pos='{0.05 * (k % 6)} {0.05 * (k // 6)} .05'><freejoint/>"
         "<geom type='box' size='.06 .06 .06'/></body>"

@@ -52,7 +52,7 @@ def _half(text: str) -> str:
 
 
 def urdf(**changes: Any) -> str:
-    """The arm as URDF."""
+    """Return the arm as URDF."""
     a = {**ARM, **changes}
     x, y, z = a["upper_moments"]
     dynamics = (
@@ -102,7 +102,7 @@ def urdf(**changes: Any) -> str:
 
 
 def mjcf(**changes: Any) -> str:
-    """The arm as MJCF."""
+    """Return the arm as MJCF."""
     a = {**ARM, **changes}
     moments = " ".join(map(str, a["upper_moments"]))
     force = f'actuatorfrcrange="-{a["effort"]} {a["effort"]}"'

@@ -21,7 +21,7 @@ VIEW = [sys.executable, "-u", "-m", "statemachine", "view"]
 
 
 def free_pair() -> int:
-    """A port that is free, and the next one too; another for each test at the same time."""
+    """Return a port that is free with the next one too; another for each test at the same time."""
     for port in random.SystemRandom().sample(range(18080, 32000), 100):
         with socket.socket() as one, socket.socket() as two:
             try:
@@ -48,11 +48,11 @@ class Viewer:
         )
 
     def line(self) -> str:
-        """The next line that it says."""
+        """Return the next line that it printed."""
         return self.process.stdout.readline()
 
     def end(self) -> str:
-        """The rest of what it said; it ended well, and complained of nothing."""
+        """Return the rest of what it printed; it ended well, and complained of nothing."""
         rest = self.process.stdout.read()
         code = self.process.wait(timeout=300)
         self._said.seek(0)
@@ -70,7 +70,7 @@ class Viewer:
 
 @contextmanager
 def served(door: Door | None = None) -> Iterator[Any]:
-    """A server of viser's behind a door."""
+    """Start a server of viser's behind a door."""
     port = serving.free_port("127.0.0.1", 0)
     server = serving.serve("127.0.0.1", port, "t", door or Door("127.0.0.1"))
     try:

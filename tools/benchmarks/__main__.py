@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
+from threading import get_ident
 
 import mujoco
 import mujoco.batch
@@ -37,7 +38,10 @@ _N, _MANY = 64, 4096  # worlds
 
 
 def step(name: str, rounds: int) -> list[Ratio]:
-    """`sm.step` against `mj_step`, one step at a time, of one Data: its place in memory counts."""
+    """Compare `sm.step` with `mj_step`, one step at a time, of the same Data.
+
+    Its place in memory counts.
+    """
     model = sm.load(name)
     data = sm.make_data(model)
     raw_model, raw_data = model.raw, data.raw
@@ -56,7 +60,7 @@ def step(name: str, rounds: int) -> list[Ratio]:
 
 
 def parts(name: str, rounds: int) -> list[Ratio]:
-    """What of a step is a function of Python's, the turn, and the look at the warnings.
+    """Compare the parts of a step: a call of Python's, exclusive access, the look at the warnings.
 
     The baseline is the engine's own step; the others add one thing each, to one Data.
     """
@@ -75,29 +79,30 @@ def parts(name: str, rounds: int) -> list[Ratio]:
         for _ in range(STEPS):
             call(model, data)
 
-    def in_turn() -> None:
+    def exclusive() -> None:
         advance, args = data._advance, (data._raw_model, data._raw)
-        turn = data._turn
+        owner = data._owner
         for _ in range(STEPS):
-            if turn.free is model:
-                del turn.free
+            me = get_ident()
+            if data._model is model and not data._unusable and not owner.thread:
+                owner.thread = me
                 advance(*args)
-                turn.free = data._trouble or model
+                owner.thread = 0
 
     def watched() -> None:
         advance, args = data._advance, (data._raw_model, data._raw)
         for _ in range(STEPS):
             advance(*args)
-            if data._warned != data._told:
-                data._attend()
+            if data._pending_warnings != data._seen_warnings:
+                data._raise_pending_warnings()
 
-    added = {"the call": called, "the turn": in_turn, "the look at warnings": watched}
+    added = {"the call": called, "exclusive access": exclusive, "the look at warnings": watched}
     named = {f"of it {words}, {name}": run for words, run in added.items()}
     return interleaved(steps, named, rounds)
 
 
 def bulk(name: str, rounds: int) -> list[Ratio]:
-    """`sm.step(…, n)` against `mj_step(…, n)`."""
+    """Compare `sm.step(…, n)` with `mj_step(…, n)`."""
     model = sm.load(name)
     ours, theirs = sm.make_data(model), sm.make_data(model)
     return interleaved(
@@ -130,7 +135,7 @@ def control_loop(name: str, rounds: int) -> list[Ratio]:
 
 
 def kinematics(name: str, rounds: int) -> list[Ratio]:
-    """A batch of poses by Pinocchio against a loop of `mj_kinematics`."""
+    """Compare a batch of poses by Pinocchio with a loop of `mj_kinematics`."""
     model = sm.load(name)
     witness = sm.Kinematics(name)
     data, tip = mujoco.MjData(model.raw), model.site_id("gripperframe")
@@ -153,7 +158,7 @@ def kinematics(name: str, rounds: int) -> list[Ratio]:
 
 
 def recording(name: str, rounds: int) -> list[Ratio]:
-    """A recorded run against a bare loop with the same controller."""
+    """Compare a recorded run with a bare loop with the same controller."""
     model = sm.load(name)
     bare, watched = sm.make_data(model), sm.make_data(model)
     target = np.array(_FLOOR)
@@ -178,7 +183,7 @@ _FLOOR = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]  # of `lesson hold`, where the finger m
 
 
 def emulation(name: str, rounds: int, target: list[float]) -> list[Ratio]:
-    """A step of the emulated arm on PyBullet against the engine's own idiom in that world.
+    """Compare a step of the emulated arm on PyBullet with the engine's own idiom in that world.
 
     All hold one pose; nothing derived is read.
     """
@@ -219,7 +224,7 @@ def _holding(model: sm.Model, target: list[float]) -> sm.Data:
 
 
 def reading_emulated(name: str, rounds: int, target: list[float]) -> list[Ratio]:
-    """A step on PyBullet after which the fingertip is read, or the contacts, against the step."""
+    """Compare a step on PyBullet that is read, the fingertip or the contacts, with the step."""
     model = sm.load(name, backend="pybullet")
 
     def steps(read: Callable[[sm.Data], object]) -> Callable[[], None]:
@@ -240,7 +245,7 @@ def reading_emulated(name: str, rounds: int, target: list[float]) -> list[Ratio]
 
 
 def looped(name: str, rounds: int, count: int, steps: int) -> list[Ratio]:
-    """Worlds on PyBullet against as many Data stepped one after the other."""
+    """Compare worlds on PyBullet with as many Data stepped one after the other."""
     model = sm.load(name, backend="pybullet")
     singles = [sm.make_data(model) for _ in range(count)]
 
@@ -254,7 +259,7 @@ def looped(name: str, rounds: int, count: int, steps: int) -> list[Ratio]:
 
 
 def freshness(name: str, rounds: int) -> list[Ratio]:
-    """What `sm.freshness` and a watch cost: nothing to a step when they are not in use.
+    """Measure what `sm.freshness` and a watch cost: nothing to a step when they are not in use.
 
     The baseline is `sm.step` on a Data that nobody ever asked; another one like it is a null
     of two Data. One was asked and watched before; the last is watched, and counted.
@@ -318,7 +323,7 @@ def reading(name: str, rounds: int) -> list[Ratio]:
 
 
 def _worlds(name: str, rounds: int, workers: int) -> list[Ratio]:
-    """Many worlds against a loop of bulk calls, one for each of as many MjData.
+    """Compare many worlds with a loop of bulk calls, one for each of as many MjData.
 
     The engine's own batch, on as many threads, tells what this machine can give.
     """
@@ -342,17 +347,17 @@ def _worlds(name: str, rounds: int, workers: int) -> list[Ratio]:
 
 
 def worlds_alone(name: str, rounds: int) -> list[Ratio]:
-    """Many worlds on one thread."""
+    """Compare many worlds on one thread with the loop of bulk calls."""
     return _worlds(name, rounds, 1)
 
 
 def worlds_on_two(name: str, rounds: int) -> list[Ratio]:
-    """Many worlds on two processors."""
+    """Compare many worlds on two processors with the loop of bulk calls."""
     return _worlds(name, rounds, 2)
 
 
 def worlds_memory(name: str, _rounds: int) -> list[Ratio]:
-    """Resident memory of a world, in kB, with all derived arrays.
+    """Measure the resident memory of a world [kB], with all derived arrays.
 
     Of a process of its own, twice: one that ran before has memory that can be used again.
     """
@@ -377,7 +382,7 @@ print((sizes[1] - sizes[0]) / {_MANY} / 1000)
 
 
 def environments(name: str, rounds: int) -> list[Ratio]:
-    """A control step of 64 worlds of an example for Gymnasium, against the engine's own batch.
+    """Compare a control step of 64 worlds of an example for Gymnasium with the engine's own batch.
 
     The baseline writes ctrl, steps and calls forward; the others observe and reward, too.
     """
@@ -418,7 +423,7 @@ def environments(name: str, rounds: int) -> list[Ratio]:
 
 
 def why_in_forks(name: str, rounds: int) -> list[Ratio]:
-    """22 differences explained in two processes, against one: `compare --why --jobs 2`."""
+    """Compare 22 differences explained in two processes with one: `compare --why --jobs 2`."""
     left = sm.load(name)
     edits = [("body_mass", (k,), left.compiled.body_mass[k] * 1.05) for k in range(1, 5)]
     for field in ("dof_damping", "dof_armature", "dof_frictionloss"):
@@ -438,13 +443,13 @@ def why_in_forks(name: str, rounds: int) -> list[Ratio]:
 
 
 def in_a_row(model: sm.Model, data: sm.Data) -> None:
-    """Some calls of `STEPS`, as of a loop: the first one finds the other process asleep."""
+    """Make some calls of `STEPS`, as of a loop: the first one finds the other process asleep."""
     for _ in range(20):
         sm.step(model, data, STEPS)
 
 
 def another_python(name: str, rounds: int) -> list[Ratio]:
-    """The installed release in a process of its own, against itself in this one.
+    """Compare the installed release in a process of its own with itself in this one.
 
     The last lines are not ratios: what a call takes, with the tenth and the ninetieth percentile.
     """

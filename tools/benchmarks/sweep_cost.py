@@ -37,12 +37,12 @@ TASKS, ROWS = 1000, 400
 
 
 def empty(number: int) -> int:
-    """A task that does nothing."""
+    """Do nothing: a task whose cost is the scheduler's."""
     return number
 
 
 def cells(what: str, backend: str, vary: tuple[str, ...], seeds: int) -> tuple[float, list[Row]]:
-    """Processor seconds of a cell, and the rows; the first ones, which load, are left out."""
+    """Return the processor time of a cell [s], and the rows, without the first ones, which load."""
     ready = prepared(Sweep(what, vary, (backend,), seeds=seeds))
     every = list(ready.cells(backend))
     run_batch(ready, every[:1], False)
@@ -52,7 +52,7 @@ def cells(what: str, backend: str, vary: tuple[str, ...], seeds: int) -> tuple[f
 
 
 def bytes_of(rows: list[Row], moments: int) -> tuple[float, float, float]:
-    """Bytes of a row on disk; seconds to write one, and to read its id again."""
+    """Return the size of a row on disk [bytes], and the times to write and to read one [s]."""
     ready = prepared(Sweep("hold", ("damping=0.5x,2x",), ("mujoco",), moments=moments))
     with tempfile.TemporaryDirectory() as folder:
         writer = RowWriter(Path(folder), ready.design.factors, {"request": {}})
@@ -68,7 +68,7 @@ def bytes_of(rows: list[Row], moments: int) -> tuple[float, float, float]:
 
 
 def ids() -> tuple[float, float]:
-    """Processor seconds to name a cell, and bytes to remember that it is there."""
+    """Return the processor time to name a cell [s], and the memory to remember it [bytes]."""
     ready = prepared(Sweep("hold", ("damping=0.5x:2x:10000",), ("mujoco",)))
     began = time.process_time()
     number = sum(1 for _ in ready.cells("mujoco"))
@@ -81,7 +81,7 @@ def ids() -> tuple[float, float]:
 
 
 def steps_alone(backend: str) -> float:
-    """Processor seconds of the steps of `hold`, and of nothing else."""
+    """Return the processor time of the steps of `hold` [s], and of nothing else."""
     model = sm.load("so101/scene", backend=backend)
     with sm.make_data(model) as data:
         data.ctrl[:] = TARGET
@@ -91,7 +91,7 @@ def steps_alone(backend: str) -> float:
 
 
 def rate(submit: Callable[..., Any], workers: int) -> float:
-    """Empty tasks a second, with twice as many in the air as there are workers."""
+    """Measure empty tasks a second, with twice as many in the air as there are workers."""
     [future.result() for future in [submit(empty, k) for k in range(50)]]  # all workers are there
     waiting = deque(submit(empty, k) for k in range(2 * workers))
     began = time.perf_counter()

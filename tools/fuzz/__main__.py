@@ -26,12 +26,12 @@ _WIDTH = 100  # of a failure in the table
 
 
 def targets() -> list[str]:
-    """Names of all targets."""
+    """Return the names of all targets."""
     return sorted(path.stem for path in _FOLDER.glob("[!_]*.py"))
 
 
 def run_apart(target: str, seed: int, times: float) -> Tally:
-    """A target in a child process; the end of the child is a failure, too.
+    """Run a target in a child process; the end of the child is a failure, too.
 
     Args:
         target: Its name.

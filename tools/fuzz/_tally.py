@@ -31,12 +31,12 @@ def limit_memory() -> None:
 
 
 def command(*words: str) -> list[str]:
-    """A command line of this checkout."""
+    """Return a command line of this checkout."""
     return [sys.executable, "-m", "statemachine", *words]
 
 
 def environment() -> dict[str, str]:
-    """An environment in which this checkout is found, and nothing of the user's counts."""
+    """Return an environment in which this checkout is found, and nothing of the user's counts."""
     kept = {name: value for name, value in os.environ.items() if name != "MENAGERIE"}
     return kept | {"PYTHONPATH": str(ROOT), "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 

@@ -39,7 +39,7 @@ class _Calls:
         self.states = [sm.get_state(model, data) for model, data in self.datas]
 
     def draw(self) -> tuple[str, sm.Data, Callable[[], Any]]:
-        """A call: what it is, on which Data, and how it is done."""
+        """Draw a call: what it is, on which Data, and how it is made."""
         chance = self.random
         model, data = chance.choice(self.datas)
         if chance.random() < 0.1:
@@ -67,13 +67,13 @@ class _Calls:
         return words, data, calls[words]
 
     def value(self) -> Any:
-        """What may be given for an array."""
+        """Draw a value to assign to an array, valid or not."""
         size = self.random.choice([6, 6, 12, 13, 13, 0, 5])
         value = self.numbers.normal(size=size) * self.random.choice([0.01, 1, 1e5])
         return self.random.choice([value, value.tolist(), value.astype("f4"), *_ODD])
 
     def write(self, data: sm.Data, entry: str) -> None:
-        """Past the checks, as a controller writes."""
+        """Write into an array past the checks, as a controller does."""
         array = getattr(data, entry)
         number = self.random.choice([0.0, 0.1, -0.1, 1e11, float("nan"), float("inf")])
         array[self.random.randrange(len(array))] = number
@@ -84,7 +84,7 @@ def _looks(data: sm.Data) -> tuple[Any, ...]:
 
 
 def _judge(words: str, data: sm.Data, call: Callable[[], Any], alone: bool) -> str:
-    """What is wrong with what a call did; "" if nothing is."""
+    """Return what is wrong with the effect of a call; "" if nothing is."""
     before = _looks(data)
     try:
         value = call()
@@ -96,7 +96,7 @@ def _judge(words: str, data: sm.Data, call: Callable[[], Any], alone: bool) -> s
         ours = isinstance(error, StateMachineError) or "got " in str(error)
         if not ours:
             return f"{words}: TypeError {error}"
-        if alone and not data._trouble and _looks(data) != before:
+        if alone and not data._unusable and _looks(data) != before:
             return f"{words}: {type(error).__name__}, and something has changed"
         return ""
     except Exception as error:
@@ -105,13 +105,13 @@ def _judge(words: str, data: sm.Data, call: Callable[[], Any], alone: bool) -> s
         return f"{words}: not a number, in silence"
     if alone and words.startswith(("step", "forward", "reset", "set_state")):
         arrays = (data.qpos, data.qvel, data.qacc)
-        if not data._trouble and not all(np.isfinite(array).all() for array in arrays):
+        if not data._unusable and not all(np.isfinite(array).all() for array in arrays):
             return f"{words}: not a number after it, in silence"
     return ""
 
 
 def run(seed: int, tries: int) -> Tally:
-    """Half of the calls from one thread, half of them from several at once."""
+    """Make half of the calls from one thread, half of them from several at once."""
     tally, failures = Tally(), set[str]()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

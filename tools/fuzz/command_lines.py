@@ -60,7 +60,7 @@ def run(seed: int, tries: int) -> Tally:
 
 
 def odd(draw: random.Random) -> list[str]:
-    """A command with a word changed, left out, put in or said twice."""
+    """Draw a command with a word changed, left out, put in or said twice."""
     words = list(draw.choice(_BASES))
     place = draw.randrange(1, len(words)) if len(words) > 1 else 1
     pool = draw.choice([_NUMBERS, _NAMES, _OUTPUTS])
@@ -77,7 +77,7 @@ def odd(draw: random.Random) -> list[str]:
 
 
 def examine(words: list[str], folder: Path) -> str:
-    """What is wrong with how a command ends, or ""."""
+    """Return what is wrong with how a command ends, or ""."""
     code, out, said = run_bounded(words, folder)
     if code is None:
         return "it hangs"
@@ -92,7 +92,7 @@ def examine(words: list[str], folder: Path) -> str:
 
 
 def _furnish(folder: Path) -> None:
-    """Files for the commands to work on."""
+    """Write the files that the commands work on."""
     run_bounded(command("trace", "record", "hold", "--seconds", "0.05", "-o", "t.npz"), folder)
     (folder / "idle.py").write_text("def controller(model, data): return None\n")
     (folder / "bad.npz").write_bytes(b"PK\x03\x04garbage")

@@ -288,7 +288,7 @@ def _wrong_answer(
 
 
 def _contact(draw: random.Random, folder: Path) -> list[str]:
-    """Legs that fall on the floor with their actuators off."""
+    """Draw legs that fall on the floor with their actuators off."""
     left = drawn_parameters(draw, 4)
     right, causes = edited(draw, left, {**_EDITS_WITHOUT_SERVOS, **_CONTACT_EDITS}, 3)
     _write(folder, mjcf_of(left), mjcf_of(right))
@@ -299,7 +299,7 @@ def _contact(draw: random.Random, folder: Path) -> list[str]:
 
 
 def _function(draw: random.Random, folder: Path) -> list[str]:
-    """Legs that a function commands."""
+    """Draw legs that a function commands."""
     left = drawn_parameters(draw, draw.choice([2, 4]))
     right, causes = edited(draw, left, _EDITS, 3)
     _write(folder, mjcf_of(left), mjcf_of(right))
@@ -319,7 +319,7 @@ def _function(draw: random.Random, folder: Path) -> list[str]:
 
 
 def _releases(draw: random.Random, folder: Path) -> list[str]:
-    """One robot in two releases, with edits: each release's own motion gives the gap."""
+    """Draw one robot in two releases, with edits: each release's own motion gives the gap."""
     left = drawn_parameters(draw, 2)
     right, causes = edited(draw, left, _FIXED_EDITS, 2)
     _write(folder, mjcf_of(left, floats=False), mjcf_of(right, floats=False))
@@ -338,7 +338,7 @@ def _releases(draw: random.Random, folder: Path) -> list[str]:
 
 
 def _base(draw: random.Random, folder: Path) -> list[str]:
-    """A URDF whose base is free on the left: told so, and not told of the right."""
+    """Draw a URDF whose base is free on the left: told so, and not told of the right."""
     left = drawn_parameters(draw, 4)
     names = {name: cause for name, cause in _FIXED_EDITS.items() if "armature" not in name}
     right, causes = edited(draw, left, names, 2)
@@ -374,7 +374,7 @@ def floating(urdf: str) -> str:
 
 
 def _pybullet(draw: random.Random, folder: Path) -> list[str]:
-    """A URDF as PyBullet's own users load it, against MuJoCo: no good verdict where they differ."""
+    """Draw a URDF as PyBullet's users load it, against MuJoCo: no good verdict if they differ."""
     left = drawn_parameters(draw, draw.choice([2, 4]))
     (folder / "left.urdf").write_text(urdf_of(left), encoding="utf-8")
     sides = ("left.urdf", f"timestep={1 / 240!r}", "left.urdf@pybullet:engine")

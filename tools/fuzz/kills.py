@@ -79,7 +79,7 @@ def _kill(source: Path, target: Path, after: float) -> None:
 
 
 def examine(target: Path) -> str:
-    """What is wrong with what is there, or ""."""
+    """Return what is wrong with what is there, or ""."""
     main, *others = _files(target)
     if not main.exists():
         return "it is gone"
@@ -90,7 +90,7 @@ def examine(target: Path) -> str:
 
 
 def _age(file: Path) -> str:
-    """Whether a file is the old one, a new one, or neither."""
+    """Return whether a file is the old one, a new one, or neither."""
     content = file.read_bytes()
     if content == _OLD:
         return "old"

@@ -80,7 +80,7 @@ def run(seed: int, tries: int) -> Tally:
 
 
 def strange(draw: random.Random) -> tuple[str, str, bytes]:
-    """What was changed, the suffix, and the bytes of a model file."""
+    """Draw a damaged model file: what was changed, the suffix, and its bytes."""
     suffix, good = draw.choice([(".xml", _MJCF), (".urdf", _URDF)])
     change = draw.choice([_attribute, _attribute, _attribute, _cut, _nested, _bytes])
     what, content = change(draw, good)
@@ -119,7 +119,7 @@ def _bytes(draw: random.Random, good: str) -> tuple[str, bytes]:
 
 
 def examine(words: list[str | bytes] | list[str], folder: Path) -> str:
-    """What is wrong with how a file is read, or ""."""
+    """Return what is wrong with how a file is read, or ""."""
     code, out, said = run_bounded(words, folder)
     if code is None:
         return "it hangs"

@@ -59,7 +59,7 @@ _WELL = (
 # Lessons that take any model, with what makes them short.
 _LESSONS: dict[str, tuple[str, ...]] = {
     "state": (),
-    "write": (),
+    "nowhere": (),
     "forward": (),
     "objects": (),
     "hold": ("--seconds", "0.05"),

@@ -41,7 +41,7 @@ def run(seed: int, tries: int) -> Tally:
 
 
 def examine(model: sm.Model, draw: random.Random) -> str:
-    """What is wrong with a Data that all threads step, or ""."""
+    """Return what is wrong with a Data that all threads step, or ""."""
     done, wrong = [0] * _THREADS, list[str]()
 
     def work(number: int, counts: list[int]) -> None:

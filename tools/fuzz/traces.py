@@ -55,7 +55,7 @@ def run(seed: int, tries: int) -> Tally:
 
 
 def examine(path: Path, trace: Trace, exact: bool) -> str:
-    """What is wrong with how a damaged file is read, or "".
+    """Return what is wrong with how a damaged file is read, or "".
 
     Args:
         path: The file.
@@ -84,7 +84,7 @@ def _same(found: Trace, trace: Trace) -> bool:
 
 
 def _flip(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]:
-    """One bit, anywhere or near the end, where the lists of contents are."""
+    """Flip one bit, anywhere or near the end, where the lists of contents are."""
     bad = bytearray(good)
     far = len(bad) if draw.random() < 0.6 else min(len(bad), 6000)
     bad[len(bad) - 1 - draw.randrange(far)] ^= 1 << draw.randrange(8)
@@ -92,7 +92,7 @@ def _flip(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]
 
 
 def _scramble(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]:
-    """Several bytes."""
+    """Change several bytes."""
     bad = bytearray(good)
     for _ in range(draw.choice([2, 10, 100])):
         bad[draw.randrange(len(bad))] = draw.randrange(256)
@@ -100,14 +100,14 @@ def _scramble(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, b
 
 
 def _cut(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]:
-    """The beginning, the end, or with something put in between."""
+    """Cut the file to its beginning or its end, or put something in between."""
     place = draw.randrange(len(good))
     between = draw.randbytes(20)
     return draw.choice([good[:place], good[place:], good[:place] + between + good[place:]]), True
 
 
 def _column(draw: random.Random, _good: bytes, trace: Trace) -> tuple[bytes, bool]:
-    """A column of another shape, kind or content, or an entry that is not an array."""
+    """Give a column another shape, dtype or content, or put in an entry that is not an array."""
     name = draw.choice(list(trace.columns))
     array: Any = np.array(trace[name])
     odd = [
@@ -126,7 +126,7 @@ def _column(draw: random.Random, _good: bytes, trace: Trace) -> tuple[bytes, boo
 
 
 def _claim(draw: random.Random, array: Any) -> bytes:
-    """An array that says it is larger than it is."""
+    """Return the bytes of an array that claims to be larger than it is."""
     out = io.BytesIO()
     shape = draw.choice([(10**12,), (-5,), (0, 10**18), (2**62, 2**62), array.shape])
     np.lib.format.write_array_header_1_0(
@@ -136,7 +136,7 @@ def _claim(draw: random.Random, array: Any) -> bytes:
 
 
 def _header(draw: random.Random, _good: bytes, trace: Trace) -> tuple[bytes, bool]:
-    """One fact of the header, or an option, is odd."""
+    """Give one fact of the header, or an option, an odd value."""
     facts = json.loads(trace.header.as_json())
     name, value = draw.choice(list(facts)), draw.choice([*_ODD, [None] * 7, [[1], [2, 3]]])
     if draw.random() < 0.3:
@@ -149,7 +149,7 @@ def _header(draw: random.Random, _good: bytes, trace: Trace) -> tuple[bytes, boo
 
 
 def _packed(trace: Trace, facts: dict[str, Any], entries: dict[str, Any]) -> bytes:
-    """The bytes of an npz with another header or other entries."""
+    """Return the bytes of an npz with another header or other entries."""
     text = json.dumps(facts) if facts else trace.header.as_json()
     arrays: dict[str, Any] = dict(trace.columns)
     arrays["header"] = np.frombuffer(text.encode(), dtype=np.uint8)

@@ -33,7 +33,7 @@ def _git(*arguments: str) -> str:
 
 
 def _copy(name: str) -> Path:
-    """A clone of what is committed, beside which shared data are found as beside the checkout."""
+    """Clone what is committed, where shared data are found as they are beside the checkout."""
     tree = WORK / name
     shutil.rmtree(tree, ignore_errors=True)
     _git("clone", "-q", "--shared", str(ROOT), str(tree))
@@ -55,7 +55,7 @@ def _end(running: subprocess.Popen[bytes], tree: Path) -> None:
 
 
 def _tried(site: Site, tests: list[str], tree: Path) -> tuple[str, str]:
-    """What became of a mutant, and the test that noticed it."""
+    """Return what became of a mutant, and the test that noticed it."""
     if not tests:
         return "not covered", ""
     path, listed = tree / site.mutant.file, tree.with_suffix(".txt")

@@ -29,7 +29,7 @@ disable_warnings = no-data-collected, module-not-imported, already-imported, cou
 
 
 def environment(tree: Path) -> dict[str, str]:
-    """Of tests in a copy of the checkout: every process they start imports that copy."""
+    """Return the environment of tests in a copy: every process they start imports that copy."""
     return {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
@@ -70,7 +70,7 @@ class Covered:
             self._of_file[test.partition("::")[0]].append(test)
 
     def tests(self, site: Site, seconds: float) -> list[str]:
-        """Tests that run the statement of a mutant.
+        """Return the tests that run the statement of a mutant.
 
         Those whose file is named after its room or module come first, then the quickest. What
         runs at import belongs to the tests of all functions of its module, and what a fixture

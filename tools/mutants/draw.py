@@ -79,13 +79,13 @@ class Site:
     called: bool
 
     def source(self, root: Path) -> bytes:
-        """The module with the fault in it."""
+        """Return the source of the module with the fault in it."""
         text = (root / self.mutant.file).read_bytes()
         return text[: self.start] + self.mutant.becomes.encode() + text[self.stop :]
 
 
 def _faults(node: ast.AST) -> Iterator[tuple[str, str]]:
-    """Kind and code of each fault that a node itself allows."""
+    """Yield kind and code of each fault that a node itself allows."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             yield "number", repr(value + 1 if isinstance(value, int) else value * 1.1 or 1.0)
@@ -115,7 +115,7 @@ def _faults(node: ast.AST) -> Iterator[tuple[str, str]]:
 
 
 def _own(statement: ast.stmt) -> Iterator[Any]:
-    """The nodes of a statement without those of statements in it, annotations and f-strings."""
+    """Yield the nodes of a statement, but not of nested statements, annotations, f-strings."""
     waiting: deque[ast.AST] = deque([statement])
     while waiting:
         node = waiting.popleft()
@@ -136,7 +136,7 @@ def _own(statement: ast.stmt) -> Iterator[Any]:
 def _statements(
     node: ast.AST, scope: tuple[str, ...] = (), called: bool = False
 ) -> Iterator[tuple[ast.stmt, str, bool]]:
-    """Every statement below a node, the scope it is in, and whether a function is around it."""
+    """Yield every statement below a node, its scope, and whether a function is around it."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.stmt) and not isinstance(child, ast.Import | ast.ImportFrom):
             yield child, ".".join(scope), called
@@ -146,7 +146,7 @@ def _statements(
 
 
 def sites(file: Path, root: Path) -> Iterator[Site]:
-    """Every fault that a module allows."""
+    """Yield every fault that a module allows."""
     text = file.read_bytes()
     starts = [0]
     for line in text.splitlines(keepends=True):
@@ -170,7 +170,7 @@ def sites(file: Path, root: Path) -> Iterator[Site]:
 
 
 def all_sites(root: Path) -> list[Site]:
-    """Every fault that the package allows, in the order of its files."""
+    """Return every fault that the package allows, in the order of its files."""
     files = sorted((root / "statemachine").rglob("*.py"))
     return [site for file in files for site in sites(file, root)]
 
@@ -184,13 +184,13 @@ def by_code(sites: Iterable[Site]) -> dict[tuple[str, str, int, str], list[Site]
 
 
 def draw(count: int, seed: int) -> list[Mutant]:
-    """Mutants of the package, each fault equally likely."""
+    """Draw mutants of the package, each fault equally likely."""
     mutants = sorted({site.mutant for site in all_sites(ROOT)}, key=str)
     return sorted(random.Random(seed).sample(mutants, count), key=str)
 
 
 def find(mutant: Mutant, standing: dict[tuple[str, str, int, str], list[Site]]) -> Site | None:
-    """Where a mutant's code stands today: in its place, in its function, or alone of its kind."""
+    """Return where a mutant's code is today: in its place, its function, or the only one."""
     same = standing.get(mutant.code, [])
     for fits in (
         [site for site in same if site.mutant == mutant],

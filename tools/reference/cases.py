@@ -28,8 +28,8 @@ MODELS = {
 }
 PAIRS = tomllib.loads((HERE / "pairs.toml").read_text("utf-8"))
 _LESSONS = (
-    *("objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time"),
-    *("speed", "questions"),
+    *("nowhere", "objects", "state", "forward", "hold", "gravity", "reset", "replay", "time"),
+    *("summary", "questions"),
 )
 # Without them the lesson looks how fast the machine is.
 _LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20")}
@@ -58,7 +58,7 @@ class Case:
 
 
 def of_model(model: str) -> Iterator[Case]:
-    """Every question about a model, on both engines."""
+    """Yield every question about a model, on both engines."""
     path = str(MODELS[model])
     both = ("--backend", "all")
     short = _SHORT.get(model, ())
@@ -66,7 +66,7 @@ def of_model(model: str) -> Iterator[Case]:
         case = f"lesson {name}"
         command = ("lesson", name, "--model", path, *both, *_LENGTHS.get(name, ()))
         yield Case(case, case, (*command, "--json"))
-        if name not in {"speed", "time"}:
+        if name not in {"summary", "time"}:
             yield Case(f"{case}, marks", "", (*command, "--no-questions"))
     for name in _EXPERIMENTS:
         # The chaos floor runs both sides eight times more: of one experiment.
@@ -92,7 +92,7 @@ def of_model(model: str) -> Iterator[Case]:
 
 
 def of_pair(name: str) -> Iterator[Case]:
-    """What two files differ in, how far apart they run, and why; writes the right one."""
+    """Yield what two files differ in, how far apart they run, and why; write the right one."""
     pair = PAIRS[name]
     source = HERE / "pairs" / pair["file"]
     other = HERE / "pairs" / pair.get("other", pair["file"])

@@ -44,7 +44,7 @@ def curve(array: np.ndarray) -> Any:
 
 
 def _list(values: list[Any]) -> Any:
-    """A list of numbers or words; curves are shortened."""
+    """Return a list of numbers or words, of which curves are shortened."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
@@ -53,7 +53,7 @@ def _list(values: list[Any]) -> Any:
 
 
 def _word(field: str, kind: str) -> str:
-    """What a field measures in the output of a kind."""
+    """Return what a field measures in the output of a kind."""
     for section in (kind, kind.partition(" ")[0], "all"):
         if field in _WORDS.get(section, {}):
             return _WORDS[section][field]
@@ -61,7 +61,7 @@ def _word(field: str, kind: str) -> str:
 
 
 def flatten(value: Any, kind: str, key: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
-    """The figures in the output of a command, with their keys.
+    """Yield the figures in the output of a command, with their keys.
 
     Raises:
         KeyError: words.toml has no word for a field.
@@ -91,7 +91,7 @@ def flatten(value: Any, kind: str, key: tuple[str, ...] = ()) -> Iterator[tuple[
 
 
 def of_output(text: str, kind: str) -> Figures:
-    """The figures of a command's JSON; without a kind the marks of what it claims."""
+    """Return the figures of a command's JSON; without a kind the marks of what it claims."""
     if not kind:
         marks = "".join(re.findall("^ *([✓✗])", text, re.MULTILINE))
         return {"claims": marks} if marks else {}

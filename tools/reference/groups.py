@@ -39,7 +39,7 @@ def machine() -> dict[str, str]:
 
 
 def _of(case: Case) -> Figures:
-    """The figures of a command, with its exit code."""
+    """Return the figures of a command, with its exit code."""
     shown = io.StringIO()
     with contextlib.redirect_stdout(shown), contextlib.redirect_stderr(io.StringIO()):
         try:
@@ -60,7 +60,7 @@ def _commands(cases: Callable[..., Iterable[Case]], *of: str) -> dict[str, Figur
 
 
 def _engines() -> dict[str, Figures]:
-    """Every convention, the contract, and a Data of each engine."""
+    """Return the figures of every convention, of the contract, and of a Data of each engine."""
     asked = {"conventions": _of(Case("", "conventions", ("conventions", "--json")))}
     for backend in _BACKENDS:
         asked[f"contract, {backend}"] = questions.contract(backend)
@@ -73,7 +73,7 @@ def _on_each(question: Callable[[str], Figures]) -> dict[str, Figures]:
 
 
 def _sweep() -> dict[str, Figures]:
-    """A small sweep and what it says."""
+    """Return the figures of a small sweep and its summary."""
     vary = ("--vary", "timestep=0.002,0.005", "--vary", "damping=0.5x:2x:3", "--seeds", "2")
     sweep = ("sweep", "hold", *vary, "--seconds", "0.5", "--out", "cells", "--jobs", "1", "--json")
     report = ("sweep", "--report", "cells", "--json")
@@ -81,7 +81,7 @@ def _sweep() -> dict[str, Figures]:
 
 
 def _students() -> dict[str, Figures]:
-    """What the judge says of each attempt, and of the solutions."""
+    """Return the judge's verdict on each attempt, and on the solutions."""
     files = dict(questions.student_files(Path.cwd()))
     files["the solution"] = ROOT / "teaching" / "solutions" / "step_loop.py"
     return {
@@ -102,13 +102,13 @@ GROUPS: dict[str, Callable[[], dict[str, Figures]]] = {
 
 
 def absent(group: str) -> bool:
-    """Whether a group is of a public model that is not beside this checkout."""
+    """Return whether a group is of a public model that is not beside this checkout."""
     path = MODELS.get(group)
     return isinstance(path, Path) and not path.exists()
 
 
 def figures(group: str) -> dict[str, Figures]:
-    """The figures of a group, computed now in an empty folder."""
+    """Compute the figures of a group in an empty folder."""
     here = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)

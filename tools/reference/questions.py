@@ -20,12 +20,12 @@ from .figures import Figures, curve
 
 
 def contract(backend: str) -> Figures:
-    """What became of each check of the contract."""
+    """Return the outcome of each check of the contract."""
     return {outcome.check: str(outcome.result) for outcome in conformance.run(backend)}
 
 
 def one_data(backend: str) -> Figures:
-    """A Data with a box in its jaws: stepped, saved, restored and read."""
+    """Step, save, restore and read a Data with a box in its jaws."""
     model = sm.load("so101/scene_box", backend=backend)
     with sm.make_data(model) as data:
         sm.reset(model, data, keyframe=0)
@@ -47,7 +47,7 @@ def one_data(backend: str) -> Figures:
 
 
 def many_worlds(backend: str) -> Figures:
-    """Eight worlds of one Model, each told another command."""
+    """Step eight worlds of one Model, each under another command."""
     model = sm.load("so101/scene_box", backend=backend)
     with make_worlds(model, 8, workers=2) as worlds:
         reset(worlds, keyframe=0)
@@ -64,7 +64,7 @@ def many_worlds(backend: str) -> Figures:
 
 
 def tasks(backend: str) -> Figures:
-    """Four episodes of each task at once, by chance and by the scripted policy."""
+    """Run four episodes of each task at once, by chance and by the scripted policy."""
     figures: Figures = {}
     for task, example in (("Reach", reach), ("HeldBox", held_box)):
         envs = make_vec(num_envs=4, **example.task(backend))
@@ -77,7 +77,7 @@ def tasks(backend: str) -> Figures:
 
 
 def student_files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Each attempt of tests/support/exercises in a file of its own, as a student hands it in."""
+    """Yield each attempt of tests/support/exercises in a file, as a student hands it in."""
     exercises = importlib.import_module("tests.support.exercises")
     for attempt in (*exercises.WRONG, *exercises.RIGHT):
         file = folder / f"{attempt.solves} {attempt.name.partition('-')[2]}.py"

@@ -56,7 +56,7 @@ def disconnect(client: int) -> None:
 
 @contextmanager
 def as_file(text: str, beside: Mapping[str, str] = MappingProxyType({})) -> Iterator[str]:
-    """A name under which PyBullet can read a text.
+    """Yield a name under which PyBullet can read a text.
 
     Nothing is left when the process dies, where nothing has to lie beside it.
 
@@ -98,7 +98,7 @@ def load_urdf(client: int, file: str, what: str, **options: Any) -> int:
 
 
 def joint_infos(client: int, body: int) -> list[Any]:
-    """What getJointInfo tells of each joint of a body, fixed ones too."""
+    """Return what getJointInfo tells of each joint of a body, fixed ones too."""
     return [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def _related(raw: MjModel, dofs: Any) -> Any:
-    """(n, n): of which pairs of degrees of freedom one carries the other."""
+    """Return (n, n) of which pairs of degrees of freedom one carries the other."""
     carriers = np.eye(raw.nv, dtype=bool)
     for dof, parent in enumerate(raw.dof_parentid.tolist()):  # what carries comes first
         if parent >= 0:
@@ -111,16 +111,16 @@ class Tendons:
         return self.squared(self._bent_damping)
 
     def squared(self, weight: Array) -> Array:
-        """Jᵀ·W·J (n, n) of weights (t,)."""
+        """Return Jᵀ·W·J (n, n) of weights (t,)."""
         return dense.product(self._across * weight, self._moment)
 
     def spring_force(self) -> Array:
-        """(n,) what springs do where they are beyond their slack."""
+        """Return the forces (n,) of springs where they are beyond their slack."""
         slack = np.minimum(np.maximum(self.lengths, self._slack[0]), self._slack[1])
         return dense.times(self._across, self._stiffness * (slack - self.lengths))
 
     def stops(self, speed: Array) -> list[SoftRow]:
-        """Rows of the limits that tendons are beyond."""
+        """Return the rows of the limits that tendons are beyond."""
         rows, rate, length = [], dense.times(self._moment, speed), self.lengths
         for k, (low, high) in enumerate(zip(*self._range, strict=True)):
             for side, gap in ((1.0, length[k] - low), (-1.0, high - length[k])):
@@ -131,7 +131,7 @@ class Tendons:
         return rows
 
     def rubbing(self, speed: Array) -> list[SoftRow]:
-        """Rows of dry friction."""
+        """Return the rows of dry friction."""
         if not self.rubs:
             return []
         rate = dense.times(self._moment, speed)
@@ -243,7 +243,8 @@ class Equalities:
     def _apart(
         self, eq: int, places: list[TiedPlace], q: Sequence[float], speed: Array
     ) -> tuple[Array, Array, Array]:
-        """By how much two places differ (6,), J (6, n) of that, and what J's change does (6,).
+        """Return the difference of two poses (6,), its Jacobian (6, n), and the Jacobian's change
+        times qvel (6,).
 
         Three numbers are of their positions, three of their axes.
         """
@@ -267,7 +268,9 @@ class Equalities:
         scale, back = 0.5 * float(self._raw.eq_data[eq, 10]), quats[1] * INVERSE
 
         def turned(spin: Array) -> Array:
-            """What a spin (…, 3) does to the quaternion from one place to the other (…, 3)."""
+            """Return the change of the quaternion (…, 3) from one place to the other under a
+            spin (…, 3).
+            """
             pure = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
             return times(times(back, pure), quats[0])
 
@@ -279,7 +282,7 @@ class Equalities:
         return gaps, jacobian, drift
 
     def _drift(self, jacobian: Array, speed: Array) -> tuple[Array, Array]:
-        """How a place spins (3,), and how it moves and turns faster (6,) without any qacc.
+        """Return the angular velocity (3,) of a place, and its acceleration (6,) without any qacc.
 
         The axis of each joint is a screw about the place, and moves with the body that carries
         it: its rate is the motion cross product with that body's velocity [Featherstone, Rigid

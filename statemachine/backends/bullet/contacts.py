@@ -177,7 +177,7 @@ class Surfaces:
             self.differences.append(f"{what} of {pair} is {ours:.3g}, not {theirs:.3g}")
 
     def _combined(self, turning: Array, i: int, j: int) -> float:
-        """What PyBullet makes of the spinning or rolling friction of two."""
+        """Return PyBullet's combination of the spinning or rolling friction of two geoms."""
         return float(turning[i] * self.slide[j] + turning[j] * self.slide[i])
 
     def _turning(self, wanted: list[PairFriction], of_pairs: list[float]) -> Array:
@@ -193,7 +193,7 @@ class Surfaces:
 
 
 def _meets(raw: MjModel) -> NDArray[np.bool_]:
-    """(ngeom, ngeom): which geoms may touch."""
+    """Return (ngeom, ngeom) of which geoms may touch."""
     if raw.opt.disableflags & NO_CONTACT:
         return np.zeros((raw.ngeom, raw.ngeom), dtype=bool)
     meets = (raw.geom_contype[:, None] & raw.geom_conaffinity) != 0
@@ -227,7 +227,7 @@ def _solids(raw: MjModel, meets: NDArray[np.bool_], touching: NDArray[np.bool_])
 
 
 def _mixed(raw: MjModel, a: int, b: int) -> tuple[int, Array, Array]:
-    """The condim, friction (3,) and solref (2,) of a contact of two geoms."""
+    """Return the condim, friction (3,) and solref (2,) of a contact of two geoms."""
     ends = np.sort([raw.pair_geom1, raw.pair_geom2], axis=0).T
     named = np.flatnonzero((ends == sorted((a, b))).all(axis=1))
     if len(named):
@@ -238,13 +238,15 @@ def _mixed(raw: MjModel, a: int, b: int) -> tuple[int, Array, Array]:
 
 
 def _friction(raw: MjModel, a: int, b: int) -> Array:
-    """Sliding, spinning and rolling friction of a pair, zero where its condim leaves it out."""
+    """Return the sliding, spinning and rolling friction of a pair, zero where its condim leaves
+    it out.
+    """
     condim, friction, _ = _mixed(raw, a, b)
     return friction * (condim > np.array([1, 3, 4]))
 
 
 def damping_ratios(raw: MjModel, pairs: list[tuple[int, int]]) -> Array:
-    """Of contacts of geoms (n, 2), by their solref."""
+    """Return the damping ratios of contacts of geoms (n, 2), from their solref."""
     first, second = np.array([_mixed(raw, a, b)[2] for a, b in pairs]).T
     # Negated, they are stiffness and damping.
     return np.where(first <= 0, -second / (2 * np.sqrt(np.maximum(-first, 1e-15))), second)
@@ -257,7 +259,7 @@ def contacts_of(
     turns_of_geoms: Mapping[int, Array],
     read: Callable[[str], Any],
 ) -> Contacts:
-    """The contacts that a world found at the beginning of its last step.
+    """Return the contacts that a world found at the beginning of its last step.
 
     PyBullet knows which links touch. A link may have several geoms: the one whose
     surface is nearest to the point is taken.
@@ -321,7 +323,7 @@ def _as_contacts(touches: list[BulletContact]) -> Contacts:
 
 
 def _axes(normal: Array) -> Array:
-    """Contact axes (3, 3) as rows, the first the normal."""
+    """Return the contact axes (3, 3) as rows, the first the normal."""
     aside = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
     first = aside - normal * dense.dot(normal, aside)
     first /= math.hypot(*first)
@@ -329,7 +331,7 @@ def _axes(normal: Array) -> Array:
 
 
 def _distance(raw: MjModel, geom: int, turn: Array, point: Array) -> float:
-    """Signed distance of a point, in the body's frame, from the surface of its geom [m].
+    """Return the signed distance of a point, in the body's frame, from the surface of its geom [m].
 
     Args:
         raw: The compiled model.

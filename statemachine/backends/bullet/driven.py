@@ -79,7 +79,7 @@ class DrivenWorld(HiddenWorld):
             act(world)
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
-        """As the base says."""
+        """Place all bodies, as the base class says."""
         if self._driven:  # it was interrupted: let go of what it was driven with
             pb.stepSimulation(self.raw.client)
             self._driven = False
@@ -93,7 +93,7 @@ class DrivenWorld(HiddenWorld):
         self._act = memory[2:]
 
     def command(self, ctrl: Array) -> None:
-        """To every arm; what was placed already, it places again where a mocap body moves."""
+        """Command every arm, and place again what is fixed to a mocap body that moves."""
         if len(ctrl) > self._nu and self.raw.lead(ctrl[self._nu :]) and self._placed:
             self.place(*self._placed)
         for arm in self._arms:
@@ -112,11 +112,11 @@ class DrivenWorld(HiddenWorld):
             arm.read()
 
     def diverging(self, fastest: float) -> bool:
-        """Looks at the arms only: to read free bodies takes longer."""
+        """Return a quick check of the arms only, as reading free bodies takes longer."""
         return not all(bounded(arm.positions, arm.speed, fastest) for arm in self._arms)
 
     def read(self) -> tuple[Array, Array]:
-        """As the base says."""
+        """Return positions and velocities, as the base class says."""
         if self._alone:
             return self._arms[0].positions, self._arms[0].speed
         qpos, qvel = np.empty(self._nq), np.zeros(self._nv)
@@ -129,7 +129,7 @@ class DrivenWorld(HiddenWorld):
         return qpos, qvel
 
     def renewed(self) -> HiddenWorld:
-        """As it comes, only a world that is loaded anew starts alike."""
+        """Return this world, or as it comes a world that is loaded anew: only that starts alike."""
         if self._kind != "engine":
             return self
         other = DrivenWorld(self._plan, self._kind, self._acts)
@@ -142,7 +142,9 @@ class DrivenWorld(HiddenWorld):
 
     @property
     def memory(self) -> Memory:
-        """Contact and friction (nv,) of the last step, and activations; as it comes, none."""
+        """Return the contact and friction forces (nv,) of the last step, and activations; as it
+        comes, none.
+        """
         if self._kind == "engine":
             return ()
         if self._alone and not self.kept_memory:
@@ -157,7 +159,7 @@ class DrivenWorld(HiddenWorld):
         return contact, friction, *act
 
     def memory_at(self, key: int | None) -> Memory:
-        """A keyframe has activations."""
+        """Return the memory of a keyframe: its activations."""
         memory = super().memory_at(key)
         if key is None or not self.kept_memory:
             return memory
@@ -171,14 +173,16 @@ class DrivenWorld(HiddenWorld):
         self.read()
 
     def kinematics(self, moment: Moment, name: str) -> Arrays:
-        """By the engine's own, in a world that is never stepped."""
+        """Return poses by the engine's own kinematics, in a world that is never stepped."""
         with HiddenWorld.lock:
             ghost = ghost_of(self._plan)
             ghost.lead(moment.ctrl[self._nu :])
             return ghost.poses(moment.qpos, name)
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
-        """Contacts, which the step found before it moved; or accelerations and forces."""
+        """Return the Contacts, which the step found before it moved, or accelerations and
+        forces.
+        """
         world, raw = self.raw, self._plan.raw
         if name == "contacts":
             points = pb.getContactPoints(physicsClientId=world.client)
@@ -227,7 +231,9 @@ class Motors:
         self.positions, self.speed = np.array(positions), np.array(speed)
 
     def forces(self) -> Arrays:
-        """What the engine tells: its bias, and the torque of its motors in the last step."""
+        """Return the forces that the engine offers: its bias, and the torque of its motors in
+        the last step.
+        """
         positions, speed = (array.tolist() for array in self._before)
         bias = self._world.needed(self.tree, positions, speed, [0.0] * len(speed))
         torque = np.zeros(len(speed))
@@ -240,7 +246,7 @@ class Motors:
         self._targets = ctrl[self._ids].tolist()
 
     def drive(self, afresh: bool = False) -> None:
-        """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
+        """Command the motors, as a PyBullet user would; without actuation, give no command."""
         self._before = self.positions, self.speed
         if self._driven:
             pb.setJointMotorControlArray(
@@ -253,7 +259,7 @@ class Motors:
 
 
 def ghost_of(plan: Plan) -> Ghost:
-    """The ghost of a plan: one for all Data of all Models that have the plan."""
+    """Return the ghost of a plan: one for all Data of all Models that have the plan."""
     with HiddenWorld.lock:  # for two threads that make the first Data at once
         if plan.ghost is None:
             plan.ghost = Ghost(plan)
@@ -269,7 +275,7 @@ class Ghost(World):
         self._known_at, self._rest = b"?", np.zeros(plan.raw.nv)
 
     def poses(self, qpos: Array, name: str) -> Arrays:
-        """Poses of bodies, or of sites, by the engine's own forward kinematics.
+        """Return the poses of bodies, or of sites, by the engine's own forward kinematics.
 
         Centres of mass and their axes are what PyBullet reports in double precision; a
         site is the centre of mass of a link of its own, where the tree has room for one.
@@ -292,7 +298,7 @@ class Ghost(World):
         return {"xpos": xpos, "xquat": xquat}
 
     def _sites(self, qpos: Array, name: str) -> Array:
-        """site_xpos or site_xmat."""
+        """Return site_xpos or site_xmat."""
         raw, values = self._raw, np.array(getattr(self.still, name))
         placed = name == "site_xpos"
         for tree, (where, turned) in zip(self.trees, self._states(qpos, True), strict=True):
@@ -313,13 +319,17 @@ class Ghost(World):
 
     @cached_property
     def _carried_sites(self) -> Any:
-        """Sites that move and have no link: of free bodies, and of trees without room for it."""
+        """Return the sites that move and have no link: of free bodies, and of trees without room
+        for it.
+        """
         linked = [site for tree in self.trees for site in tree.tips]
         moving = self._raw.body_weldid[self._raw.site_bodyid] > 0
         return np.flatnonzero(moving & ~np.isin(np.arange(self._raw.nsite), linked))
 
     def _states(self, qpos: Array, sites: bool = False) -> list[tuple[Array, Array]]:
-        """Of each tree of joints its bodies or sites: centres of mass, and axes (x, y, z, w)."""
+        """Return centres of mass and axes (x, y, z, w) of the bodies or sites of each tree of
+        joints.
+        """
         at = qpos.tobytes()
         with HiddenWorld.lock:
             if self._known_at != at:
@@ -334,7 +344,7 @@ class Ghost(World):
 
 
 def free_dynamics(raw: MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
-    """Mass matrix (6, 6) and bias (6,) of a free body, in MuJoCo's coordinates.
+    """Return the mass matrix (6, 6) and bias (6,) of a free body, in MuJoCo's coordinates.
 
     Newton's and Euler's equations about the centre of mass, whose velocity is J·qvel.
     """

@@ -71,7 +71,7 @@ class Drives:
         later: float,
         inertia: Array,
     ) -> None:
-        """Of a tree.
+        """Take the actuators of a tree.
 
         Args:
             raw: The compiled model.
@@ -138,7 +138,7 @@ class Drives:
         self._timestep = h
 
     def _with_slope(self, free: Array) -> Array:
-        """Both inertias, with the slope of the actuators that are not at their limit."""
+        """Return both inertias, with the slope of the actuators that are not at their limit."""
         inertias = self._inertia.copy()
         inertias[1] += dense.product(self._slope * free, self._across) * self._tendons.near
         return inertias
@@ -148,12 +148,14 @@ class Drives:
         self._ctrl = ctrl[self._ids]
 
     def pass_step(self) -> None:
-        """What activations come to in a step, they are now."""
+        """Keep, as the activations, what they have become in a step."""
         if len(self.places):
             self.act = self._next
 
     def _bend(self, angles: Array, speed: Array, acting: Array) -> Array:
-        """The feedback (m,) where lengths or gains are curves; the gains and slopes with it."""
+        """Return the feedback (m,) where lengths or gains are curves; the gains and slopes with
+        it.
+        """
         for column, gear, tendon in self._paths:
             self._gear[:, column] = gear * self._tendons.moments[self._tendons.ids[tendon]]
         self._across = self._gear.T.copy()
@@ -172,7 +174,7 @@ class Drives:
         return feedback
 
     def forces(self, feedback: Array, angles: Array, speed: Array) -> tuple[Array, Array]:
-        """The generalised force (n,), and both inertias (2, n, n) with the slopes in it.
+        """Return the generalised force (n,), and both inertias (2, n, n) with the slopes in it.
 
         Args:
             feedback: (m,) what `feedback` of the class gives.
@@ -236,7 +238,7 @@ class Medium:
         self._square = density * np.concatenate([np.array(move) / 2, np.array(spin) / 64]).T
 
     def forces(self, q: Sequence[float], speed: Array) -> tuple[Array, Array]:
-        """The generalised force (n,), and how it opposes each velocity more (n, n)."""
+        """Return the generalised force (n,), and how it opposes each velocity more (n, n)."""
         raw, n = self._raw, len(speed)
         force, slope = np.zeros(n), np.zeros((n, n))
         places, quats = self._world.body_poses(self._tree, self.bodies)
@@ -258,7 +260,7 @@ class Medium:
 
 
 def in_force(raw: MjModel) -> Any:
-    """(nactuator,) bool: which actuators the model's file does not turn off."""
+    """Return (nactuator,) bool of which actuators the model's file does not turn off."""
     groups = raw.actuator_group
     off = (groups >= 0) & (groups < 31) & ((raw.opt.disableactuator >> (groups & 31)) & 1 > 0)
     return ~off & (not raw.opt.disableflags & DisableFlag.ACTUATION)

@@ -105,7 +105,7 @@ class UrdfFile:
 
     @classmethod
     def is_one(cls, path: Path) -> bool:
-        """Whether a file is a URDF that PyBullet can read."""
+        """Tell whether a file is a URDF that PyBullet can read."""
         try:
             return cls.read(path) is not None
         except (ModelError, UnsupportedError):

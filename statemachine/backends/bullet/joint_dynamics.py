@@ -69,7 +69,7 @@ class Law:
     """
 
     def __init__(self, raw: MjModel, world: World, tree: Tree, ghost: World) -> None:
-        """Of a tree in a world that is stepped; the ghost has the true arm."""
+        """Take a tree of a world that is stepped; the ghost has the true arm."""
         self._true = next(other for other in ghost.trees if other.root == tree.root)
         self._ghost, self._world, self.tree = ghost, world, tree
         off = {name: bool(raw.opt.disableflags & bit) for name, bit in _FLAGS.items()}
@@ -106,7 +106,7 @@ class Law:
         self._linear = np.vstack([passive, damped, self.drives.feedback])
 
     def _take_constraints(self, raw: MjModel, joints: Any, off: Mapping[str, bool]) -> None:
-        """What is known of the dry friction and the limits of joints."""
+        """Take the dry friction and the limits of joints."""
         dofs = self.tree.dofs
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
@@ -160,7 +160,7 @@ class Law:
 
     @property
     def contact(self) -> Array:
-        """(n,) the generalised force of contacts during the last step [N·m or N]."""
+        """Return the generalised force (n,) of contacts during the last step [N·m or N]."""
         if self._contact is None:
             q, v, speed = self._start
             rate = ((self.speed - speed) / self._timestep).tolist()
@@ -168,7 +168,7 @@ class Law:
         return self._contact
 
     def forces(self) -> Arrays:
-        """Accelerations and forces of the last step, by their names in the contract."""
+        """Return the accelerations and forces of the last step, by their names in the contract."""
         bias, actuator, passive, friction, limit, equality = self._parts
         total = actuator + passive + friction + limit + equality + self.contact
         factor = dense.factored(self._mass + self._inertia[0])
@@ -201,7 +201,7 @@ class Law:
         self._world.push(self.tree, q, self._torque)
 
     def _solve(self, contact: Array, afresh: bool) -> Array:
-        """The acceleration (n,) of a step, and what makes it up in `_mass` and `_parts`."""
+        """Return the acceleration (n,) of a step; keep the mass matrix and the force's parts."""
         v, x, friction, tree = self._v, self._x, self.friction, self._true
         n = len(v)
         self._mass = mass = self._ghost.mass_matrix(tree, self._q)
@@ -253,7 +253,7 @@ class Law:
         return self._whirled(implicit, acceleration) if self._whirls else acceleration
 
     def _whirled(self, factor: Array, acceleration: Array) -> Array:
-        """The acceleration (6,) of a single rigid body that feels how its bias grows with it.
+        """Return the acceleration (6,) of a single rigid body, its bias linearised in the velocity.
 
         With the bias linear in the change of its spin: ω × (J·ω) about the body's origin.
         """
@@ -280,7 +280,8 @@ class Law:
         friction: Array,
         kinds: Sequence[Sequence[SoftRow]],
     ) -> list[Array]:
-        """Friction, limit and equality force (n,), by pivoting between free and bounded rows.
+        """Return the friction, limit and equality force (n,), by pivoting between free and bounded
+        rows.
 
         Each row has a force F between two bounds, and wants J·a + R·F = its reference; a row at a
         bound may miss it to one side. Those of the joints' friction come before the others.
@@ -305,7 +306,7 @@ class Law:
         ]
 
     def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
-        """Rows of the limits that joints and tendons are beyond."""
+        """Return the rows of the limits that joints and tendons are beyond."""
         low, high = self._ranges
         rows = self._tendons.stops(speed) if self._tendons.limited else []
         if all(map(le, low, q)) and all(map(ge, high, q)):

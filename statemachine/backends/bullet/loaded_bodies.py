@@ -173,7 +173,7 @@ class LoadedBodies:
         self._homes = [(b, pb.getBasePositionAndOrientation(b, self.client)) for b in bodies]
 
     def _take_surfaces(self) -> None:
-        """Softness and friction of links, and which of them meet."""
+        """Take the softness and friction of links, and which of them meet."""
         self.soften()
         known = self._surfaces
         self.set_friction(known.slide, known.spin, known.roll)
@@ -187,17 +187,17 @@ class LoadedBodies:
 
     @property
     def stands(self) -> bool:
-        """Whether the base does not move, though the model has a free joint there."""
+        """Tell whether the base does not move, though the model has a free joint there."""
         return self._of_file is not None and self._of_file.standing >= 0
 
     @property
     def reads_file(self) -> bool:
-        """Whether PyBullet read the robot's file itself, and nothing else is here."""
+        """Tell whether PyBullet read the robot's file itself, and nothing else is here."""
         return self._of_file is not None
 
     @property
     def closed(self) -> bool:
-        """Whether the client was given back; its number may be another's by now."""
+        """Tell whether the client was given back; its number may be another's by now."""
         return not self.close.alive
 
     def solids(self) -> Iterator[tuple[int, int, Solid]]:
@@ -229,13 +229,13 @@ class LoadedBodies:
                 yield tree.body, link, Solid(body, tuple(geoms))
 
     def joints(self) -> Iterator[tuple[int, int, int]]:
-        """PyBullet's body and index of each joint, and its degree of freedom."""
+        """Yield PyBullet's body and index of each joint, and its degree of freedom."""
         for tree in self.trees:
             for index, dof in zip(tree.joints, tree.dofs[tree.base :].tolist(), strict=True):
                 yield tree.body, index, dof
 
     def links(self) -> Iterator[tuple[int, int, int]]:
-        """PyBullet's body and link, and MuJoCo's body, of all that has a mass."""
+        """Yield PyBullet's body and link, and MuJoCo's body, of each that has a mass."""
         for tree in self.trees:
             for b, link in tree.links.items():
                 yield tree.body, link, b
@@ -251,7 +251,7 @@ class LoadedBodies:
         pb.changeDynamics(body, link, physicsClientId=self.client, **settings)
 
     def change_all(self, body: int, **settings: Any) -> None:
-        """The same of the base and all links of a body."""
+        """Change the same of the base and all links of a body."""
         for link in range(-1, pb.getNumJoints(body, self.client)):
             self.change(body, link, **settings)
 

@@ -86,7 +86,9 @@ class Plan:
         return tuple(r for r in urdf.roots(self.raw) if r != root and self.mechanism[r] == root)
 
     def driven(self, root: int) -> bool:
-        """Whether more than gravity and contact moves it: all but one free body by itself."""
+        """Tell whether more than gravity and contact moves it: true of all but a single free
+        body.
+        """
         raw = self.raw
         bodies = self.bodies(root)
         if not urdf.floats(raw, root) or len(bodies) > 1:
@@ -101,7 +103,7 @@ class Plan:
 
     @cached_property
     def padding(self) -> Array:
-        """(nv,) what each degree of freedom gives of its armature to the stepped arm.
+        """Return how much of its armature each degree of freedom (nv,) gives to the stepped arm.
 
         As inertia of the links; see `Dialect` and `joint_dynamics`.
         """
@@ -109,18 +111,18 @@ class Plan:
 
     @cached_property
     def still(self) -> MjData:
-        """Where everything is in the file; not to be written into."""
+        """Return the pose of everything in the file; it is not to be written into."""
         return self.standing()
 
     def standing(self) -> MjData:
-        """The same, to be written into."""
+        """Return the pose of everything in the file, to be written into."""
         data = new_data(self.raw)
         compute_kinematics(self.raw, data)
         return data
 
     @cached_property
     def softness(self) -> float:
-        """By how much contacts yield to their own force: the engine's CFM [s/kg].
+        """Return by how much contacts yield to their own force: the engine's CFM [s/kg].
 
         Where a contact pushes along what no joint can move, a hard one gets a force without
         bound. MuJoCo's yield by (1 - d)/d of the inverse weight, about 5 % [manual, chapter
@@ -138,18 +140,20 @@ class Plan:
 
     @cached_property
     def hulls(self) -> dict[int, Hull]:
-        """Hulls of the geoms that touch and are meshes or ellipsoids."""
+        """Return the hulls of the geoms that touch and are meshes or ellipsoids."""
         geoms = (geom for solid in self.surfaces.solids for geom in solid.geoms)
         return {g: hull_of(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
     def links(self, root: int) -> int:
-        """How many links it has in PyBullet, without those of sites: one a joint or a solid."""
+        """Return how many links it has in PyBullet, without those of sites: one a joint or a
+        solid.
+        """
         bodies = self.bodies(root)
         further = [s for s in self.surfaces.solids if s.part and s.body in bodies]
         return len(further) + sum(max(1, len(urdf.axes(self.raw, body))) for body in bodies)
 
     def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
-        """URDF of a mechanism as a world of that kind reads it.
+        """Return the URDF of a mechanism as a world of that kind reads it.
 
         And the files that it names, by their names: the hulls of its geoms.
         """
@@ -192,7 +196,7 @@ def _parts(solids: Sequence[Solid]) -> dict[int, int]:
 
 
 def _padding(raw: MjModel) -> Array:
-    """As much of the armature as the observer of contacts bears.
+    """Return as much of the armature as the observer of contacts bears.
 
     It converges while what contact meets, the padded arm, is less than twice what the
     law reckons with, M + A: the largest eigenvalue of (M + A)⁻¹·(M + padding) is kept
@@ -225,12 +229,12 @@ def _padding(raw: MjModel) -> Array:
 
 
 def _worst(mass: Array, padded: Array) -> float:
-    """The largest eigenvalue of whole⁻¹·padded."""
+    """Return the largest eigenvalue of whole⁻¹·padded."""
     return float(np.linalg.eigvals(np.linalg.solve(mass, padded)).real.max())
 
 
 def _padding_at(raw: MjModel, data: MjData, share: Array) -> Array:
-    """What the padding adds to the mass matrix (nv, nv) in a pose."""
+    """Return what the padding adds to the mass matrix (nv, nv) in a pose."""
     total = np.zeros((raw.nv, raw.nv))
     for j in [j for body in range(raw.nbody) for j in urdf.axes(raw, body)]:
         dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
@@ -283,7 +287,7 @@ def _kept_hull(vertices: bytes, faces: bytes) -> Hull:
 
 
 def hull_of(raw: MjModel, geom: int) -> Hull:
-    """The hull of a geom; one for all geoms and models that have the same."""
+    """Return the hull of a geom; one for all geoms and models that have the same."""
     if raw.geom_type[geom] == GeomKind.ELLIPSOID:
         vertices, faces = _sphere()
         vertices = vertices * raw.geom_size[geom]
@@ -293,13 +297,13 @@ def hull_of(raw: MjModel, geom: int) -> Hull:
 
 
 def roughness(size: Array) -> float:
-    """How far the hull of an ellipsoid of semi-axes (3,) is from it at most [m]."""
+    """Return how far the hull of an ellipsoid of semi-axes (3,) is from it at most [m]."""
     ball, _ = _sphere()
     return float((np.linalg.norm(ball, axis=1).max() - 1) * size.max())
 
 
 def _mesh_hull(raw: MjModel, mesh: int) -> tuple[Array, Faces]:
-    """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
+    """Return the vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
     start, count = int(raw.mesh_vertadr[mesh]), int(raw.mesh_vertnum[mesh])
     vertices = np.array(raw.mesh_vert[start : start + count], dtype=np.float64)
     # Vertices, triangles, two tables of vertices, one of edges, and the triangles by vertex.
@@ -315,14 +319,16 @@ def _mesh_hull(raw: MjModel, mesh: int) -> tuple[Array, Faces]:
 
 @cache
 def _sphere() -> tuple[Array, Faces]:
-    """Vertices (n, 3) and triangles (m, 3) about a unit sphere, as far in as out of it."""
+    """Return the vertices (n, 3) and triangles (m, 3) about a unit sphere, as far in as out of
+    it.
+    """
     vertices, faces = _mesh_hull(compile_text(_SPHERE), 0)
     depth = np.linalg.norm(vertices[faces].mean(axis=1), axis=1).min()
     return vertices * (2 / (1 + depth)), faces
 
 
 def _planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
-    """Outward normals (m, 3) of the faces, and how far along them the faces are [m]."""
+    """Return outward normals (m, 3) of the faces, and how far along them the faces are [m]."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)
@@ -333,7 +339,7 @@ def _planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
 
 
 def _inset(vertices: Array, meeting: Sequence[Array], distance: float) -> Array:
-    """Vertices (n, 3) of a hull whose planes are a distance [m] further in.
+    """Return the vertices (n, 3) of a hull whose planes are a distance [m] further in.
 
     Where more than three planes meet, as near to all as it goes: least squares.
 

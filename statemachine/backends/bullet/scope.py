@@ -240,7 +240,7 @@ def _of_geoms(plan: Plan) -> Iterator[UnsupportedPart]:
 
 
 def ignored(plan: Plan) -> list[str]:
-    """Settings of a model that have no counterpart, and do not make it another robot."""
+    """Return the settings of a model that have no counterpart, and do not make it another robot."""
     raw = plan.raw
     enabled = {
         flag: raw.opt.enableflags & flag
@@ -299,7 +299,9 @@ def _contact_settings(raw: MjModel) -> dict[str, np.bool_]:
 
 
 def as_targets(plan: Plan) -> list[str]:
-    """Actuators whose ctrl is no position, and is the target of one on the engine as it comes."""
+    """Return the actuators whose ctrl is no position, and is the target of one on the engine as
+    it comes.
+    """
     raw = plan.raw
     others = np.flatnonzero(in_force(raw) & (raw.actuator_biasprm[:, 1] == 0))
     names = few([str(_name(raw, "actuator", int(a))) for a in others], 3)
@@ -323,12 +325,14 @@ def otherwise(plan: Plan) -> list[str]:
 
 
 def _sticks(raw: MjModel) -> Any:
-    """(nactuator,) bool: which actuators act on the contacts of a body alone."""
+    """Return (nactuator,) bool of which actuators act on the contacts of a body alone."""
     return raw.actuator_trntype == TransmissionKind.BODY
 
 
 def _bounces(plan: Plan) -> list[str]:
-    """The contact that would spring back most: a damping ratio far below one is restitution."""
+    """Return the contact that would spring back most: a damping ratio far below one is
+    restitution.
+    """
     raw, pairs = plan.raw, plan.surfaces.meeting
     if not pairs:
         return []
@@ -346,7 +350,9 @@ def _bounces(plan: Plan) -> list[str]:
 
 
 def softness(plan: Plan) -> str:
-    """Geoms that touch and have a solref or solimp of their own, in words; "" without any."""
+    """Return the geoms that touch and have a solref or solimp of their own, in words; "" without
+    any.
+    """
     raw = plan.raw
     touching = plan.surfaces.touching
     own = (raw.geom_solref != _SOLREF).any(axis=1) | (raw.geom_solimp != _SOLIMP).any(axis=1)
@@ -355,7 +361,9 @@ def softness(plan: Plan) -> str:
 
 
 def _hull_differences(plan: Plan) -> list[str]:
-    """Where a hull is not its shape: ellipsoids, and what is thinner than the engine's margin."""
+    """Return where a hull differs from its shape: ellipsoids, and what is thinner than the
+    engine's margin.
+    """
     raw, sentences = plan.raw, []
     eggs = [geom for geom in plan.hulls if int(raw.geom_type[geom]) == GeomKind.ELLIPSOID]
     if eggs:
@@ -377,7 +385,9 @@ def _hull_differences(plan: Plan) -> list[str]:
 
 
 def _list(raw: MjModel, kind: str, values: Array) -> str:
-    """Elements whose value is not zero, the largest first, as "a 0.5, b 0.1 and 3 more"."""
+    """Return the elements whose value is not zero, the largest first, as "a 0.5, b 0.1 and 3
+    more".
+    """
     order = [int(k) for k in np.argsort(-np.abs(values), kind="stable") if values[k]]
     return few([f"{_name(raw, kind, k)} {values[k]:.3g}" for k in order], most=2)
 

@@ -67,7 +67,9 @@ Soft = tuple[list[float], list[float]]
 
 
 def soft(solref: Array, solimp: Array, weight: Array, shortest: float) -> list[Soft]:
-    """Of each of m constraints, from its solref (m, 2), solimp (m, 5) and inverse weight (m,)."""
+    """Return the softness of m constraints, from solref (m, 2), solimp (m, 5) and inverse weight
+    (m,).
+    """
     damping, stiffness = springs(solref, solimp, shortest)
     constants = np.column_stack([damping, stiffness, weight]).tolist()
     return list(zip(curves(solimp), constants, strict=True))
@@ -81,7 +83,7 @@ def soft_row(
     bounds: tuple[float, float] = (0.0, math.inf),
     distance: float | None = None,
 ) -> SoftRow:
-    """The row of a constraint.
+    """Return the row of a constraint.
 
     Args:
         kind: What it is like.
@@ -98,7 +100,9 @@ def soft_row(
 
 
 def shortest_time(raw: MjModel, off: Mapping[str, bool]) -> float:
-    """The least time constant of a constraint [s]: two steps, where MuJoCo takes care of it."""
+    """Return the least time constant of a constraint [s]: two steps, where MuJoCo takes care of
+    it.
+    """
     return 0.0 if off["refsafe"] else 2 * float(raw.opt.timestep)
 
 
@@ -108,7 +112,8 @@ def bounds_of(ranges: Array, limited: Any) -> tuple[Array, Array]:
 
 
 def curves(solimp: Array) -> list[list[float]]:
-    """Rows of solimp, each number within what MuJoCo takes; then the scales of both halves.
+    """Return the rows of solimp, each number within what MuJoCo takes; then the scales of both
+    halves.
 
     Their powers are Python's: the last bits of NumPy's are those of the processor.
     """
@@ -121,7 +126,7 @@ def curves(solimp: Array) -> list[list[float]]:
 
 
 def impedance(curve: Sequence[float], distance: float) -> float:
-    """d(r) of a curve [MuJoCo's manual, chapter Modeling, Solver parameters]."""
+    """Return d(r) of a curve [MuJoCo's manual, chapter Modeling, Solver parameters]."""
     low, high, width, middle, power, rising, falling = curve
     if width <= 1e-15:
         return (low + high) / 2
@@ -131,12 +136,12 @@ def impedance(curve: Sequence[float], distance: float) -> float:
 
 
 def softness(impedance: float, inverse_weight: float) -> float:
-    """R, by which a constraint yields to its own force."""
+    """Return R, by which a constraint yields to its own force."""
     return max((1 - impedance) / impedance * inverse_weight, 1e-15)
 
 
 def springs(solref: Array, solimp: Array, shortest: float) -> tuple[Array, Array]:
-    """Damping b and stiffness k of the reference acceleration, of solref (n, 2)."""
+    """Return the damping b and stiffness k of the reference acceleration, of solref (n, 2)."""
     time, ratio = solref.T
     most = np.clip(solimp[:, 1], 1e-4, 0.9999)
     given = time <= 0  # then they are stiffness and damping, negated

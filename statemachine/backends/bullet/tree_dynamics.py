@@ -68,7 +68,7 @@ class TreeDynamics(LoadedBodies):
     def needed(
         self, tree: Tree, q: Sequence[float], v: Sequence[float], rate: Sequence[float]
     ) -> Sequence[float]:
-        """The generalised force (n,) that gives a tree an acceleration, by inverse dynamics.
+        """Return the generalised force (n,) that gives a tree an acceleration, by inverse dynamics.
 
         PyBullet takes the angles of a base in another order than it gives them. So a tree that
         floats is told to it in the axes of its base, and gravity turned into them.
@@ -126,7 +126,7 @@ class TreeDynamics(LoadedBodies):
                 pb.setGravity(*self._gravity, self.client)
 
     def mass_matrix(self, tree: Tree, q: Sequence[float]) -> Array:
-        """M (n, n) of a tree where its `qpos` are q, in the coordinates of its `qvel`."""
+        """Return M (n, n) of a tree where its `qpos` are q, in the coordinates of its `qvel`."""
         n = len(tree.dofs)
         rows = pb.calculateMassMatrix(tree.body, q[7 * tree.free :], 0, self.client)
         # Faster than np.array.
@@ -138,7 +138,7 @@ class TreeDynamics(LoadedBodies):
         return mass
 
     def _base_axes(self, tree: Tree, q: Sequence[float]) -> tuple[Array, Array]:
-        """Of the base of a tree that floats, at its positions q, two matrices.
+        """Return two matrices of the base of a tree that floats, at its positions q.
 
         T (6, 6), by which the engine's velocities of it are T·qvel: it turns, then moves, in its
         own axes. And where the body's axes (3, 3) point.
@@ -152,18 +152,20 @@ class TreeDynamics(LoadedBodies):
         return known[1:]
 
     def body_poses(self, tree: Tree, bodies: Sequence[int]) -> tuple[Array, Array]:
-        """The xpos (n, 3) and xquat (n, 4) of bodies that are not the engine's base."""
+        """Return the xpos (n, 3) and xquat (n, 4) of bodies that are not the engine's base."""
         links = [tree.links[body] for body in bodies]
         return self.frames(bodies, *self.centres(tree, links))
 
     def frames(self, bodies: Sequence[int], centres: Array, axes: Array) -> tuple[Array, Array]:
-        """The xpos (n, 3) and xquat (n, 4) of bodies, from what `centres` tells of their links."""
+        """Return the xpos (n, 3) and xquat (n, 4) of bodies, from what `centres` tells of their
+        links.
+        """
         quats = quat_times(wxyz_from_xyzw(axes), self._inward[bodies])
         turns = matrix_from_quat(quats)
         return centres - np.einsum("bij,bj->bi", turns, self._raw.body_ipos[bodies]), quats
 
     def centres(self, tree: Tree, links: Sequence[int]) -> tuple[Array, Array]:
-        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of some links."""
+        """Return the centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of some links."""
         if not links:
             return np.empty((0, 3)), np.empty((0, 4))
         states = pb.getLinkStates(
@@ -174,7 +176,8 @@ class TreeDynamics(LoadedBodies):
     def jacobian(
         self, tree: Tree, q: Sequence[float], body: int, pose: tuple[Array, Array], point: Array
     ) -> Array:
-        """How a point that is fixed to a body moves, then turns, by the tree's `qvel`: (6, n).
+        """Return the Jacobian (6, n) of a point that is fixed to a body, linear rows first, by the
+        tree's `qvel`.
 
         Args:
             tree: The tree, which the world has in the same pose.

@@ -64,7 +64,9 @@ class Tree:
 
 
 def _index(places: Any) -> Any:
-    """Places in an array: a slice, which NumPy takes faster, where they follow one another."""
+    """Return indices of an array: a slice, which NumPy takes faster, where they follow one
+    another.
+    """
     if not len(places) or (np.diff(places) == 1).all():
         start = int(places[0]) if len(places) else 0
         return slice(start, start + len(places))

@@ -81,29 +81,29 @@ class Dialect:
 
 
 def roots(raw: MjModel) -> list[int]:
-    """Bodies that hang directly in the world, each the root of a tree."""
+    """Return the bodies that hang directly in the world, each the root of a tree."""
     return [b for b in range(1, raw.nbody) if raw.body_parentid[b] == 0]
 
 
 def tree(raw: MjModel, root: int) -> list[int]:
-    """The bodies of a tree, parents first; the world is a tree of its own."""
+    """Return the bodies of a tree, parents first; the world is a tree of its own."""
     return [b for b in range(raw.nbody) if raw.body_rootid[b] == root]
 
 
 def axes(raw: MjModel, body: int) -> list[int]:
-    """The joints of a body that URDF writes, its hinges and slides, in order."""
+    """Return the joints of a body that URDF writes, its hinges and slides, in order."""
     start = int(raw.body_jntadr[body])
     joints = range(start, start + int(raw.body_jntnum[body]))
     return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
 
 
 def floats(raw: MjModel, root: int) -> bool:
-    """Whether the root of a tree has a free joint."""
+    """Tell whether the root of a tree has a free joint."""
     return bool(raw.body_jntnum[root]) and not axes(raw, root)
 
 
 def write(raw: MjModel, root: int, dialect: Dialect = Dialect(), names: Names | None = None) -> str:
-    """URDF of one tree of bodies, and of those that stand beside it.
+    """Return the URDF of one tree of bodies, and of those that stand beside it.
 
     Args:
         raw: The compiled model.
@@ -139,13 +139,13 @@ def write(raw: MjModel, root: int, dialect: Dialect = Dialect(), names: Names | 
 
 
 def anchor(raw: MjModel, body: int) -> Array:
-    """Where a body's last joint is, in the body's frame: the origin of its link."""
+    """Return where a body's last joint is, in the body's frame: the origin of its link."""
     joints = axes(raw, body)
     return raw.jnt_pos[joints[-1]] if joints else np.zeros(3)
 
 
 def padding_shape(axis: Array) -> Array:
-    """Inertia (3, 3) of a unit of padding about an axis: ½·1.0001·1 + ½·a·aᵀ.
+    """Return the inertia (3, 3) of a unit of padding about an axis: ½·1.0001·1 + ½·a·aᵀ.
 
     Turning about the axis alone would be enough, and is refused as no body's inertia.
     """
@@ -153,7 +153,7 @@ def padding_shape(axis: Array) -> Array:
 
 
 def _padding(raw: MjModel, joint: int, dialect: Dialect) -> tuple[float, Array]:
-    """Mass and inertia (3, 3), in the body's axes, on top of what the joint carries."""
+    """Return the mass and inertia (3, 3), in the body's axes, on top of what the joint carries."""
     if dialect.padding is None:
         return 0.0, np.zeros((3, 3))
     size, axis = float(dialect.padding[raw.jnt_dofadr[joint]]), raw.jnt_axis[joint]
@@ -184,7 +184,7 @@ def _link(raw: MjModel, body: int, dialect: Dialect, names: Names) -> Element:
 
 
 def _geoms(raw: MjModel, body: int, part: int, dialect: Dialect) -> Iterator[Element]:
-    """What of a body's geoms is in one of its links."""
+    """Yield the elements for a body's geoms in one of its links."""
     for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
         touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom] or geom in dialect.parts
         wanted = dialect.solids if touches else dialect.looks
@@ -228,7 +228,7 @@ def _geom(raw: MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect) ->
 
 
 def hull_file(geom: int) -> str:
-    """The name of the file with the hull of a geom, beside the URDF."""
+    """Return the name of the file with the hull of a geom, beside the URDF."""
     return f"hull_{geom}.obj"
 
 
@@ -239,7 +239,7 @@ def _mesh_file(raw: MjModel, mesh: int, folder: Path | None) -> str:
 
 
 def _joints(raw: MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[Element]:
-    """The joints between a body and its parent, with massless links between them."""
+    """Yield the joints between a body and its parent, with massless links between them."""
     upper = int(raw.body_parentid[body])
     parent = names.links[upper] if upper else "world"
     turn = matrix_from_quat(raw.body_quat[body])
@@ -298,7 +298,7 @@ def _bounds(raw: MjModel, joint: int, dialect: Dialect) -> tuple[float, float]:
 
 
 def _at_zero(raw: MjModel, joint: int, place: Array, turn: Array) -> tuple[Array, Array]:
-    """Where a joint's frame is when its position is 0, from where it is in the file's pose.
+    """Return where a joint's frame is when its position is 0, from where it is in the file's pose.
 
     There the position is the joint's `ref`.
     """
@@ -313,7 +313,7 @@ def _at_zero(raw: MjModel, joint: int, place: Array, turn: Array) -> tuple[Array
 
 
 def _effort(raw: MjModel, joint: int) -> float:
-    """The largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
+    """Return the largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
     on_joint = raw.actuator_trntype == TransmissionKind.JOINT
     drives = on_joint & (raw.actuator_trnid[:, 0] == joint)
     limited = drives & raw.actuator_forcelimited.astype(bool)

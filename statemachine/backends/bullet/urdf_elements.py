@@ -48,7 +48,7 @@ def origin_element(pos: Array, mat: Array) -> Element:
 
 
 def _rpy(mat: Array) -> Array:
-    """Angles (3,) with mat = Rz(yaw)·Ry(pitch)·Rx(roll), to full precision everywhere.
+    """Return the angles (3,) with mat = Rz(yaw)·Ry(pitch)·Rx(roll), to full precision everywhere.
 
     At a pitch of ±90° roll is arbitrary; yaw is computed from the roll that was
     chosen, so that the product is right whatever it is.

@@ -36,7 +36,7 @@ class Names:
         self._parts: dict[tuple[int, int], tuple[str, str]] = {}
 
     def part(self, body: int, part: int) -> tuple[str, str]:
-        """Of the link of a part of a body, and of its fixed joint."""
+        """Return the names of the link of a part of a body, and of its fixed joint."""
         if (body, part) not in self._parts:
             name = f"{self.links[body]}_part_{part}"
             link, fixed = (
@@ -48,7 +48,7 @@ class Names:
 
 
 def _once(name: str, taken: set[str], suffix: str = "") -> str:
-    """A name that is not taken yet, and not so long that a reader cuts it."""
+    """Return a name that is not taken yet, and not so long that a reader cuts it."""
     first = name = name.encode()[:_LONGEST].decode(errors="ignore")
     if name in taken and suffix:
         name = first + suffix

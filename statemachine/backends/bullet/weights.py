@@ -38,7 +38,7 @@ class Weight:
     inertia: Array
 
     def plus(self, other: Weight) -> Weight:
-        """Both, held together."""
+        """Return the mass properties of two bodies held together."""
         mass = self.mass + other.mass
         if not mass:
             return self
@@ -46,7 +46,9 @@ class Weight:
         return Weight(mass, com, self.about(com) + other.about(com))
 
     def about(self, point: Array) -> Array:
-        """Inertia (3, 3) about another point (3,), by the theorem of Huygens and Steiner."""
+        """Return the inertia (3, 3) about another point (3,), by the theorem of Huygens and
+        Steiner.
+        """
         arm = self.com - point
         return self.inertia + self.mass * (dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
 

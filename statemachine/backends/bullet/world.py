@@ -62,7 +62,9 @@ class World(TreeDynamics):
 
     @cached_property
     def still(self) -> MjData:
-        """Where bodies and sites are that no joint moves; those on mocap bodies as they are led."""
+        """Return where bodies and sites are that no joint moves; those on mocap bodies as they
+        are led.
+        """
         return self._plan.standing()
 
     def lead(self, poses: Array) -> bool:
@@ -155,7 +157,7 @@ class World(TreeDynamics):
         return (qpos[:3] + arm).tolist(), pose, turn, arm
 
     def follow(self, body: int) -> tuple[Any, Quat]:
-        """Where a base is; of a quaternion and its negative the one nearer to the last.
+        """Return the pose of a base; of a quaternion and its negative the one nearer to the last.
 
         They are one rotation. The engine changes between them at will, MuJoCo never:
         to be told after each step, so that a body that turns far keeps its sign.
@@ -169,7 +171,7 @@ class World(TreeDynamics):
         return where, quat
 
     def read_free(self, tree: Tree) -> tuple[list[float], list[float]]:
-        """What of qpos (7,) and qvel (6,) is a free joint's, in MuJoCo's conventions."""
+        """Return qpos (7,) and qvel (6,) of a free joint, in MuJoCo's conventions."""
         centre, (ax, ay, az, aw) = self._frames[tree.body]
         (px, py, pz), pose = self.follow(tree.body)
         (vx, vy, vz), spin = pb.getBaseVelocity(tree.body, self.client)
@@ -188,7 +190,7 @@ class World(TreeDynamics):
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
     def read(self) -> tuple[Array, Array]:
-        """What the engine tells of positions (nq,) and velocities (nv,)."""
+        """Return the positions (nq,) and velocities (nv,) that the engine has."""
         qpos, qvel = np.zeros(self._raw.nq), np.zeros(self._raw.nv)
         self.read_standing(qpos)
         for tree in self.trees:
@@ -204,7 +206,9 @@ class World(TreeDynamics):
         return True
 
     def read_tree(self, tree: Tree) -> tuple[Sequence[float], Sequence[float]]:
-        """The same of one tree, in the order of its `qpos` and `qvel`."""
+        """Return the positions and velocities of one tree, in the order of its `qpos` and
+        `qvel`.
+        """
         if not tree.joints:
             return self.read_free(tree) if tree.free else ((), ())
         q, v, _, _ = zip(*pb.getJointStates(tree.body, tree.joints, self.client), strict=True)

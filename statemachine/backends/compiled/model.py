@@ -61,7 +61,7 @@ def new_data(raw: mujoco.MjModel) -> mujoco.MjData:
 
 @contextmanager
 def compiler_warnings() -> Iterator[list[str]]:
-    """What MuJoCo warns of meanwhile; else it goes into a log file and to the terminal.
+    """Yield the list that MuJoCo's warnings go to meanwhile, not to a log file and the terminal.
 
     Yields:
         A list of texts that is complete when the `with` block ends.
@@ -191,7 +191,7 @@ def check_numbers(raw: mujoco.MjModel, name: str) -> None:
 
 
 def _problems(raw: mujoco.MjModel) -> Iterator[str]:
-    """What of a compiled model is not a number, or has a sign that it cannot have."""
+    """Yield the problems of a compiled model: no number, or a sign that it cannot have."""
     if not raw.opt.timestep > 0:
         yield f"timestep is {raw.opt.timestep:g}, and must be above 0"
     for key, time in enumerate(raw.key_time.tolist()):
@@ -222,7 +222,7 @@ def _array_problems(raw: mujoco.MjModel, name: str, array: Array) -> Iterator[st
 
 
 def _doubtful(raw: mujoco.MjModel) -> Iterator[str]:
-    """What has a sign that engines take, and that is seldom meant."""
+    """Yield the values whose sign engines take, and that is seldom meant."""
     for name in _SELDOM_NEGATIVE:
         yield from _first(raw, name, getattr(raw, name) < 0, "is negative")
     affine = raw.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
@@ -234,7 +234,7 @@ def _doubtful(raw: mujoco.MjModel) -> Iterator[str]:
 def _first(
     raw: mujoco.MjModel, name: str, where: Any, says: str, called: str = ""
 ) -> Iterator[str]:
-    """A message of the first row of an array for which something holds, if there is one.
+    """Yield a message on the first row of an array for which a condition holds, if there is one.
 
     Args:
         raw: The compiled model.
@@ -254,7 +254,7 @@ def _first(
 
 
 def fastest(m: mujoco.MjModel) -> Array:
-    """Velocities (nv,) [rad/s or m/s] beyond which a degree of freedom has diverged.
+    """Return the velocities (nv,) [rad/s or m/s] beyond which a degree of freedom has diverged.
 
     Of each the largest of three:
 
@@ -291,7 +291,7 @@ def fastest(m: mujoco.MjModel) -> Array:
 
 
 def gravity(m: mujoco.MjModel) -> Array:
-    """Gravity (3,) [m/s²], zero where the model's file turns it off."""
+    """Return gravity (3,) [m/s²], zero where the model's file turns it off."""
     off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     return np.array(m.opt.gravity) * (not m.opt.disableflags & off)
 

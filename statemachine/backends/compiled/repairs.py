@@ -277,7 +277,7 @@ _MENDS: dict[str, Callable[[mujoco.MjSpec, Any, _Fault], list[Repair]]] = {
 
 
 def _set_moments(body: Any, moments: list[float]) -> None:
-    """State the principal moments of a body along the axes of its inertial frame."""
+    """Write the principal moments of a body along the axes of its inertial frame."""
     body.fullinertia = [math.nan, 0, 0, 0, 0, 0]
     body.inertia = moments
     body.explicitinertial = True

@@ -97,7 +97,7 @@ class AlarmError(Exception):
         self.quantity, self.index, self.time = quantity, index, time
 
     def entry(self, model: Model) -> str:
-        """'qpos[2] (elbow_flex)'."""
+        """Return the entry in words, as 'qpos[2] (elbow_flex)'."""
         if self.index is None:
             return f"an entry of {self.quantity} (MuJoCo did not tell which)"
         name = model._coordinate_name(self.quantity, self.index)
@@ -105,7 +105,7 @@ class AlarmError(Exception):
 
 
 def ended(model: Model, alarm: AlarmError, who: str) -> BadInputError | DivergedError:
-    """The error for what is useless from now on: a Data or a world, as `who` names it."""
+    """Return the error for a Data or a world that has diverged, as `who` names it."""
     kind, happened = DivergedError, f"became NaN, infinite or huge at time {alarm.time:g} s"
     if alarm.quantity == "ctrl":
         kind, happened = BadInputError, f"was no number at time {alarm.time:g} s"
@@ -119,12 +119,12 @@ def ended(model: Model, alarm: AlarmError, who: str) -> BadInputError | Diverged
 
 
 def gave_up(error: object) -> EngineError:
-    """The error for one of MuJoCo's own, or for a memory that is full."""
+    """Return the error for one of MuJoCo's own, or for a memory that is full."""
     return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
 
 
 def resets_itself(model: mujoco.MjModel) -> bool:
-    """Whether MuJoCo resets what diverges, without a word but the warning."""
+    """Tell whether MuJoCo resets what diverges, with no other sign than its warning."""
     return not model.opt.disableflags & _AUTORESET
 
 
@@ -148,7 +148,7 @@ class Alarms:
         self.seen = self._seen.reshape(-1).view(np.uint64).data
 
     def clear(self) -> None:
-        """The engine's counters were set to zero, by a reset."""
+        """Forget the seen warnings: a reset has set the engine's counters to zero."""
         self._seen[:] = 0
         listen()
 

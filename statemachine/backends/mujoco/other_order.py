@@ -91,7 +91,7 @@ class DataInOtherOrder(MujocoData):
 
     @property
     def raw(self) -> mujoco.MjData:
-        """An MjData with all that the other one has, if that is an MjData."""
+        """Return an MjData with all that the other one has, if that is an MjData."""
         if self._is_behind:
             self._is_behind = False
             self._catch_up()
@@ -134,7 +134,7 @@ class DataInOtherOrder(MujocoData):
             kind = "site"
         values = getattr(source, name)
         ours, theirs = self._elements[kind]
-        model = self._home
+        model = self._model
         counts = {"dof": model.nv, "body": model.nbody, "site": model.nsite}
         shown = np.zeros((counts[kind], *values.shape[1:]))
         shown[ours] = values[theirs]
@@ -157,7 +157,7 @@ class DataInOtherOrder(MujocoData):
 
 
 def _derived(source: Data, name: str) -> Any:
-    """A derived array of a Data of any engine; None where it has no such array."""
+    """Return a derived array of a Data of any engine; None where it has no such array."""
     try:
         return getattr(source, name)
     except (AttributeError, UnsupportedError):

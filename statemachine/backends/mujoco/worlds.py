@@ -46,8 +46,8 @@ class MujocoWorlds(Worlds):
 
     _batch: Any  # Batch; None once closed
     _history: Any  # (n, nhistory), or None
-    _warned: Any  # (n, kinds, 2) the engine's counters: last index, number
-    _told: Any  # what they were when they were last looked at
+    _pending_warnings: Any  # (n, kinds, 2) the engine's counters: last index, number
+    _seen_warnings: Any  # what they were when they were last looked at
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class MujocoWorlds(Worlds):
         self._kept = None if history is None else history[:, :, 0]
         self._layout = cache(layout)
         self._history = batch.bind("history") if raw.nhistory else None
-        self._warned, self._told = batch.warning, batch.warning.copy()
+        self._pending_warnings, self._seen_warnings = batch.warning, batch.warning.copy()
         # A copy of what a step changes in a row, to run a world again from there.
         all_of_it = resets_itself(raw) or any(mujoco.mj_stateSize(raw, int(part)) for part in _LATE)
         end = batch.nstate if all_of_it else batch._component(_STATE.mjSTATE_CTRL)[0]
@@ -127,7 +127,14 @@ class MujocoWorlds(Worlds):
         return self._base.with_compiled(compiled)
 
     def _close(self) -> None:
-        for name in ("_changing", "_before", "_warned", "_told", "_history", "_batch"):
+        for name in (
+            "_changing",
+            "_before",
+            "_pending_warnings",
+            "_seen_warnings",
+            "_history",
+            "_batch",
+        ):
             setattr(self, name, None)
 
     def _step(self, ids: Ints, nstep: int, forward: bool) -> Errors:
@@ -168,29 +175,31 @@ class MujocoWorlds(Worlds):
                 errors[world] = gave_up(self._batch.error(world))
         except ValueError as error:  # a callback in Python
             raise unsupported(self.model, "worlds", one_line(error)) from error
-        if (self._warned != self._told).any():
-            errors.update(self._attend(count))
+        if (self._pending_warnings != self._seen_warnings).any():
+            errors.update(self._raise_pending_warnings(count))
         return errors
 
-    def _attend(self, count: int) -> Errors:
+    def _raise_pending_warnings(self, count: int) -> Errors:
         """Look at the counters that differ: the errors, and what else was warned of."""
         listen()
-        counts = (self._warned - self._told)[:, :, 1]
+        counts = (self._pending_warnings - self._seen_warnings)[:, :, 1]
         worlds = np.flatnonzero((counts > 0).any(axis=1))
         fatal = worlds[(counts[worlds][:, list(FATAL.values())] > 0).any(axis=1)]
         errors = self._causes(fatal, count)
         # MuJoCo says a thing only the first time after a reset, and so do we.
         texts: dict[str, None] = {}
         for world in np.setdiff1d(worlds, fatal).tolist():
-            first = (counts[world] == self._warned[world, :, 1]) & (counts[world] != 0)
+            first = (counts[world] == self._pending_warnings[world, :, 1]) & (counts[world] != 0)
             for kind in np.flatnonzero(first).tolist():
-                texts[mujoco.mju_warningText(kind, int(self._warned[world, kind, 0]))] = None
-        self._told[:] = self._warned
+                texts[mujoco.mju_warningText(kind, int(self._pending_warnings[world, kind, 0]))] = (
+                    None
+                )
+        self._seen_warnings[:] = self._pending_warnings
         pass_on(list(texts), stacklevel=7)
         return errors
 
     def _causes(self, worlds: Ints, count: int) -> Errors:
-        """What ended each of these worlds, from running it again alone."""
+        """Return the error of each of these worlds, from running it again by itself."""
         errors: Errors = {}
         raw = data = None
         for world in worlds.tolist():
@@ -221,7 +230,7 @@ class MujocoWorlds(Worlds):
                 counts = None if self._kept is None else self._kept[ids]
                 hold(self._base.raw, history, self.ctrl[ids], counts)
                 self._history[ids] = history
-            self._told[ids] = self._warned[ids]
+            self._seen_warnings[ids] = self._pending_warnings[ids]
         listen()
 
     def _get_states(self, ids: Ints) -> list[State]:
@@ -247,7 +256,7 @@ class MujocoWorlds(Worlds):
         return self._layout(nhistory)
 
     def _places(self, world: int) -> Any:
-        """Where in a row of the worlds' state the numbers of a State are."""
+        """Return the slices of a row of the worlds' state that hold the numbers of a State."""
         if self._kept is None:
             return slice(None)
         start, size = self._batch._component(_STATE.mjSTATE_HISTORY)
@@ -300,14 +309,14 @@ class MujocoWorlds(Worlds):
             redo[error.ids] = True
         except ValueError as error:  # a callback in Python
             raise unsupported(self.model, "worlds", one_line(error)) from error
-        redo |= (self._warned != self._told).any(axis=(1, 2))
+        redo |= (self._pending_warnings != self._seen_warnings).any(axis=(1, 2))
         if not every_one:
             for name, array in arrays.items():
                 array[able] = rows[name]
         again = np.flatnonzero(redo)
         if len(again):
             self._changing[again] = self._before[again]
-            self._warned[again] = self._told[again]
+            self._pending_warnings[again] = self._seen_warnings[again]
             if ctrl_before is not None:
                 self.ctrl[again] = ctrl_before[again]
             for array in arrays.values():

@@ -55,7 +55,7 @@ def send(pipe, said, arrays) -> None:
 
 
 def receive(pipe, patience):
-    """The next message, and the patience for the one after it; EOFError where there is none.
+    """Receive the next message, and the patience for the one after it.
 
     A process that sleeps takes longer to wake than most calls take. So a message is looked for,
     and waited for asleep where it does not come soon, or somebody else wants the processor: then
@@ -90,7 +90,7 @@ class Answerer:
         self.engine, self.things = engine, {}
 
     def keep(self, thing):
-        """Its number."""
+        """Keep a model and return its number."""
         self.things[id(thing)] = thing
         return id(thing)
 
@@ -108,12 +108,12 @@ class Answerer:
         return {"model": self.keep(model), "digest": digest, **said}, fields
 
     def written(self, job, _):
-        """What the engine reads in a file, as MJCF."""
+        """Return the MJCF that the engine writes of a file."""
         told = {"read": job["read"]} if "read" in job else {}
         return {"text": self.engine.written(job["file"], job["text"], **told)}, {}
 
     def make(self, job, _):
-        """A world of a model."""
+        """Make a world of a model."""
         world = self.engine.Simulation(self.things[job["model"]])
         said = {name: getattr(world, name) for name in ("memory", "kept_memory", "untold")}
         return {"world": self.keep(world), **said}, {}
@@ -132,7 +132,7 @@ class Answerer:
         return {"taken": taken}, states
 
     def look(self, job, arrays):
-        """What is derived: of a state and a command, or of where the last step started."""
+        """Return the derived arrays of a state and a command, or of where the last step started."""
         world = self.things[job["world"]]
         if "ctrl" in arrays:
             world.place(arrays["state"])

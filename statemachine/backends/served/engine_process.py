@@ -44,7 +44,7 @@ class ServedEngine(NamedTuple):
 
     @property
     def anew(self) -> str:
-        """What to type to make the environment of a release anew."""
+        """Return what to type to make the environment of a release anew."""
         return f"statemachine engines remove {self.name}, then add"
 
 
@@ -127,7 +127,7 @@ class Server:
 
     @classmethod
     def of(cls, engine: ServedEngine) -> Server:
-        """The one of an engine; started where there is none, or none that lives."""
+        """Return the process of an engine; start one where there is none that lives."""
         with cls._lock:
             key = os.getpid(), engine
             if key not in cls._all or not cls._all[key].lives:
@@ -241,7 +241,9 @@ class Server:
         return RunSteps(answer["taken"], states["before"], states.get("after"))
 
     def number(self, opened: Callable[[Server], int]) -> int:
-        """The number of a model there: all worlds that are opened alike share it."""
+        """Return the number of a model in that process: all worlds that are opened alike share
+        it.
+        """
         with self._turn:
             if opened not in self._models:
                 self._models[opened] = opened(self)

@@ -61,7 +61,7 @@ def load(
 def served(
     engine: ServedEngine, capabilities: Capabilities | None = None
 ) -> Callable[..., ServedModel]:
-    """The loader of an engine that runs in a Python of its own.
+    """Return the loader of an engine that runs in a Python of its own.
 
     Args:
         engine: Its Python, and the file that knows it there.
@@ -92,7 +92,8 @@ def _opened(reading: EngineReading, edits: Mapping[str, Any], server: Server) ->
 
 
 def _edits(reading: EngineReading, raw: mujoco.MjModel) -> dict[str, Any]:
-    """Fields of a compiled model that are another than those of the file; flags by their names.
+    """Return the fields of a compiled model that differ from those of the file; flags by their
+    names.
 
     Raises:
         UnsupportedError: The engine has no such field.
@@ -154,12 +155,12 @@ class ServedModel(HiddenModel):
 
     @property
     def compiled(self) -> mujoco.MjModel:
-        """In the terms of the installed release."""
+        """Return the compiled model in the terms of the installed release."""
         return self.raw
 
     def with_compiled(self, compiled: mujoco.MjModel) -> ServedModel:
         inner = self._inner.with_compiled(compiled)
-        return ServedModel(self._reading, self._own, inner)._started_as(self, {})
+        return ServedModel(self._reading, self._own, inner)._inherit_start(self, {})
 
     def _replace(self, options: dict[str, Any]) -> ServedModel:
         return ServedModel(self._reading, self._own, self._inner._replace(options))

@@ -58,7 +58,7 @@ class Simulation:
             part[:] = values
 
     def state(self):
-        """The same, in a row."""
+        """Return the state in one row."""
         return np.concatenate(self.parts)
 
     def command(self, ctrl) -> None:
@@ -94,7 +94,7 @@ class Simulation:
         return bool(qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest)
 
     def warned(self) -> bool:
-        """Whether the engine has found a number bad since a state was placed."""
+        """Tell whether the engine has found a number bad since a state was placed."""
         return any(self.alarms)
 
     def forward(self) -> None:
@@ -102,7 +102,7 @@ class Simulation:
         mujoco.mj_forward(self.model, self.data)
 
     def derived(self, _vector):
-        """Every derived array, by name, then those of the contacts."""
+        """Return every derived array, by name, then those of the contacts."""
         model, data = self.model, self.data
         arrays = {name: getattr(data, name) for name in POSES + FORCES}
         arrays.update({part: constraint_part(model, data, part) for part in PARTS})
@@ -151,7 +151,7 @@ def written(file, text, read=None):
 
 
 def names_of(model):
-    """Names of the elements of a model, by kind; "" of one without a name."""
+    """Return the names of the elements of a model, by kind; "" of one without a name."""
     names = {}
     for kind in NAMED:
         starts = getattr(model, "name_" + kind + "adr").tolist()
@@ -192,7 +192,7 @@ def edit(model, edits, flags):
 
 
 def flags_of(model, kind):
-    """Names of the flags of a model that are set; kind: "disable" or "enable"."""
+    """Return the names of the flags of a model that are set, by kind: "disable" or "enable"."""
     bits = getattr(model.opt, f"{kind}flags")
     members = KINDS[kind].__members__.items()
     return [name for name, bit in members if "BL_" in name and bits & int(bit)]  # not mjNDISABLE

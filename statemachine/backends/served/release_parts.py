@@ -35,7 +35,7 @@ def contact_arrays(model, data):
 
 
 def constraint_part(model, data, part):
-    """The forces (nv,) of the rows of constraints that make up one of `PARTS`."""
+    """Return the forces (nv,) of the rows of constraints that make up one of `PARTS`."""
     total = np.zeros(model.nv)
     if data.nefc:
         rows = np.isin(data.efc_type, [int(kind) for kind in PARTS[part]])
@@ -44,6 +44,6 @@ def constraint_part(model, data, part):
 
 
 def held(model, name):
-    """Whose attribute a field is, and its name there: "opt.timestep", "body_mass"."""
+    """Return the owner of a field, and its name there: "opt.timestep", "body_mass"."""
     holder, _, field = name.rpartition(".")
     return (getattr(model, holder) if holder else model), field

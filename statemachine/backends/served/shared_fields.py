@@ -62,7 +62,9 @@ def take_over_flags(raw: mujoco.MjModel, name: str, set_there: list[str]) -> Non
 
 
 def field_names(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
-    """Names of the numeric fields of a compiled model that releases may have in common."""
+    """Yield the names of the numeric fields of a compiled model that releases may have in
+    common.
+    """
     for name in dir(raw):
         sent = not name.startswith(("_", *_OWN, *without))
         if sent and isinstance(getattr(raw, name), np.ndarray):

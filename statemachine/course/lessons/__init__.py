@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from ...errors import UnknownNameError, check_name
+
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -56,7 +58,6 @@ class Lesson:
         question: What it answers.
         model: The model that it is about.
         options: On the command line.
-        more: Switches, each of which shows a part of it; JSON and documentation show all.
         on_path: Whether the guided path has it.
         plots: Whether it has pictures for a file.
     """
@@ -65,7 +66,6 @@ class Lesson:
     question: str
     model: str
     options: tuple[Option, ...] = ()
-    more: tuple[str, ...] = ()
     on_path: bool = True
     plots: bool = False
 
@@ -74,43 +74,54 @@ class Lesson:
         """Its options where nobody sets one."""
         return {option.key: option.default for option in self.options}
 
+    @property
+    def more(self) -> tuple[str, ...]:
+        """The switch that shows what goes further, if it has one; JSON and documentation do."""
+        return tuple(option.key for option in self.options if option is FURTHER)
+
+
+FURTHER = Option("--further", "", "show what goes further, after the lesson")
 
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
 _JOINT = Option("--joint", "JOINT", "joint to write (default shoulder_lift, if there is one)")
 _VALUE = Option("--value", "X", "what to write [rad or m] (default 0.8, if in range)")
+_SITE = Option("--site", "SITE", "the fingertip (default gripperframe, or the last site)")
 
 _LESSONS = (
     Lesson(
-        "objects",
-        "What never changes, and what does?",
+        "nowhere",
+        "The arm that is nowhere: where is it?",
         "so101/scene",
-        (Option("--worlds", "N", "how many Data of one Model (default 10)", {"default": 10}),),
+        (_SITE, FURTHER),
+    ),
+    Lesson(
+        "objects",
+        "Two objects and one function: what is in which?",
+        "so101/scene",
+        (
+            Option("--worlds", "N", "how many Data of one Model (default 10)", {"default": 10}),
+            Option("--most", "N", "most worlds with --further (default 4096)", {"default": 4096}),
+            FURTHER,
+        ),
+        plots=True,
     ),
     Lesson(
         "state",
-        "Which numbers are the state?",
+        "Which numbers are the state of the robot?",
         "so101/scene_box",
         plots=True,
     ),
     Lesson(
-        "write",
-        "You wrote into qpos. Who noticed?",
-        "so101/scene",
-        (_JOINT, _VALUE),
-    ),
-    Lesson(
         "forward",
-        "Why is a fresh arm's fingertip at the origin?",
+        "You wrote into the state. Who noticed?",
         "so101/scene",
         (
             _JOINT,
             _VALUE,
-            Option("--site", "SITE", "the fingertip (default gripperframe, or the last site)"),
-            Option("--arrays", "", "show only which arrays each call changes"),
-            Option("--lag", "", "show only how far behind a step leaves it"),
-            Option("--seconds", "S", "simulated time of --lag (default 2)"),
+            _SITE,
+            Option("--seconds", "S", "simulated time with --further (default 2)"),
+            FURTHER,
         ),
-        more=("arrays", "lag"),
         plots=True,
     ),
     Lesson(
@@ -120,6 +131,7 @@ _LESSONS = (
         (
             Option("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),
             Option("--target", "X,X,…", "command, one number an actuator [rad for a servo]"),
+            FURTHER,
         ),
         plots=True,
     ),
@@ -134,14 +146,16 @@ _LESSONS = (
                 "JOINT",
                 "joint to watch, with a servo (default shoulder_lift, or that with most load)",
             ),
-            Option("--longer", "S", "simulated time of the fall; 0 for none (default 100)"),
+            Option("--longer", "S", "simulated time of the fall with --further (default 100)"),
+            FURTHER,
         ),
         plots=True,
     ),
     Lesson(
         "reset",
-        "Back to a known state: what is in it?",
+        "How do you get back to a known state?",
         "so101/scene_box",
+        (FURTHER,),
     ),
     Lesson(
         "replay",
@@ -156,34 +170,50 @@ _LESSONS = (
                 "make the second run differ: one step more, or the command one step late",
                 {"choices": ("extra-step", "late-ctrl")},
             ),
+            FURTHER,
         ),
         plots=True,
     ),
     Lesson(
         "time",
         "What time is it in a simulator?",
-        "so101/scene",
+        "so101/scene_box",
         (
+            Option("--steps", "N", "steps of the run (default 4000)", {"default": 4000}),
             Option("--realtime", "", "wait for the clock"),
             Option("--seconds", "S", "simulated time with --realtime (default 4)"),
+            FURTHER,
         ),
     ),
     Lesson(
-        "speed",
-        "What does one second of your machine buy?",
+        "summary",
+        "What can you do now, and what is next?",
         "so101/scene_box",
-        (Option("--steps", "N", "steps of each run (default 4000)", {"default": 4000}),),
-    ),
-    Lesson(
-        "worlds",
-        "Many worlds: what does a shared Model save?",
-        "so101/scene_box",
-        (Option("--most", "N", "the largest number of worlds (default 4096)", {"default": 4096}),),
-        on_path=False,
-        plots=True,
     ),
     Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),
 )
+
+# Lessons that were, and the command that now shows what they taught.
+MOVED = {
+    "write": "lesson forward",
+    "speed": "lesson time",
+    "worlds": "lesson objects --further",
+}
+
+
+def moved(name: str) -> str:
+    """Return where a lesson went that is none any more, as the end of a message; "" for others."""
+    if name not in MOVED:
+        return ""
+    return f"what it taught is in: statemachine {MOVED[name]}"
+
+
+def check_lesson(name: str) -> None:
+    """Raise UnknownNameError where no lesson has a name."""
+    if moved(name):
+        raise UnknownNameError(f"no lesson named {name!r} any more; {moved(name)}")
+    check_name("lesson", name, LESSONS)
+
 
 # The lessons of the path, in order, and those beside it.
 LESSONS = {lesson.name: lesson for lesson in _LESSONS}

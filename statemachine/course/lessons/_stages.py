@@ -16,6 +16,7 @@ from ...lab.runs.readings import Tip, read_derived, read_stored
 from ...lab.runs.usual_commands import hold_ctrl
 from ...measures.text import grouped
 from ...show.blocks import Block, Table
+from ...show.lesson_template import Words
 from ...show.pictures import Pipeline, Traces
 
 _STORED = (*INPUTS, "time")
@@ -191,14 +192,14 @@ def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
     )
 
 
-def change_tables(results: Mapping[str, Sequence[ArrayChange]]) -> list[Block]:
+def change_tables(results: Mapping[str, Sequence[ArrayChange]], say: Words) -> list[Block]:
     """Show the arrays that a write, forward and step changed, in groups that behave alike."""
     engines_by_rows = grouped((_change_rows(changes), name) for name, changes in results.items())
     tables: list[Block] = [
         Table(
             (", ".join(engines), "a write", "forward", "step"),
             rows,
-            title="Whose bytes change, after a write to qpos[…] and then one call",
+            title=say("changes"),
             words=frozenset({0, 1, 2, 3}),
         )
         for rows, engines in engines_by_rows.items()
@@ -208,7 +209,7 @@ def change_tables(results: Mapping[str, Sequence[ArrayChange]]) -> list[Block]:
     computed = [change.name for change in first if not change.stored and change.forward]
     moved = [change.name for change in first if change.stored and change.step]
     pipeline = Pipeline(
-        "What forward and step cover, as found by comparing bytes",
+        say("cover"),
         (("stored", stored), ("derived", computed), ("integrated", moved)),
         (("forward", 0, 1), ("step", 0, 2)),
     )
@@ -226,7 +227,7 @@ def _change_rows(changes: Sequence[ArrayChange]) -> tuple[tuple[str, ...], ...]:
     return tuple(rows)
 
 
-def lag_tables(lags: Mapping[str, Lag]) -> list[Block]:
+def lag_tables(lags: Mapping[str, Lag], say: Words) -> list[Block]:
     """Show to which moment belongs what a step leaves behind, by backend."""
     headers = ["array"]
     for name in lags:
@@ -237,17 +238,18 @@ def lag_tables(lags: Mapping[str, Lag]) -> list[Block]:
         for lag in lags.values():
             row += [str(lag.of_before.get(array, "–")), str(lag.of_after.get(array, "–"))]
         rows.append(row)
-    title = "Steps after which an array belongs to the state before the step, or after it"
     curves = {
         name: (lag.time.tolist(), (lag.distance * 1e3).tolist()) for name, lag in lags.items()
     }
     return [
-        Table(headers, rows, title),
-        Traces("How far site_xpos is behind after each step", "time [s]", "distance [mm]", curves),
+        Table(headers, rows, say("moments")),
+        Traces(say("behind"), "time [s]", "distance [mm]", curves),
     ]
 
 
-def own_tables(results: Mapping[str, Sequence[OwnAnswer]], question: str) -> list[Table]:
+def own_tables(
+    results: Mapping[str, Sequence[OwnAnswer]], question: str, say: Words
+) -> list[Table]:
     """Show what each engine does without us, where some of this is emulated."""
     tables: list[Table] = []
     for name, answers in results.items():
@@ -257,7 +259,7 @@ def own_tables(results: Mapping[str, Sequence[OwnAnswer]], question: str) -> lis
                 Table(
                     ("after", "what", "is"),
                     [(f"a {question}", answer.part, answer.answer) for answer in asked],
-                    title=f"{name} itself, without us (statemachine conventions {question})",
+                    title=say("itself", engine=name, question=question),
                     words=frozenset({0, 1, 2}),
                 )
             )

@@ -1,4 +1,4 @@
-"""Stored, derived: what forward recomputes, and when the fingertip notices a write."""
+"""A write into the state: it is in the simulator at once, and nothing derived has noticed it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...lab.runs.readings import tips_of, usual_tip
 from ...measures import largest
 from ...measures.text import count, millimetres, short_time, vector
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, differences, emulated
+from ...show.lesson_template import Blocks, Results, Words, differences, emulated
 from ._robot import coordinate, with_joint
 from ._stages import (
     ArrayChange,
@@ -32,8 +32,10 @@ from ._stages import (
     own_answers,
     own_tables,
 )
+from ._write import WriteEffects, effects_of, in_engine, refusals, write_slots
 from .session import CodeRun, Options
 
+_SAY = Words("course/lessons/forward")
 _SECONDS = 2.0  # under a command, long enough to touch something
 _INSIDE = 1e-3  # metres; less is how engines press things together
 _Pairs = tuple[tuple[int, int], ...]
@@ -57,7 +59,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class ForwardResult:
-    """Four readings of the fingertip around a write, and what else was asked for.
+    """Four readings of the fingertip around a write, and what goes further.
 
     Attributes:
         joint: The joint that was written.
@@ -68,9 +70,16 @@ class ForwardResult:
         moved: Distance that the write and the second `forward` moved it [m].
         contacts: How many were found after the second `forward`.
         deepest: How far the two surfaces of the worst of them are inside each other [m].
+        place: Index of the entry of qpos that was written.
+        view: What another name for `data.qpos` says right after the write [rad or m].
+        copy: What a copy of it says that was made before the write [rad or m].
+        in_engine: The entry as the engine's own memory shows it then [rad or m]; None where the
+            engine keeps its state elsewhere.
+        further: What follows from the write, and what is refused; None where what goes further
+            was not asked for.
         itself: What the engine does without us, where some of this is emulated.
-        changes: What each call changes, if that was asked for.
-        lag: Of which moment derived values are after a step, if that was asked for.
+        changes: What each call changes, if what goes further was asked for.
+        lag: Of which moment derived values are after a step, if it was.
         provenance: What it was computed with.
     """
 
@@ -82,6 +91,11 @@ class ForwardResult:
     moved: float
     contacts: int
     deepest: float
+    place: int
+    view: float
+    copy: float
+    in_engine: float | None
+    further: WriteEffects | None
     itself: tuple[OwnAnswer, ...]
     changes: tuple[ArrayChange, ...]
     lag: Lag | None
@@ -120,36 +134,46 @@ print(4, {read}.round(4))
 
 
 def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
-    """Read the fingertip at each print; then what else was asked for."""
-    model, joint, site, value = play.model, options["joint"], options["site"], options["value"]
-    place, tip = coordinate(model, joint).place, tips_of(model, site)[0]
-    steps = _steps(model, options)
-    actions = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
+    """Read the fingertip at each print; then what goes further, if that was asked for."""
+    model, joint, value = play.model, options["joint"], options["value"]
+    at, tip = coordinate(model, joint), tips_of(model, options["site"])[0]
+    actions = ("make_data", "forward", f"qpos[{at.place}] = {value:g}", "forward again")
     readings: list[Reading] = []
+    view, copy = np.zeros(model.nq), np.zeros(model.nq)
+    in_memory: float | None = None
     for source in play.lines():
+        if source.startswith("data = "):
+            view, copy = play.names["data"].qpos, play.names["data"].qpos.copy()
+        if source.startswith("data.qpos["):
+            in_memory = in_engine(play.names["data"], at.place)
         if source.startswith("print("):
             data = play.names["data"]
             readings.append(Reading(actions[len(readings)], tip.read(data), data.time))
     contacts = play.names["data"].contacts
     deepest = max(0.0, -float(contacts.dist.min(initial=0.0)))
     moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
+    further = lag = None
     itself: list[OwnAnswer] = []
     changes: list[ArrayChange] = []
-    if options["arrays"]:
-        itself += own_answers(model, "write")
-        changes += changes_by_call(model, place, value)
-    if steps:
-        itself += own_answers(model, "step")
-    lag = lag_of_steps(model, tip, steps, progress) if steps else None
+    if options["further"]:
+        further = effects_of(model, at, value)
+        itself += [*own_answers(model, "write"), *own_answers(model, "step")]
+        changes += changes_by_call(model, at.place, value)
+        lag = lag_of_steps(model, tip, _steps(model, options), progress)
     return ForwardResult(
         joint=joint,
-        site=site,
+        site=options["site"],
         value=value,
         readings=tuple(readings),
         equal=_equal_pairs(readings),
         moved=moved,
         contacts=len(contacts),
         deepest=deepest,
+        place=at.place,
+        view=float(view[at.place]),
+        copy=float(copy[at.place]),
+        in_engine=in_memory,
+        further=further,
         itself=tuple(itself),
         changes=tuple(changes),
         lag=lag,
@@ -167,11 +191,9 @@ def _equal_pairs(readings: Sequence[Reading]) -> _Pairs:
 
 
 def _steps(model: Model, options: Options) -> int:
-    """Return over how many steps to look at the lag; 0 if it is not asked for."""
+    """Return over how many steps to look at the lag."""
     seconds = options["seconds"]
-    if seconds is None and options["lag"]:
-        seconds = _SECONDS
-    return 0 if seconds is None else steps_in(model, seconds)
+    return steps_in(model, _SECONDS if seconds is None else seconds)
 
 
 def slots(result: ForwardResult) -> dict[str, Any]:
@@ -180,6 +202,9 @@ def slots(result: ForwardResult) -> dict[str, Any]:
     slots["right"] = _CHOICES.get(result.equal)
     slots["zero_at_first"] = not result.readings[0].fingertip.any()
     slots["unchanged"] = (1, 2) in result.equal
+    slots["is_view"] = result.view == result.value != result.copy
+    slots["in_memory"] = result.in_engine is not None
+    slots["engine_agrees"] = result.in_engine == result.value
     slots["moved"] = millimetres(result.moved, 1)
     slots["moves"] = result.moved > 0
     slots["no_time_passed"] = len({reading.time for reading in result.readings}) == 1
@@ -189,6 +214,8 @@ def slots(result: ForwardResult) -> dict[str, Any]:
     slots["emulated"] = emulated(
         result, "zeros when fresh", "stale after a write", "stale after a step"
     )
+    if result.further is not None:
+        slots |= write_slots(result.further)
     return slots | _slots_of_changes(result.changes) | _slots_of_lag(result.lag)
 
 
@@ -197,7 +224,6 @@ def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
     derived = [change for change in changes if not change.stored]
     same = {change.name for change in derived if change.same}
     return {
-        "arrays": len(changes) > 0,
         "derived": len(derived),
         "same": len(same),
         "places_are_same": {"xpos", "xquat", "site_xpos", "site_xmat"} <= same,
@@ -207,10 +233,10 @@ def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
 def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
     """Fill the slots about what a step leaves behind."""
     if lag is None:
-        return {"lag": False}
+        return {}
     steps = len(lag.time)
     worst, step = largest(lag.distance)
-    slots: dict[str, Any] = {"lag": True}
+    slots: dict[str, Any] = {}
     slots["lags"] = worst > 0 and not lag.neither
     slots["steps"] = count(steps, "step")
     slots["of_before"] = lag.of_before[lag.array] == steps > lag.of_after[lag.array]
@@ -221,20 +247,21 @@ def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
 
 
 def tables(results: Results[ForwardResult], first: ForwardResult) -> Blocks:
-    """Show the four readings; then what was asked for."""
+    """Show the four readings; then what goes further, if that was asked for."""
     answers = {name: result.itself for name, result in results.items()}
     changes = {name: result.changes for name, result in results.items()}
     lags = {name: result.lag for name, result in results.items() if result.lag is not None}
     rows: dict[str, Callable[[ForwardResult, ForwardResult], str]] = {}
     for k in range(len(first.readings)):
-        rows[f"{first.site}, reading {k + 1}"] = partial(_apart, k)
+        rows[_SAY("reading", site=first.site, number=k + 1)] = partial(_apart, k)
     blocks: dict[str, Table | Sequence[Block]] = {}
     blocks["readings"] = _readings(results, first)
     blocks["differences"] = differences(results, rows)
-    blocks["changes"] = change_tables(changes) if first.changes else []
-    blocks["own_write"] = own_tables(answers, "write")
-    blocks["lag_tables"] = lag_tables(lags) if lags else []
-    blocks["own_step"] = own_tables(answers, "step")
+    blocks["refused"] = refusals(first.further, _SAY) if first.further else []
+    blocks["changes"] = change_tables(changes, _SAY) if first.changes else []
+    blocks["own_write"] = own_tables(answers, "write", _SAY)
+    blocks["lag_tables"] = lag_tables(lags, _SAY) if lags else []
+    blocks["own_step"] = own_tables(answers, "step", _SAY)
     return blocks
 
 
@@ -252,7 +279,7 @@ def _readings(results: Results[ForwardResult], first: ForwardResult) -> Table:
     return Table(
         ("", "after", *columns, "data.time"),
         rows,
-        title=f"{first.site}, read four times",
+        title=_SAY("readings", site=first.site),
         words=frozenset({0, 1}),
         emphasis=frozenset(equal),
     )

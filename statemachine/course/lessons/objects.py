@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -17,11 +17,13 @@ from ...interface.checks import as_count
 from ...lab.runs.drive import Progress, part_of
 from ...lab.runs.in_turns import in_turns
 from ...lab.runs.provenance import Provenance, provenance
-from ...measures.text import count, duration
-from ...show.blocks import Block, Table
-from ...show.lesson_template import by_engine, differences
+from ...measures.text import count, duration, milliseconds
+from ...show.blocks import Table
+from ...show.lesson_template import Blocks, Results, Words, by_engine, differences
+from ._many_worlds import ManyWorlds, measured, slots_of_worlds, world_tables
 from .session import CodeRun, Options
 
+_SAY = Words("course/lessons/objects")
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
 _STEPS = 200  # of each Data
@@ -60,6 +62,9 @@ class ObjectsResult:
         arrays: Number of arrays that the Model and the engine's own model hold.
         constant: Whether all these arrays are unchanged.
         shared: Whether each Data's engine object names the Model's as its own.
+        meshes: Number of meshes that the file names.
+        triangles: Number of triangles of all of them.
+        further: What each of many worlds costs; None where that was not asked for.
         provenance: What it was computed with.
     """
 
@@ -73,6 +78,9 @@ class ObjectsResult:
     arrays: int
     constant: bool
     shared: bool
+    meshes: int
+    triangles: int
+    further: ManyWorlds | None
     provenance: Provenance
 
     @property
@@ -104,6 +112,9 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ObjectsResult:
         singly += _in_turn(model, [k], worlds, share)
     together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
     different = len({end.tobytes() for end in together})
+    many = None
+    if options["further"]:
+        many = measured(model, as_count(options["most"], "most"), progress)
     return ObjectsResult(
         loading=loading,
         making=making,
@@ -115,6 +126,9 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ObjectsResult:
         arrays=len(before),
         constant=before == _arrays(model),
         shared=shared,
+        meshes=int(getattr(model.compiled, "nmesh", 0)),
+        triangles=int(getattr(model.compiled, "nmeshface", 0)),
+        further=many,
         provenance=provenance(model),
     )
 
@@ -168,43 +182,52 @@ def _arrays(model: Model) -> dict[str, bytes]:
 
 def slots(result: ObjectsResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
-    return {
+    slots: dict[str, Any] = {
         "right": 0 if result.alone else 1,
         "stepped": f"{100 * result.provenance.timestep:g} s",
+        "timestep": milliseconds(result.provenance.timestep),
         "steps": count(result.nstep, "step"),
+        "load_steps": f"{result.ratio:,.0f}",
+        "load": duration(result.loading),
+        "step": duration(result.stepping),
+        "make": duration(result.making),
+        "triangles": f"{result.triangles:,}",
         "cheap": result.making < result.loading / _CHEAP,
+    }
+    if result.further is not None:
+        slots |= slots_of_worlds(result.further)
+    return slots
+
+
+def tables(results: Results[ObjectsResult], _first: ObjectsResult) -> Blocks:
+    """Return what each part costs, and what each of many worlds costs."""
+    worlds = {name: result.further for name, result in results.items() if result.further}
+    return {
+        "costs": _costs(results),
+        "differences": _differences(results),
+        "worlds_tables": world_tables(worlds, _SAY) if worlds else [],
     }
 
 
-def tables(
-    results: Mapping[str, ObjectsResult], _first: ObjectsResult
-) -> dict[str, Block | Sequence[Block]]:
-    """Return what each part costs."""
-    return {"costs": _costs(results), "differences": _differences(results)}
-
-
-def _costs(results: Mapping[str, ObjectsResult]) -> Table:
+def _costs(results: Results[ObjectsResult]) -> Table:
     """Return the wall time of each part by engine."""
-    return by_engine(
-        results,
-        {
-            "load: the file, once": lambda r: duration(r.loading),
-            "make_data": lambda r: duration(r.making),
-            "step: one timestep": lambda r: duration(r.stepping),
-            "a load costs as much as": lambda r: f"{r.ratio:,.0f} steps",
-        },
-        "What each costs on this machine, now (median of five)",
-    )
+    rows: dict[str, Callable[[ObjectsResult], str]] = {
+        _SAY("load_cost"): lambda r: duration(r.loading),
+        _SAY("data_cost"): lambda r: duration(r.making),
+        _SAY("step_cost"): lambda r: duration(r.stepping),
+        _SAY("load_in_steps"): lambda r: f"{r.ratio:,.0f} steps",
+    }
+    return by_engine(results, rows, _SAY("costs"))
 
 
-def _differences(results: Mapping[str, ObjectsResult]) -> Sequence[Table]:
+def _differences(results: Results[ObjectsResult]) -> Sequence[Table]:
     """Return how much longer each part takes on another engine than on the first."""
     return differences(
         results,
         {
-            "a load takes": lambda a, b: _times(a.loading, b.loading),
-            "a Data takes": lambda a, b: _times(a.making, b.making),
-            "a step takes": lambda a, b: _times(a.stepping, b.stepping),
+            _SAY("load_takes"): lambda a, b: _times(a.loading, b.loading),
+            _SAY("data_takes"): lambda a, b: _times(a.making, b.making),
+            _SAY("step_takes"): lambda a, b: _times(a.stepping, b.stepping),
         },
     )
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...interface import Array, forward, make_data, reset, step
+from ...interface import Array, make_data, reset, step
 from ...lab.runs.robot import TARGET, UNACTUATED
 from ...show.blocks import Page, Printed
 from ...show.pictures import RobotPicture
@@ -73,6 +73,11 @@ def _poses(
     return rows
 
 
+def _at_the_start() -> _Poses:
+    """Return the arm in its default state."""
+    return _poses(_ARM, 1), None
+
+
 def _towards_the_goal() -> _Poses:
     """Return the arm on its way to the goal, and where it starts."""
     run = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
@@ -95,18 +100,6 @@ def _before_and_after_a_write() -> _Poses:
     return _poses(_ARM, 1), _poses(_ARM, 1, shoulder_lift=0.8)
 
 
-def _lag() -> _Poses:
-    """Return the arm by site_xpos after a step, and by qpos."""
-    model = load(_ARM)
-    with make_data(model) as data:
-        data.ctrl[:] = TARGET
-        step(model, data, 50)
-        before = data.qpos[None].copy()
-        step(model, data)
-        forward(model, data)
-        return before, data.qpos[None].copy()
-
-
 def _servos_off_and_on() -> _Poses:
     """Return the arm without its servos, and with them, while nobody writes ctrl."""
     return _poses(_ARM, 22, options=UNACTUATED), _poses(_ARM, 22)
@@ -124,10 +117,18 @@ def _two_runs() -> _Poses:
 
 def _while_waiting() -> _Poses:
     """Return the arm after 100 steps, twice: nothing is called in between."""
-    return _poses(_ARM, 2, every=100)[1:], _poses(_ARM, 2, every=100)[1:]
+    poses = _poses(_BOX, 2, keyframe=0, every=100)[1:]
+    return poses, poses.copy()
 
 
 PICTURES: Mapping[str, RobotPicture] = {
+    "nowhere": RobotPicture(
+        "The arm where `forward` finds it: the fingertip is 39 cm in front of the foot.",
+        "An arm on a floor, stretched out to the front, with its gripper above the floor.",
+        "statemachine view so101/scene --paused",
+        _ARM,
+        _at_the_start,
+    ),
     "objects": RobotPicture(
         "Two Data of one Model, four times as slow: one is commanded and advanced; the other, in "
         "violet, waits.",
@@ -144,22 +145,13 @@ PICTURES: Mapping[str, RobotPicture] = {
         _BOX,
         _box_held,
     ),
-    "write": RobotPicture(
+    "forward": RobotPicture(
         "What xpos still says, and in violet what was written into qpos.",
         "Two arms: one stretched out as before the write; the other, in violet, bent down at "
         "shoulder_lift by 0.8 rad, where qpos says that it is, part of it below the floor.",
         "statemachine view so101/scene --paused",
         _ARM,
         _before_and_after_a_write,
-    ),
-    "forward": RobotPicture(
-        "After the step from 0.250 s: the arm by site_xpos, and in violet by qpos, 9.95 mm on.",
-        "The jaws from close by, twice: the outline in violet, where qpos has the arm, is about "
-        "a centimetre ahead of the one that site_xpos tells of.",
-        "statemachine view so101/scene --speed 0.1",
-        _ARM,
-        _lag,
-        near="gripper",
     ),
     "hold": RobotPicture(
         "The arm on its way, four times as slow, and in violet the goal that ctrl tells it.",
@@ -195,15 +187,16 @@ PICTURES: Mapping[str, RobotPicture] = {
     ),
     "time": RobotPicture(
         "After 100 steps, and 0.2 s later by the clock: the second is drawn in violet.",
-        "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
-        "statemachine view so101/scene --paused",
-        _ARM,
+        "The arm with the box in its jaws. No violet is to be seen: while nobody called step, "
+        "nothing moved.",
+        "statemachine view --keyframe held --speed 4",
+        _BOX,
         _while_waiting,
     ),
-    "speed": RobotPicture(
-        "What is advanced here: six joints, a box, and the contacts between them.",
+    "summary": RobotPicture(
+        "The robot of the path: six joints, a box, and the contacts between them.",
         "The arm with a small box between its jaws, above the floor.",
-        "statemachine view --keyframe held --speed 4",
+        "statemachine view --keyframe held",
         _BOX,
         _box_held,
     ),

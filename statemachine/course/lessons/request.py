@@ -13,7 +13,7 @@ from ...lab.runs.drive import Progress
 from ...lab.runs.each_backend import on_each_backend
 from ...lab.runs.reporter import QUIET, Reporter
 from ...models import AnyPath
-from . import LESSONS, Lesson
+from . import LESSONS, Lesson, check_lesson
 from .session import LessonRun, take
 
 LessonValue = bool | int | float | str | Sequence[float] | None  # of a lesson's option
@@ -41,7 +41,7 @@ class LessonRequest:
     calls: bool = False
 
     def __post_init__(self) -> None:
-        check_name("lesson", self.name, LESSONS)
+        check_lesson(self.name)
         for key in self.options:
             check_name(f"option of the lesson {self.name}", key, self.lesson.defaults)
         for backend in chosen_backends(self.backends):

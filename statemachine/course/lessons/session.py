@@ -263,6 +263,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
     blocks: dict[str, Block | Sequence[Block]] = {
         "code": Code(_code_shown(taken).splitlines()),
         "printed": Printed({name: run.printed for name, run in taken.items()}),
+        "diagram": [],
     }
     if hasattr(lesson_module, "tables"):
         blocks |= lesson_module.tables(results, first.result)

@@ -1,34 +1,42 @@
-"""Time is a number in the state; pacing lives in your loop."""
+"""Time is a number in the state: who waits, and how much of it a second of the clock buys."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...errors import BadInputError
-from ...interface import Data, Model, step
-from ...lab.runs.drive import Progress, steps_in
+from ...interface import Array, Data, Model, make_data, step
+from ...interface.checks import as_count
+from ...lab.runs.drive import Progress, part_of, steps_in
+from ...lab.runs.in_turns import FEWEST, Ratio
 from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import count, duration
-from ...show.blocks import Block
-from ...show.lesson_template import by_engine
+from ...show.blocks import Block, Table
+from ...show.lesson_template import UNDECIDED, Blocks, Results, Words, by_engine
+from ._loop_cost import LoopCost, loop_slots, loop_tables, measured, rounds_of
 from .session import CodeRun, Options
 
+_SAY = Words("course/lessons/time")
 _NAP = 0.2  # s
-_BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
+_BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds that are paced, without and with --realtime
+_MOST = 20_000  # steps of a call; between two calls Ctrl-C is heard
+_BOUNDS = (1.0, 10.0)  # × real time, between the choices of the question
 
 
 def code(model: Model, options: Options, load: str) -> str:
-    """Write a loop that does not wait; with --realtime one that does."""
-    total = _steps(model, options)
-    return _paced(total, load) if options["realtime"] else _free(total, load)
+    """Write a run that does not wait; with --realtime one that does."""
+    paced = _paced_steps(model, options)
+    steps = as_count(options["steps"], "steps")
+    return _paced(paced, load) if options["realtime"] else _free(model, steps, load)
 
 
-def _steps(model: Model, options: Options) -> int:
+def _paced_steps(model: Model, options: Options) -> int:
+    """Return the steps of the run that waits."""
     seconds = options["seconds"]
     if seconds is not None and not options["realtime"]:
         raise BadInputError("--seconds goes with --realtime")
@@ -37,21 +45,34 @@ def _steps(model: Model, options: Options) -> int:
     return steps_in(model, seconds)
 
 
-def _free(steps: int, load: str) -> str:
+def _free(model: Model, steps: int, load: str) -> str:
+    """Write a run that does not wait, from the first keyframe if there is one."""
+    start = ""
+    if model.keyframes:
+        start = "sm.reset(model, data, keyframe=0)\ndata.time = 0\n"
+    stepping = f"sm.step(model, data, {steps})"
+    full, rest = divmod(steps, _MOST)
+    if full:
+        last = f" + [{rest}]" if rest else ""
+        stepping = f"for n in [{_MOST}] * {full}{last}:\n    sm.step(model, data, n)"
     return f"""\
 import time
 import statemachine as sm
 
 model = {load}
 data = sm.make_data(model)
-sm.step(model, data, {steps})
+{start}began = time.perf_counter()
+{stepping}
+wall = time.perf_counter() - began
 print(data.time)
-time.sleep(0.2)  # the world goes on; the simulation does not
+time.sleep({_NAP})  # the world goes on; the simulation does not
 print(data.time)
+print(f"{{data.time / wall:.0f}} times real time")
 """
 
 
 def _paced(steps: int, load: str) -> str:
+    """Write a loop that waits for the clock."""
     return f"""\
 import time
 import statemachine as sm
@@ -70,66 +91,57 @@ print(f"{{data.time:.3f}} s simulated in {{wall:.3f}} s")
 
 @dataclass(frozen=True)
 class TimeResult:
-    """Two runs of the same steps by the clock, one that waits and one that does not.
+    """A run that does not wait, by the clock; and a shorter one with waiting and without.
 
     Attributes:
-        nstep: Steps of each run.
-        simulated: Their simulated time [s].
-        free: Wall time of the run that does not wait [s].
-        paced: Wall time of the run that waits [s].
-        realtime: Whether the run that waits was typed.
-        waited: How much of it was waiting [s].
-        latest: How far behind the clock a step was at worst, after its waiting [s].
-        identical: Whether both runs end in the same bits.
-        nap: For how long nothing was called [s].
-        passed: How far `data.time` moved in it [s]; 0 if time is a number of the state.
-        moved: Whether the state moved in it.
-        end: `data.time` at the end of a run [s].
+        nstep: Steps of the run that does not wait.
+        wall: Its wall time [s].
+        rate: Its simulated time over its wall time, measured again in rounds.
+        nap: For how long nothing was called after it [s].
+        passed: How far `data.time` moved meanwhile [s]; 0 if time is a number of the state.
+        moved: Whether the state moved meanwhile.
+        end: `data.time` at its end [s].
         exact: Whether `data.time` is the running sum of the timestep, bit for bit.
+        realtime: Whether the run that waits was typed.
+        paced_steps: Steps of the run that waits, and of the same without waiting.
+        simulated: Their simulated time [s].
+        free: Wall time of them without waiting [s].
+        paced: Wall time of them with waiting [s].
+        waited: How much of that was waiting [s].
+        latest: How far behind the clock a step was at worst, after its waiting [s].
+        identical: Whether both end in the same bits.
+        further: What a loop of single steps costs; None where that was not asked for.
         provenance: What it was computed with.
     """
 
     nstep: int
-    simulated: float
-    free: float
-    paced: float
-    realtime: bool
-    waited: float
-    latest: float
-    identical: bool
+    wall: float
+    rate: Ratio
     nap: float
     passed: float
     moved: bool
     end: float
     exact: bool
+    realtime: bool
+    paced_steps: int
+    simulated: float
+    free: float
+    paced: float
+    waited: float
+    latest: float
+    identical: bool
+    further: LoopCost | None
     provenance: Provenance
 
     @property
     def factor(self) -> float:
-        """Return the simulated time over the wall time of the run that does not wait."""
+        """Return the simulated time over the wall time without waiting."""
         return self.simulated / self.free
 
     @property
     def paced_factor(self) -> float:
-        """Return the simulated time over the wall time of the run that waits."""
+        """Return the simulated time over the wall time with waiting."""
         return self.simulated / self.paced
-
-
-@dataclass(frozen=True)
-class _FreeRun:
-    """Run that does not wait, and a nap after it in which nothing is called.
-
-    Attributes:
-        wall: Wall time of the run [s].
-        nap: Length of the nap [s].
-        passed: How far `data.time` moved in the nap [s].
-        moved: Whether the state moved in it.
-    """
-
-    wall: float
-    nap: float
-    passed: float
-    moved: bool
 
 
 @dataclass(frozen=True)
@@ -147,34 +159,6 @@ class _PacedRun:
     latest: float
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> TimeResult:
-    """Watch the loop that is typed, and the other of the two on another Data."""
-    model, total = play.model, _steps(play.model, options)
-    realtime: bool = options["realtime"]
-    also = (_free if realtime else _paced)(total, "sm.load()")
-    with CodeRun(also, model) as second:
-        free_code, paced_code = (second, play) if realtime else (play, second)
-        free = _run_free(free_code)
-        paced = _run_paced(paced_code, total, progress)
-        (_, data), (_, other) = free_code.worlds[0], paced_code.worlds[0]
-        return TimeResult(
-            nstep=total,
-            simulated=total * model.timestep,
-            free=free.wall,
-            paced=paced.wall,
-            realtime=realtime,
-            waited=paced.waited,
-            latest=paced.latest,
-            identical=_same_state(data, other),
-            nap=free.nap,
-            passed=free.passed,
-            moved=free.moved,
-            end=data.time,
-            exact=other.time == _sum_of_steps(model, total),
-            provenance=provenance(model),
-        )
-
-
 @dataclass(frozen=True)
 class _Moment:
     """Moment after a line of the code.
@@ -190,20 +174,82 @@ class _Moment:
     qpos: bytes
 
 
-def _run_free(play: CodeRun) -> _FreeRun:
-    """Run the code that does not wait, and look at clock and Data after each of its lines."""
-    moments = []
-    for _ in play.lines():
+def run(play: CodeRun, options: Options, progress: Progress) -> TimeResult:
+    """Watch the code that is typed, and the other of the two on another Data."""
+    model, steps = play.model, as_count(options["steps"], "steps")
+    paced_steps = _paced_steps(model, options)
+    realtime: bool = options["realtime"]
+    also = _free(model, steps, "sm.load()") if realtime else _paced(paced_steps, "sm.load()")
+    with CodeRun(also, model) as second:
+        free_code, paced_code = (second, play) if realtime else (play, second)
+        stepped, slept = _run_free(free_code)
+        paced = _run_paced(paced_code, paced_steps, part_of(progress, 0.0, 0.4))
+        (_, data), (_, other) = free_code.worlds[0], paced_code.worlds[0]
+        free, unpaced = _without_waiting(model, paced_steps)
+        rate = _rate(model, data, steps)
+        further = None
+        if options["further"]:
+            further = measured(model, steps, part_of(progress, 0.5, 0.5))
+        return TimeResult(
+            nstep=steps,
+            wall=free_code.names["wall"],
+            rate=rate,
+            nap=slept.clock - stepped.clock,
+            passed=slept.time - stepped.time,
+            moved=slept.qpos != stepped.qpos,
+            end=stepped.time,
+            exact=other.time == _sum_of_steps(model, paced_steps),
+            realtime=realtime,
+            paced_steps=paced_steps,
+            simulated=paced_steps * model.timestep,
+            free=free,
+            paced=paced.wall,
+            waited=paced.waited,
+            latest=paced.latest,
+            identical=np.array_equal(unpaced, other.qpos),
+            further=further,
+            provenance=provenance(model),
+        )
+
+
+def _run_free(play: CodeRun) -> tuple[_Moment, _Moment]:
+    """Run the code that does not wait; look at clock and Data before and after its sleep."""
+    moments: list[_Moment] = []
+    slept = 0
+    for source in play.lines():
         if play.worlds:
             _, data = play.worlds[0]
             moments.append(_Moment(time.perf_counter(), data.time, data.qpos.tobytes()))
-    made, stepped, printed, slept, _ = moments
-    return _FreeRun(
-        wall=stepped.clock - made.clock,
-        nap=slept.clock - printed.clock,
-        passed=slept.time - printed.time,
-        moved=slept.qpos != printed.qpos,
-    )
+        if source.startswith("time.sleep("):
+            slept = len(moments)
+    return moments[slept - 2], moments[slept - 1]
+
+
+def _without_waiting(model: Model, steps: int) -> tuple[float, Array]:
+    """Take some steps from a new Data, and return their wall time [s] and qpos (nq,) then."""
+    with make_data(model) as data:
+        began = time.perf_counter()
+        for _ in range(steps):
+            step(model, data)
+        return time.perf_counter() - began, data.qpos.copy()
+
+
+def _rate(model: Model, data: Data, steps: int) -> Ratio:
+    """Measure in rounds how much simulated time passes in a second of the clock.
+
+    Args:
+        model: The Model to step.
+        data: A Data of it, which goes on from where it is.
+        steps: Number of steps of all rounds.
+    """
+    simulated: list[float] = []
+    walls: list[float] = []
+    for nstep in rounds_of(steps):
+        began = time.perf_counter()
+        step(model, data, nstep)
+        walls.append(time.perf_counter() - began)
+        simulated.append(nstep * model.timestep)
+    return Ratio.of("real time", simulated, walls)
 
 
 def _run_paced(play: CodeRun, steps: int, progress: Progress) -> _PacedRun:
@@ -233,11 +279,6 @@ def _run_paced(play: CodeRun, steps: int, progress: Progress) -> _PacedRun:
     return _PacedRun(play.names["wall"], sum(waits), max(0.0, *delays))
 
 
-def _same_state(data: Data, other: Data) -> bool:
-    """Tell whether two Data have the same positions and time, bit for bit."""
-    return np.array_equal(data.qpos, other.qpos) and data.time == other.time
-
-
 def _sum_of_steps(model: Model, steps: int) -> float:
     """Return the sum of some timesteps [s], added one after the other as `step` adds them."""
     return float(np.cumsum(np.full(steps, model.timestep))[-1])
@@ -246,14 +287,22 @@ def _sum_of_steps(model: Model, steps: int) -> float:
 def slots(result: TimeResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
     still = is_still(result)
-    return {
+    slots: dict[str, Any] = {
         "right": 0 if still else 1,
+        "speed_right": _speed_choice(result.rate),
         "nap": f"{result.nap:.2f} s",
         "still": still,
-        **_clock_slots(result),
         "steps": count(result.nstep, "step"),
         "timestep": f"{result.provenance.timestep:g}",
+        "rounds": count(result.rate.rounds, "round"),
+        "rate": f"{result.rate.median:.0f}",
+        "wait": f"{result.waited / result.paced:.0%}",
+        "paced_time": f"{result.simulated:g} s",
+        **_clock_slots(result),
     }
+    if result.further is not None:
+        slots |= loop_slots(result.further)
+    return slots
 
 
 def is_still(result: TimeResult) -> bool:
@@ -261,29 +310,55 @@ def is_still(result: TimeResult) -> bool:
     return result.passed == 0 and not result.moved
 
 
+def _speed_choice(rate: Ratio) -> int | str:
+    """Return the number of the right choice, how many times real time; or `UNDECIDED`."""
+    straddles = any(rate.low <= bound <= rate.high for bound in _BOUNDS)
+    if rate.rounds < FEWEST or straddles:
+        return UNDECIDED
+    return sum(rate.median > bound for bound in _BOUNDS)
+
+
 def _clock_slots(result: TimeResult) -> dict[str, Any]:
     """Return what the page says of `data.time` at the end of a run."""
     return {
-        "end": f"{result.end:g}",
-        "later": f"{result.end + _NAP:g}",
-        "whole_end": repr(result.end),
+        "end": repr(result.end),
+        "later": repr(result.end + _NAP),
         "inexact": result.end != round(result.end, 9),
     }
 
 
-def tables(
-    results: Mapping[str, TimeResult], first: TimeResult
-) -> dict[str, Block | Sequence[Block]]:
-    """Return both loops by the clock."""
-    steps = count(first.nstep, "step")
-    title = f"{first.simulated:g} s of simulated time, {steps}, by the clock"
-    rows = {
-        "not waiting": _unpaced,
-        "paced": _paced_by_clock,
-        "part of that spent waiting": _part_waited,
-        "the latest step was late by": _latest,
+def tables(results: Results[TimeResult], first: TimeResult) -> Blocks:
+    """Return how fast the run is, and both loops by the clock."""
+    loops = {name: result.further for name, result in results.items() if result.further}
+    blocks: dict[str, Table | list[Block]] = {}
+    blocks["speed"] = _speed(results, first)
+    blocks["paces"] = _paces(results, first)
+    blocks["loops"] = loop_tables(loops, _SAY) if loops else []
+    return blocks
+
+
+def _speed(results: Results[TimeResult], first: TimeResult) -> Table:
+    """Return how many times real time the run is, by engine."""
+    rows: dict[str, Callable[[TimeResult], str]] = {
+        _SAY("wall"): lambda result: duration(result.wall),
+        _SAY("rate"): lambda result: result.rate.spread(" ×", 1),
     }
-    return {"paces": by_engine(results, rows, title)}
+    simulated = f"{first.nstep * first.provenance.timestep:g} s"
+    steps = count(first.nstep, "step")
+    return by_engine(results, rows, _SAY("speed", steps=steps, simulated=simulated))
+
+
+def _paces(results: Results[TimeResult], first: TimeResult) -> Table:
+    """Return the run with waiting and without, by engine."""
+    rows: dict[str, Callable[[TimeResult], str]] = {
+        _SAY("unpaced"): _unpaced,
+        _SAY("paced"): _paced_by_clock,
+        _SAY("waiting"): _part_waited,
+        _SAY("latest"): _latest,
+    }
+    steps = count(first.paced_steps, "step")
+    simulated = f"{first.simulated:g} s"
+    return by_engine(results, rows, _SAY("paces", steps=steps, simulated=simulated))
 
 
 def _unpaced(result: TimeResult) -> str:

@@ -27,12 +27,12 @@ class AttributeChange:
 
     @property
     def old_text(self) -> str:
-        """The attribute as the file has it."""
+        """Return the attribute as the file has it."""
         return f'{self.attribute}="{self.old}"'
 
     @property
     def new_text(self) -> str:
-        """The attribute as it is to be."""
+        """Return the attribute as it is to be."""
         return f'{self.attribute}="{self.new}"'
 
 

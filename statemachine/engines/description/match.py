@@ -51,7 +51,7 @@ class Matching:
     only_right: tuple[Group, ...]
 
     def of(self, number: int) -> Pair | None:
-        """The pair of a group of the first description."""
+        """Return the pair of a group of the first description."""
         return next((pair for pair in self.pairs if pair.left.number == number), None)
 
     def other_kinds(self) -> Iterator[str]:
@@ -98,7 +98,7 @@ def match(
     one_world: bool = False,
     root_align: Placement | None = None,
 ) -> Matching:
-    """Pairs of rigid groups.
+    """Return the pairs of rigid groups.
 
     Args:
         left: A description.
@@ -209,7 +209,9 @@ def _floats(group: Group) -> bool:
 def _placed(
     left: GroupTree, right: GroupTree, group: Group, above: Pair, taken: set[int]
 ) -> Group | None:
-    """A group of the second description that hangs where `group` does, by the same axis."""
+    """Return the group of the second description that hangs where `group` does, by the same
+    axis.
+    """
     joint = group.joint
     assert joint is not None
     place, nearest = None, _NEAR
@@ -237,7 +239,7 @@ def _are_only_robots(left: GroupTree, group: Group, right: GroupTree, other: Gro
 
 
 def _line(group: Group, align: Placement) -> tuple[Array, Array]:
-    """A point of a group's joint axis and its direction, in an aligned parent's frame."""
+    """Return a point of a group's joint axis and its direction, in an aligned parent's frame."""
     joint = group.joint
     assert joint is not None
     place = align @ group.place
@@ -245,7 +247,7 @@ def _line(group: Group, align: Placement) -> tuple[Array, Array]:
 
 
 def _apart(point: Array, other: Array, axis: Array) -> float:
-    """Distance of a point from the line through another."""
+    """Return the distance of a point from the line through another [m]."""
     return float(np.linalg.norm(np.cross(axis, point - other)))
 
 
@@ -286,7 +288,7 @@ def _errors(
     fixed: list[tuple[Placement, Placement]],
     align: Placement,
 ) -> Iterator[float]:
-    """How far apart [m] the features of two solids are that are laid on each other."""
+    """Yield how far apart [m] the features of two solids are that are laid on each other."""
     if a.joint and b.joint and a.joint.kind in SCALAR:
         yield float(np.linalg.norm(align.mat @ a.joint.axis - b.joint.axis)) / 10
         if a.joint.kind == "hinge":
@@ -309,7 +311,9 @@ def _errors(
 
 
 def _fixed_frames(left: GroupTree, right: GroupTree) -> Places:
-    """Frames of one name by the groups that carry them, those of the groups themselves apart."""
+    """Return the frames of one name by the groups that carry them, without those of the groups
+    themselves.
+    """
     fixed: Places = {}
     for name, other_name in frame_names(left, right).items():
         (at, place), (there, other) = left.frames[name], right.frames[other_name]

@@ -67,5 +67,5 @@ class ModelReading:
 
     @property
     def run_model(self) -> Model:
-        """The Model with the masses and inertias that a run has."""
+        """Return the Model with the masses and inertias that a run has."""
         return self.model if self.mended is None else self.mended

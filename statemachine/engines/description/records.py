@@ -33,7 +33,7 @@ class Inertial:
     tensor: Array
 
     def seen_from(self, place: Placement) -> Inertial:
-        """The same body in the frame in which its link is at `place`."""
+        """Return the same body in the frame in which its link is at `place`."""
         return Inertial(self.mass, place.of(self.com), place.mat @ self.tensor @ place.mat.T)
 
 
@@ -59,7 +59,7 @@ class CollisionShape:
 
     @property
     def corners(self) -> Array:
-        """Those (n, 3) of a mesh that was read [m], in the link's frame."""
+        """Return the corners (n, 3) of a mesh that was read [m], in the link's frame."""
         assert self.points is not None
         return self.place.pos + self.points @ self.place.mat.T
 
@@ -182,24 +182,28 @@ class Robot:
 
     @property
     def joints(self) -> tuple[RobotJoint, ...]:
-        """All joints, in the order of the links."""
+        """Return all joints, in the order of the links."""
         return tuple(link.joint for link in self.links if link.joint)
 
     @property
     def names(self) -> set[str]:
-        """Of all joints, links and frames."""
+        """Return the names of all joints, links and frames."""
         return {part.name for part in (*self.joints, *self.links, *self.frames)}
 
 
 def moved(joint: RobotJoint | None, amount: float) -> Placement:
-    """Where a joint takes its link at a position, in the frame that the link has at zero."""
+    """Return the link's frame at a position of its joint, in the frame that the link has at
+    zero.
+    """
     if joint is None or not amount or joint.kind not in SCALAR:
         return HERE
     return motion(joint.kind == "slide", joint.axis, joint.anchor, amount)
 
 
 def motion(slides: bool, axis: Array, anchor: Array, amount: float) -> Placement:
-    """A move by `amount` along an axis (3,), or a turn about it through a point (3,)."""
+    """Return a translation by `amount` along an axis (3,), or a rotation about it through a
+    point (3,).
+    """
     if slides:
         return Placement(axis * amount, np.eye(3))
     mat = rotation(axis, amount)

@@ -34,7 +34,7 @@ _CUBE = _rotations_of_a_cube()
 
 
 def bounds_of(shape: CollisionShape) -> Array:
-    """Least and greatest coordinates (6,) of a mesh; of another shape twice its place.
+    """Return the least and greatest coordinates (6,) of a mesh; of another shape twice its place.
 
     A mesh has other frames in other files, but the same extent; of one that was not read (0,).
     """
@@ -46,7 +46,9 @@ def bounds_of(shape: CollisionShape) -> Array:
 
 
 def likest(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> dict[int, int]:
-    """Which shape of a part is which of another, both in one frame: by name, then by likeness."""
+    """Return which shape of a part is which of another, both in one frame: by name, then by
+    likeness.
+    """
     costs = sorted((_misfit(a, b), k, i) for k, a in enumerate(ours) for i, b in enumerate(theirs))
     return one_to_one((k, i) for _, k, i in costs)
 
@@ -54,7 +56,7 @@ def likest(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> 
 def one_to_one(
     candidates: Iterable[tuple[int, int]], known: Iterable[tuple[int, int]] = ()
 ) -> dict[int, int]:
-    """Known pairs, and of the candidates, in turn, those whose ends are both left."""
+    """Return the known pairs, and of the candidates, in turn, those whose ends are both left."""
     pairs = dict(known)
     for left, right in candidates:
         if left not in pairs and right not in pairs.values():
@@ -63,7 +65,7 @@ def one_to_one(
 
 
 def _misfit(left: CollisionShape, right: CollisionShape) -> float:
-    """How unlike two shapes are: of one name least, of other kinds most."""
+    """Return how unlike two shapes are: of one name least, of other kinds most."""
     if left.name and left.name == right.name:
         return -1.0
     ends = bounds_of(left), bounds_of(right)
@@ -115,7 +117,7 @@ class LaidShape:
 
     @property
     def is_reordered(self) -> bool:
-        """Whether its sizes stand in another order than in its file."""
+        """Tell whether the sizes of a shape stand in another order than in its file."""
         return self.order != (0, 1, 2)
 
     def in_own_order(self, values: Array) -> Array:

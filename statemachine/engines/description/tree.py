@@ -38,17 +38,17 @@ class Group:
 
     @property
     def name(self) -> str:
-        """That of its first link."""
+        """Return the name of the group's first link."""
         return self.links[0][0].name
 
     @property
     def joint(self) -> RobotJoint | None:
-        """What it moves by against its parent."""
+        """Return the joint by which the group moves against its parent."""
         return self.links[0][0].joint
 
     @property
     def body(self) -> int:
-        """The id of its first link's body in a compiled model; -1 where it is of none."""
+        """Return the id of its first link's body in a compiled model; -1 where it is of none."""
         return self.links[0][0].body
 
     def is_of_body(self, other: Group) -> bool:
@@ -57,14 +57,14 @@ class Group:
 
     @cached_property
     def inertial(self) -> Inertial:
-        """All of its links together, in the group's frame."""
+        """Return the inertial properties of all of its links together, in the group's frame."""
         return together(
             [link.inertial.seen_from(place) for link, place in self.links if link.inertial]
         )
 
     @cached_property
     def shapes(self) -> tuple[CollisionShape, ...]:
-        """Those of all its links, placed in the group's frame."""
+        """Return the shapes of all its links, placed in the group's frame."""
         return tuple(
             replace(shape, place=place @ shape.place)
             for link, place in self.links
@@ -73,7 +73,7 @@ class Group:
 
 
 def together(parts: list[Inertial]) -> Inertial:
-    """Composite of rigid parts in one frame: the parallel axis theorem."""
+    """Return the composite of rigid parts in one frame: the parallel axis theorem."""
     if len(parts) == 1:
         return parts[0]
     mass = sum(part.mass for part in parts)
@@ -114,7 +114,7 @@ class GroupTree:
         self.by_joint = {g.joint.name: g for g in self.groups if g.joint}
 
     def children(self, number: int) -> list[Group]:
-        """Groups that hang on a group."""
+        """Return the groups that hang on a group."""
         return [group for group in self.groups if group.parent == number]
 
     def of_body(self, group: Group) -> list[Group]:
@@ -128,7 +128,7 @@ class GroupTree:
 
     @cached_property
     def frames(self) -> dict[str, tuple[int, Placement]]:
-        """Sites and links by name: the group each is in, and its place there.
+        """Return the sites and links by name: the group each is in, and its place there.
 
         Where a site and a link share a name, the site goes by "name (site)".
         """
@@ -140,7 +140,7 @@ class GroupTree:
         return frames
 
     def poses(self, positions: Mapping[str, float] | None = None) -> list[Placement]:
-        """World poses of the groups, joints at `positions` by name, others at zero."""
+        """Return the world poses of the groups, joints at `positions` by name, others at zero."""
         poses: list[Placement] = []
         for group in self.groups:
             above = poses[group.parent] if group.parent >= 0 else HERE
@@ -150,7 +150,7 @@ class GroupTree:
 
     @cached_property
     def reach(self) -> float:
-        """How far links and frames are from the root at zero [m]."""
+        """Return how far links and frames are from the root at zero [m]."""
         world = self.poses()
         points = [world[number].of(place.pos) for number, place in self.frames.values()]
         points += [place.of(g.inertial.com) for g, place in zip(self.groups, world, strict=True)]
@@ -158,7 +158,9 @@ class GroupTree:
 
     @cached_property
     def carried(self) -> list[Inertial]:
-        """By number each group and all beyond it, as one body at zero, in the group's frame."""
+        """Return, by number, each group and all beyond it as one body at zero, in the group's
+        frame.
+        """
         carried = [group.inertial for group in self.groups]
         for group in reversed(self.groups):  # children before parents
             if group.parent >= 0:
@@ -167,7 +169,8 @@ class GroupTree:
         return carried
 
     def felt(self, number: int) -> tuple[float, float]:
-        """What the group's joint feels of all that it carries, at zero; NaN of other joints.
+        """Return the inertia about the joint of each group of all that it carries, at zero; NaN
+        without a joint.
 
         Returns:
             M_ii, armature included [kg m² or kg], and the largest force or torque of the weight

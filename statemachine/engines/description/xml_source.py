@@ -51,12 +51,12 @@ class XmlElement:
 
     @property
     def name(self) -> str:
-        """Its name; "" without one."""
+        """Return the element's name; "" without one."""
         return self.attributes.get("name", "")
 
     @property
     def label(self) -> str:
-        """What it is called: its tag, and its name or that of the element around it."""
+        """Return the element's label: its tag, and its name or that of the element around it."""
         named = next((each for each in (self, *reversed(self.around)) if each.name), None)
         if named is None:
             return f"<{self.tag}>"
@@ -88,7 +88,7 @@ class AttributeText:
 
     @property
     def change(self) -> AttributeChange:
-        """What is changed, as a record."""
+        """Return the change as a record."""
         old = "" if self.child else self.element.attributes.get(self.attribute, "")
         label = self.element.label
         if self.child:
@@ -143,17 +143,17 @@ class XmlSource:
 
     @property
     def root(self) -> XmlElement:
-        """The outermost element of the file."""
+        """Return the outermost element of the file."""
         return self._roots[self.path]
 
     @property
     def files(self) -> Collection[Path]:
-        """The file, and those that it includes."""
+        """Return the file, and those that it includes."""
         return self._texts.keys()
 
     @property
     def includes(self) -> Collection[XmlElement]:
-        """The elements that include a file."""
+        """Return the elements that include a file."""
         return self._included.keys()
 
     def children(self, element: XmlElement, through: Collection[str] = ()) -> Iterator[XmlElement]:
@@ -240,7 +240,7 @@ class XmlSource:
 
     @property
     def _references(self) -> list[XmlElement]:
-        """The elements that name a file, an included one apart."""
+        """Return the elements that name a file, without those that include one."""
         naming: list[XmlElement] = []
         for element in self.elements:
             names_file = any(name.startswith("file") for name in element.attributes)

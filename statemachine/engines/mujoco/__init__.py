@@ -57,7 +57,9 @@ class MujocoEngine(RawEngine):
     drawing_diagnosis = function_of(".mujoco.rendering:diagnosis")
 
     def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
-        """By MjModel.from_xml_path and mj_step; None: it looks for no ROS packages."""
+        """Return a run by MjModel.from_xml_path and mj_step; None where a ROS package would be
+        looked for.
+        """
         from ...backends.binary import is_binary, read_binary
 
         mujoco = require("mujoco")
@@ -82,14 +84,14 @@ class MujocoEngine(RawEngine):
     def stepper(
         self, model: Model, qpos: Array, qvel: Array, ctrl: Array
     ) -> Iterator[Callable[[int], object]]:
-        """By mj_step."""
+        """Yield a function that advances by mj_step."""
         mujoco = require("mujoco")
         data = mujoco.MjData(model.raw)
         data.qpos[:], data.qvel[:], data.ctrl[:] = qpos, qvel, ctrl
         yield lambda steps: mujoco.mj_step(model.raw, data, steps)
 
     def ignored(self, model: Model) -> list[str]:
-        """Time constants of contacts that it raises (its flag refsafe)."""
+        """Return the time constants of contacts that the engine raises (its flag refsafe)."""
         raw, off = model.compiled, require("mujoco").mjtDisableBit.mjDSBL_REFSAFE
         if raw is None or raw.opt.disableflags & int(off):
             return []
@@ -99,20 +101,22 @@ class MujocoEngine(RawEngine):
         return [what] if raised else []
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
-        """A function of `conventions`."""
+        """Return a function of `conventions`."""
         from . import conventions
 
         return getattr(conventions, question, None)
 
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
-        """That of the state that the derived arrays of `data` belong to."""
+        """Return the mass matrix (nv, nv) of the state that the derived arrays of `data` belong
+        to.
+        """
         mass = np.zeros((model.nv, model.nv))
         if model.nv:
             require("mujoco").mj_fullM(model.raw, data.raw, mass)
         return mass
 
     def prime(self, model: Model, data: Data, before: Mapping[str, Array]) -> None:
-        """The solver of contacts begins with the accelerations "qacc" (nv,)."""
+        """Set the accelerations "qacc" (nv,) with which the solver of contacts begins."""
         if "qacc" in before:
             data.raw.qacc_warmstart[:] = before["qacc"]
 
@@ -123,7 +127,7 @@ class MujocoEngine(RawEngine):
         qvel: Array,
         made: Callable[[Model], AbstractContextManager[Data]],
     ) -> Array:
-        """By mj_energyPos and mj_energyVel."""
+        """Return the energies (n, 2) [J] by mj_energyPos and mj_energyVel."""
         from ...interface import reset
 
         mujoco = require("mujoco")
@@ -140,7 +144,7 @@ class MujocoEngine(RawEngine):
         return energies
 
     def opengl(self) -> str:
-        """The MUJOCO_GL that it draws with here."""
+        """Return the MUJOCO_GL that it draws with here."""
         from .rendering import offscreen_opengl, opengl_remedy
 
         require("mujoco")
@@ -152,27 +156,27 @@ class MujocoEngine(RawEngine):
         return opengl
 
     def drawn_by(self, opengl: str) -> str:
-        """With the OpenGL that it was told."""
+        """Return the engine's name, with the OpenGL that it was told."""
         return f"MuJoCo (MUJOCO_GL={opengl})" if opengl else "MuJoCo"
 
     def watched_data(self) -> type[Data]:
-        """Its verbs are mj_step and mj_forward."""
+        """Return a Data whose verbs are mj_step and mj_forward."""
         from ...backends.mujoco_backend import MujocoData
 
         return MujocoData
 
     def data_in_other_order(self, model: Model, elements: Mapping[str, Any]) -> Any:
-        """One whose derived arrays are looked up in the Data that it shows."""
+        """Return a Data whose derived arrays are looked up in the Data that it shows."""
         from ...backends.mujoco.other_order import DataInOtherOrder
 
         return DataInOtherOrder(model, elements)
 
     def origin(self, raw: Any) -> object:
-        """The names of an MjModel lie in one memory, its copies' too."""
+        """Return the memory of an MjModel's names, which its copies share."""
         return raw.names
 
     def settings(self, raw: Any) -> dict[str, list[float]]:
-        """Options of an MjModel by name, and the checksums of its arrays."""
+        """Return the options of an MjModel by name, and the checksums of its arrays."""
         values = {
             f"opt.{name}": np.atleast_1d(getattr(raw.opt, name)).tolist() for name in _OPTIONS
         }
@@ -183,7 +187,7 @@ class MujocoEngine(RawEngine):
         return values
 
     def backend(self) -> ModuleType:
-        """The backend of MJCF."""
+        """Return the backend of MJCF."""
         from ...backends import mujoco_backend
 
         return mujoco_backend

@@ -59,7 +59,7 @@ _STILL = (
 
 
 def drives(sides: Sides) -> Iterator[ModelDifference]:
-    """Actuators, by their gains, ranges, laws and what they drive."""
+    """Yield the differences of actuators: gains, ranges, dynamics, and what they drive."""
     left, right = sides.raws
     owners = ctrl_owners(left), ctrl_owners(right)
     places = sides.pairs.actuators
@@ -82,7 +82,9 @@ def drives(sides: Sides) -> Iterator[ModelDifference]:
 
 
 def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """Rows of an actuator; together, where its own state moves by another law."""
+    """Yield the differences of an actuator's force and activation; together, where its own state
+    follows another law.
+    """
     rows = list(_rows(sides, a, b))
     ours, theirs = _Law.of(sides.left, a), _Law.of(sides.right, b)
     if ours == theirs:
@@ -121,7 +123,7 @@ def _both(sides: Sides, a: int, b: int) -> tuple[tuple[Any, int], tuple[Any, int
 
 
 def _rows(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """Rows of an actuator, gains and parameters by the names that they have in an MJCF."""
+    """Yield the differences of an actuator's gains and parameters, by their names in an MJCF."""
     left, right = sides.raws
     for row in sides.rows("actuator", [(a, b)]):
         if row.subject == "gains":
@@ -138,7 +140,7 @@ def _rows(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 
 def _outputs(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """Rows of the outputs of an actuator, which are together one difference of it."""
+    """Yield the differences of the outputs of an actuator, together as one."""
     left, right = sides.raws
     count = min(int(left.actuator_outnum[a]), int(right.actuator_outnum[b]))
     here, there = int(left.actuator_outadr[a]), int(right.actuator_outadr[b])
@@ -180,7 +182,7 @@ class _Law:
 
     @property
     def size(self) -> tuple[int, int, int]:
-        """What no edit of a compiled model can change."""
+        """Return the difference that no edit of a compiled model can equalize."""
         return self.length, self.controls, self.meaning
 
 
@@ -226,7 +228,9 @@ def _activations(source: Any, k: int, target: Any) -> tuple[float, ...]:
 
 
 def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """A delay needs a memory of commands: without one it is taken away from the other."""
+    """Yield a difference of delay, which needs a memory of commands: without one it is taken
+    from the other.
+    """
     left, right = sides.raws
     sizes = left.actuator_history[a], right.actuator_history[b]
     back = bool(sizes[0][0] and not sizes[1][0])
@@ -254,7 +258,7 @@ def _given_memory(actuator: int, history: Any) -> tuple[SpecEdit, ...]:
 
 
 def _transmission(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """What an actuator drives, and from which site it measures."""
+    """Yield the differences of what an actuator drives, and from which site it measures."""
     ours, theirs = _targets(sides, 0, a), _targets(sides, 1, b)
     if ours[0] == theirs[0]:
         return
@@ -291,7 +295,9 @@ def _named_targets(sides: Sides, side: int, k: int) -> list[tuple[str, int]]:
 
 
 def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:
-    """What an actuator acts on and from which site it measures: ids of the second model, words."""
+    """Return what an actuator acts on and from which site it measures: ids of the second model,
+    words.
+    """
     raw = sides.raws[side]
     kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
     if kind == _SO3:

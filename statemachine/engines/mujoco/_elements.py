@@ -39,7 +39,7 @@ _NEAR = 1e-9  # [m], and of entries of matrices: as a file with ten digits leave
 
 
 def elements(sides: Sides) -> Iterator[ModelDifference]:
-    """Bodies, joints, geoms and tendons."""
+    """Yield the differences of bodies, joints, geoms and tendons."""
     yield from _bodies(sides)
     for a, b in sides.pairs.joints:
         yield from _joint(sides, a, b)
@@ -57,7 +57,7 @@ def elements(sides: Sides) -> Iterator[ModelDifference]:
 
 
 def _bodies(sides: Sides) -> Iterator[ModelDifference]:
-    """The weight that is taken off bodies; of a model without any, nothing is kept."""
+    """Yield the weight that is taken off bodies; of a model without any, nothing is kept."""
     left, right = sides.raws
     sleep = int(require("mujoco").mjtEnableBit.mjENBL_SLEEP)
     if (left.opt.enableflags | right.opt.enableflags) & sleep:
@@ -88,7 +88,7 @@ def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 
 def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDifference]:
-    """Where the spring of a joint is slack."""
+    """Yield the differences of where the spring of a joint is slack."""
     left, right = sides.raws
     stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
     here, there = int(left.jnt_qposadr[a]), int(right.jnt_qposadr[b])
@@ -104,7 +104,7 @@ def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDiffer
 
 
 def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """What a tendon passes, in which order."""
+    """Yield the differences of what a tendon passes, in which order."""
     ours, theirs = _passes(sides, 0, a), _passes(sides, 1, b)
     differ = [k for k, pair in enumerate(zip(ours, theirs, strict=False)) if pair[0] != pair[1]]
     numbers = [k for k in differ if ours[k][:2] == theirs[k][:2] and ours[k][0] in _NUMBERED]
@@ -132,7 +132,7 @@ def _words_of_path(raw: Any, tendon: int) -> str:
 
 
 def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:
-    """What a tendon passes: its kind, its id in the second model, and a number."""
+    """Return what a tendon passes: its kind, its id in the second model, and a number."""
     raw = sides.raws[side]
     start, passes = int(raw.tendon_adr[tendon]), []
     for k in range(start, start + int(raw.tendon_num[tendon])):
@@ -145,7 +145,9 @@ def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]
 
 
 def equalities(sides: Sides) -> Iterator[ModelDifference]:
-    """Equalities; the two things that one keeps together have no order, where it can be read so."""
+    """Yield the differences of equalities; the two objects that one connects have no order,
+    where possible.
+    """
     pairs = sorted(_match(sides))
     yield from sides.rows("equality", pairs)
     for a, b in pairs:
@@ -210,7 +212,9 @@ def _deactivated(raw: Any, k: int) -> tuple[Edit, ...]:
 
 
 def _match(sides: Sides) -> Iterator[tuple[int, int]]:
-    """What keeps the same two things in the same way; of several the most alike."""
+    """Yield pairs of equalities that connect the same two objects in the same way; of several
+    the most alike.
+    """
     free = list(range(sides.right.neq))
     for a in range(sides.left.neq):
         ours = _keeps(sides, 0, a)
@@ -226,7 +230,7 @@ def _match(sides: Sides) -> Iterator[tuple[int, int]]:
 
 
 def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
-    """How an equality keeps things, and which, as ids of the second model."""
+    """Return the type of an equality, and its objects, as ids of the second model."""
     raw = sides.raws[side]
     kind, of = int(raw.eq_type[k]), int(raw.eq_objtype[k])
     target = _KINDS_OF_COUPLING.get(kind, _KEEPS.get(of))
@@ -252,7 +256,7 @@ def _is_of_bodies(sides: Sides, a: int) -> bool:
 
 
 def _wanted(sides: Sides, a: int, b: int) -> Array:
-    """What the second's equality keeps if it is as the first's, in the second's own terms.
+    """Return the data of the second model's equality that equalizes it with the first's.
 
     Of a connect the first three numbers are the point in body 1, the next three that in
     body 2. Of a weld it is the other way round, and a quaternion follows: the frame of body 2
@@ -282,7 +286,7 @@ def _wanted(sides: Sides, a: int, b: int) -> Array:
 
 
 def _frame(sides: Sides, body: int) -> Placement:
-    """The frame of a body of the first model in that of its counterpart."""
+    """Return the frame of a body of the first model in that of its counterpart."""
     there, pair = sides.ids["body"].get(body), sides.part(body)
     if there is None or pair is None:
         return HERE
@@ -297,10 +301,10 @@ def _unit(quat: Array) -> Array:
 
 
 def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
-    """Which pairs of geoms touch by rules of their own, and which bodies never do."""
+    """Yield the differences of explicit contact pairs, and of bodies that never touch."""
 
     def pairs(kind: str, ends: Callable[[Any], Iterable[tuple[int, int]]]) -> Pairs:
-        """Those of either model that are of the same two elements."""
+        """Return the explicit pairs of either model that are of the same two elements."""
         found: list[list[set[int]]] = []
         for side, raw in enumerate(sides.raws):
             found.append([])
@@ -320,7 +324,7 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
 
 
 def as_geoms(raw: Any, k: Any) -> tuple[Edit, ...]:
-    """What makes a pair of its own touch as its two geoms would without it."""
+    """Return the parameters that let an explicit pair touch as its two geoms would without it."""
     from ...backends.contact_rules import bodies_meet, masks_meet, mixed
 
     g, h = int(raw.pair_geom1[k]), int(raw.pair_geom2[k])

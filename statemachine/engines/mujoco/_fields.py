@@ -338,7 +338,7 @@ def is_beginning(array: str) -> bool:
 
 
 def known(name: str) -> str:
-    """What becomes of an array of a compiled model: a key of `FATES`, or "".
+    """Return what becomes of an array of a compiled model: a key of `FATES`, or "".
 
     Args:
         name: Of the attribute of an mjModel.

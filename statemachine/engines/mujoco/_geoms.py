@@ -50,7 +50,7 @@ class Geoms:
         sides.ids["geom"] = dict(self.pairs)
 
     def _match(self) -> Iterator[tuple[int, int]]:
-        """By name, then by likeness, within each rigid part."""
+        """Yield pairs of geoms, by name, then by likeness, within each rigid part."""
         for pair in self._sides.pairs.solids:
             ours, theirs = self._on(0, pair.left), self._on(1, pair.right)
             for g, shape in ours.items():
@@ -61,19 +61,19 @@ class Geoms:
                 yield [*ours][k], [*theirs][i]
 
     def _on(self, side: int, head: int) -> dict[int, CollisionShape]:
-        """The shapes of a rigid part, in its frame."""
+        """Return the shapes of a rigid part, in its frame."""
         solids = self._sides.solids[side]
         on = [g for g in self._acting[side] if solids.head(solids.raw.geom_bodyid[g]) == head]
         return {g: replace(shapes.of(solids.raw, g), place=solids.on("geom", g)) for g in on}
 
     def differences(self) -> Iterator[ModelDifference]:
-        """What they differ in."""
+        """Yield the differences of two geoms."""
         for a, b in self.pairs:
             yield from self._shape(a, b)
         yield from self._sides.extras("geom", self.pairs, self._without, "shape", shapes.kind)
 
     def _without(self, raw: Any, g: int) -> tuple[Edit, ...]:
-        """What switches a geom off, if it acts."""
+        """Return the edits that switch a geom off, if it acts."""
         if g not in self._acting[raw is self._sides.right]:
             return ()
         pairs = np.flatnonzero((raw.pair_geom1 == g) | (raw.pair_geom2 == g)).tolist()
@@ -122,7 +122,9 @@ class Geoms:
         return self._sides.elsewhere("geom", a, b, *places)
 
     def _mesh(self, a: int, b: int) -> Iterator[ModelDifference]:
-        """A mesh acts by its convex hull, whatever the order of its vertices and faces."""
+        """Yield the difference of a mesh, which acts by its convex hull, whatever the order of
+        its vertices.
+        """
         left, right = self._sides.left, self._sides.right
         ours, theirs = self._shapes[0][a], self._shapes[1][b]
         points = ours.corners, theirs.corners
@@ -160,7 +162,7 @@ class Geoms:
 
     @cached_property
     def _choices(self) -> dict[int, int]:
-        """By geom of the second model the mesh there that its counterpart has."""
+        """Return, by geom of the second model, the mesh there that its counterpart has."""
         kinds = self._sides.left.geom_type, self._sides.right.geom_type
         pairs = [(a, b) for a, b in self.pairs if kinds[0][a] == kinds[1][b] == shapes.MESH]
         return shapes.chosen(self._sides.left, self._sides.right, pairs)
@@ -193,14 +195,16 @@ def _of_fluids(left: Array, right: Array) -> Iterator[DifferingQuantity]:
 
 
 def touches(raw: Any) -> Any:
-    """Which geoms (ngeom,) can touch: by their masks, or in a pair of their own."""
+    """Return (ngeom,) of which geoms can touch: by their masks, or in an explicit pair."""
     touching = (raw.geom_contype != 0) | (raw.geom_conaffinity != 0)
     touching[raw.pair_geom1] = touching[raw.pair_geom2] = True
     return touching
 
 
 def acting_geoms(raw: Any) -> list[int]:
-    """Geoms that can touch, that a tendon wraps, or that a medium flows around by their shape."""
+    """Return the geoms that can touch, that a tendon wraps, or that a medium flows around by
+    their shape.
+    """
     acting = touches(raw) | (raw.geom_fluid[:, 0] > 0)
     acting[raw.wrap_objid[np.isin(raw.wrap_type, _WRAPPED)]] = True
     return np.flatnonzero(acting).tolist()

@@ -38,14 +38,14 @@ class MjcfElements:
 
     @cached_property
     def bodies(self) -> list[XmlElement]:
-        """The world and the bodies, in the order of the compiled model."""
+        """Return the world and the bodies, in the order of the compiled model."""
         worlds = [each for each in self._source.elements if each.tag == "worldbody"]
         bodies = [each for each in self._source.elements if each.tag == "body"]
         return [*worlds[:1], *[body for body in bodies if body.is_in("worldbody")]]
 
     @cached_property
     def is_listed(self) -> bool:
-        """Whether the file has its elements one by one."""
+        """Tell whether the file has its elements one by one."""
         return not any(self._makes(element) for element in self._source.elements)
 
     def _makes(self, element: XmlElement) -> bool:
@@ -121,7 +121,7 @@ class MjcfElements:
 
     @cached_property
     def _in_tree(self) -> dict[str, list[XmlElement]]:
-        """The joints, geoms and sites of each body, body by body."""
+        """Return the joints, geoms and sites of each body, body by body."""
         rows: dict[str, list[XmlElement]] = {kind: [] for kind in _TAGS}
         for number, body in enumerate(self.bodies):
             inner = [*self._source.children(body, THROUGH)]

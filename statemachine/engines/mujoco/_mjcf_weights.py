@@ -47,7 +47,7 @@ class MjcfWeights:
 
     @cached_property
     def _both(self) -> list[dict[int, Any]]:
-        """The geoms of both descriptions, by their ids."""
+        """Return the geoms of both descriptions, by their ids."""
         return [_geoms_of(path) for path in self._paths]
 
     def of_body(self, body: int, geoms: Sequence[int]) -> WeightsOfBody:

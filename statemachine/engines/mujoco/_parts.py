@@ -50,7 +50,7 @@ _TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal 
 
 
 def weights(sides: Sides) -> Iterator[ModelDifference]:
-    """Masses, centres of mass and inertias: body by body where a part is made alike."""
+    """Yield masses, centres of mass and inertias: body by body where a part is made alike."""
     ours, theirs = sides.solids
     for pair in sides.pairs.solids:
         if not (pair.left and pair.right) or sides.left.body_mocapid[pair.left] >= 0:
@@ -96,7 +96,7 @@ def _stored_otherwise(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[
 
 
 def _differing(left: Inertial, right: Inertial) -> dict[str, list[DifferingQuantity]]:
-    """What two bodies weigh otherwise, by subject."""
+    """Return the differences of the masses and inertias of two bodies, by subject."""
     values: dict[str, list[DifferingQuantity]] = {}
     if not same(left.mass, right.mass):
         values["mass"] = [DifferingQuantity("mass", left.mass, right.mass, "kg")]
@@ -111,7 +111,8 @@ def _differing(left: Inertial, right: Inertial) -> dict[str, list[DifferingQuant
 
 
 def _of_tensors(left: Array, right: Array) -> list[DifferingQuantity]:
-    """What two tensors of inertia (3, 3) [kg m²] differ in: their moments, and their axes.
+    """Return the differences of two inertia tensors (3, 3) [kg m²]: of their moments, and their
+    axes.
 
     Moments are in the order of the axes of the body that their own are nearest to, as a file writes
     them, and each beside that of the axis of the other tensor that it is nearest to. An axis has no
@@ -156,7 +157,7 @@ def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:
 def _of_body(
     sides: Sides, pair: BodyPair, target: int, wanted: Inertial, bodies: list[int]
 ) -> Iterator[ModelDifference]:
-    """What the one body is to weigh that has the mass of a part."""
+    """Yield the mass properties of the one body that has the mass of a part."""
     left, right, align = sides.left, sides.right, pair.align
     exact = align is HERE and bodies == [pair.left]
     # The engine stores the mass matrix of a body that turns about its centre of mass as a diagonal:
@@ -180,7 +181,7 @@ def _of_body(
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
-    """Edits that give a body of the second model one figure of what it is to weigh."""
+    """Return the edits that give a body of the second model one figure of its mass properties."""
     inner = sides.solids[1].place(body).inverse
     if subject == "inertia":
         values = principal(inner.mat @ there.tensor @ inner.mat.T)
@@ -192,7 +193,7 @@ def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edi
 
 
 def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) -> ModelDifference:
-    """All of a part's inertia in its first body, none in those fixed to it."""
+    """Return all of a part's inertia in its first body, none in those fixed to it."""
     differing = _differing(there, sides.solids[1].inertial(*bodies))
     subject = next(iter(differing))
     fixed = (body for body in bodies if body != pair.right)
@@ -216,7 +217,7 @@ def _specified(edits: Iterable[Edit]) -> tuple[SpecEdit, ...]:
 
 
 def principal(tensor: Array) -> tuple[Array, Array]:
-    """Moments (3,) of inertia, and the quaternion of their axes."""
+    """Return the moments (3,) of inertia, and the quaternion of their axes."""
     moments, axes = np.linalg.eigh(tensor)
     moments, axes = moments[::-1], axes[:, ::-1]
     if np.linalg.det(axes) < 0:
@@ -225,7 +226,9 @@ def principal(tensor: Array) -> tuple[Array, Array]:
 
 
 def places(sides: Sides) -> Iterator[ModelDifference]:
-    """Rigid parts, joints and sites, in the frames of the second model."""
+    """Yield the differences of the places of rigid parts, joints and sites, in frames of the
+    second model.
+    """
     for pair in sides.pairs.solids:
         if pair.left and pair.right:
             yield from _hangs(sides, pair)
@@ -240,7 +243,9 @@ def places(sides: Sides) -> Iterator[ModelDifference]:
 
 
 def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
-    """Where a part is on the one that carries it, and what it turns about."""
+    """Yield the differences of where a part is on the one that carries it, and of its joint
+    axis.
+    """
     left, right = sides.raws
     joints = [(a, b) for a, b in sides.pairs.joints if left.jnt_bodyid[a] == pair.left]
     if any(left.jnt_type[a] == _FREE for a, _ in joints):
@@ -278,7 +283,8 @@ def _axis(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDiffere
 def _order(
     sides: Sides, pair: BodyPair, joints: list[tuple[int, int]]
 ) -> Iterator[ModelDifference]:
-    """Which joint of a body turns which: of two that do not commute, the later hangs on the other.
+    """Yield the differences of the order of joints of a body: of two that do not commute, one
+    carries the other.
 
     Joints that commute, such as two slides, move a body alike in any order.
     """
@@ -354,12 +360,12 @@ def _place(
 
 
 def _ref(raw: Any, joint: int) -> float:
-    """The position of a joint in which the body lies as its frame says; 0 of a ball."""
+    """Return the position of a joint in which the body lies as its frame says; 0 of a ball."""
     scalar = int(raw.jnt_type[joint]) in (_SLIDE, _HINGE)
     return float(raw.qpos0[raw.jnt_qposadr[joint]]) if scalar else 0.0
 
 
 def _is_kept(raw: Any, joint: int) -> bool:
-    """Whether an equality of joints holds a joint."""
+    """Tell whether an equality of joints holds a joint."""
     of_joints = raw.eq_type == int(require("mujoco").mjtEq.mjEQ_JOINT)
     return bool((of_joints & ((raw.eq_obj1id == joint) | (raw.eq_obj2id == joint))).any())

@@ -18,7 +18,7 @@ _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves 
 
 
 def same(left: Any, right: Any) -> bool:
-    """Whether two values are equal, but for rounding."""
+    """Tell whether two values are equal, but for rounding."""
     a, b = np.asarray(left), np.asarray(right)
     if a.shape != b.shape or "f" not in (a.dtype.kind, b.dtype.kind):
         return bool(np.array_equal(a, b))
@@ -27,19 +27,19 @@ def same(left: Any, right: Any) -> bool:
 
 
 def plain(value: Any) -> Any:
-    """A number or a tuple, for a result."""
+    """Return a value as a number or a tuple, for a result."""
     return tuple(np.asarray(value).tolist()) if np.ndim(value) else np.asarray(value).item()
 
 
 def word_in(enumeration: str, number: int) -> str:
-    """The word by which an MJCF says an entry of one of the engine's enumerations: "affine"."""
+    """Return the word for an entry of one of the engine's enumerations in an MJCF: "affine"."""
     return getattr(require("mujoco"), enumeration)(number).name.partition("_")[2].lower()
 
 
 def quantity_of(
     array: str, left: Any, right: Any, unit: str = "", called: str = ""
 ) -> DifferingQuantity:
-    """What two elements have in one array, as a quantity.
+    """Return what two elements have in one array, as a quantity.
 
     Args:
         array: Its name in an mjModel; of an option as "opt.o_solref".
@@ -65,7 +65,7 @@ def quantity_of(
 def differing(
     row: fields.FieldRow, left: Sequence[Any], right: Sequence[Any]
 ) -> tuple[DifferingQuantity, ...]:
-    """The quantities of a row that differ.
+    """Return the quantities of a row that differ.
 
     Args:
         row: Of `fields.ROWS`.

@@ -204,7 +204,7 @@ def _text(sides: Sides, side: int, k: int, there: int) -> _Entry:
 
 
 def _tuple(sides: Sides, side: int, k: int, there: int) -> _Entry:
-    """What a tuple refers to: objects of the second model, and a number with each."""
+    """Return what a tuple refers to: objects of the second model, and a number with each."""
     raw, mujoco = sides.raws[side], require("mujoco")
     start, size = int(raw.tuple_adr[k]), int(raw.tuple_size[k])
     objects: list[tuple[str, int, float]] = []

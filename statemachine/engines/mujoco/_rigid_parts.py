@@ -18,24 +18,24 @@ from ..description.tree import together
 
 
 def placed(pos: Array, quat: Array) -> Placement:
-    """A pose of the compiled model as a Placement."""
+    """Return a pose of the compiled model as a Placement."""
     return Placement(np.array(pos), matrix_from_quat(np.asarray(quat)))
 
 
 def apart(left: Placement, right: Placement) -> tuple[float, float]:
-    """How far two poses are from each other: [m], and the largest entry of the matrices."""
+    """Return how far two poses are from each other: [m], and the largest entry of the matrices."""
     return left.distance(right), float(np.abs(left.mat - right.mat).max())
 
 
 def quat_of(mat: Array) -> Array:
-    """The quaternion (4,), wxyz, of a rotation matrix."""
+    """Return the quaternion (4,), wxyz, of a rotation matrix."""
     quat = np.empty(4)
     require("mujoco").mju_mat2Quat(quat, np.ascontiguousarray(mat).reshape(9))
     return quat
 
 
 def inertial_of(raw: Any, body: int) -> Inertial:
-    """What a body weighs, in its own frame."""
+    """Return the mass properties of a body, in its own frame."""
     axes = matrix_from_quat(raw.body_iquat[body])
     tensor = axes @ np.diag(raw.body_inertia[body]) @ axes.T
     return Inertial(float(raw.body_mass[body]), np.array(raw.body_ipos[body]), tensor)
@@ -60,7 +60,7 @@ class Solids:
         self._hung = cache(self.hangs)
 
     def _stays(self, body: int) -> bool:
-        """Whether no keyframe has a mocap body elsewhere, and nothing moves on it."""
+        """Tell whether no keyframe has a mocap body elsewhere, and nothing moves on it."""
         raw, number = self.raw, self.raw.body_mocapid[body]
         # Of a file without a keyframe these are empty, and reshape could not tell -1 from them.
         places = raw.key_mpos.reshape(raw.nkey, raw.nmocap, 3)[:, number]
@@ -69,34 +69,34 @@ class Solids:
         return bool(stays and not raw.body_dofnum[raw.body_rootid == body].any())
 
     def head(self, body: int) -> int:
-        """The first body of the rigid part that a body is in."""
+        """Return the first body of the rigid part that a body is in."""
         return int(self._heads[body])
 
     def members(self, head: int) -> list[int]:
-        """All bodies of a rigid part."""
+        """Return all bodies of a rigid part."""
         return np.flatnonzero(self._heads == head).tolist()
 
     def place(self, body: int) -> Placement:
-        """The frame of a body in that of its rigid part."""
+        """Return the frame of a body in that of its rigid part."""
         return HERE if body == self.head(body) else self._hung(body)
 
     def hangs(self, body: int) -> Placement:
-        """The frame of a body in that of the part that carries it, joints at qpos0."""
+        """Return the frame of a body in that of the part that carries it, joints at qpos0."""
         own = placed(self.raw.body_pos[body], self.raw.body_quat[body])
         return self.place(int(self.raw.body_parentid[body])) @ own
 
     def on(self, kind: str, index: int) -> Placement:
-        """The frame of a geom or a site in that of its rigid part."""
+        """Return the frame of a geom or a site in that of its rigid part."""
         body, pos, quat = (
             getattr(self.raw, f"{kind}_{part}")[index] for part in ("bodyid", "pos", "quat")
         )
         return self.place(int(body)) @ placed(pos, quat)
 
     def massive(self, head: int) -> list[int]:
-        """The bodies of a rigid part that have a mass or an inertia."""
+        """Return the bodies of a rigid part that have a mass or an inertia."""
         mass, inertia = self.raw.body_mass, self.raw.body_inertia
         return [body for body in self.members(head) if mass[body] or inertia[body].any()]
 
     def inertial(self, *bodies: int) -> Inertial:
-        """Bodies of a rigid part together, in its frame."""
+        """Return the mass properties of the bodies of a rigid part together, in its frame."""
         return together([inertial_of(self.raw, b).seen_from(self.place(b)) for b in bodies])

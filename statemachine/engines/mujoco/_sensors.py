@@ -18,7 +18,7 @@ ORDER_OF_SENSORS = "order of sensordata"
 
 
 def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
-    """What the sensors of two compiled models differ in, on which nothing but a controller depends.
+    """Return the differences of the sensors of two compiled models, which only a controller reads.
 
     Args:
         left: An mjModel.
@@ -113,7 +113,7 @@ def _reordered_names(raw: Any, order: list[int]) -> Any:
 
 
 def _object(raw: Any, end: str, k: int) -> tuple[str, int, str]:
-    """What a sensor is of: its kind, its id, and both in words."""
+    """Return the object of a sensor: its kind, its id, and both in words."""
     mujoco = require("mujoco")
     kind, number = (int(getattr(raw, f"sensor_{end}{part}")[k]) for part in ("type", "id"))
     word = str(mujoco.mju_type2Str(kind) or "")

@@ -31,12 +31,12 @@ _OF_A_MESH = ("mesh_extrema", "mesh_pos", "mesh_quat", "mesh_scale")
 
 
 def kind(raw: Any, geom: int) -> str:
-    """What a geom is: "box", "mesh"."""
+    """Return the type of a geom in words: "box", "mesh"."""
     return require("mujoco").mjtGeom(int(raw.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
 
 
 def of(raw: Any, geom: int) -> CollisionShape:
-    """A geom, in the frame of its body."""
+    """Return a geom as a shape, in the frame of its body."""
     word = kind(raw, geom)
     points = None
     if word == "mesh":
@@ -49,7 +49,7 @@ def of(raw: Any, geom: int) -> CollisionShape:
 
 
 def hull(raw: Any, geom: int, points: Any) -> Array:
-    """Those of its vertices (n, 3) by which a mesh touches: of its hull, if it has one."""
+    """Return the vertices (n, 3) by which a mesh touches: of its hull, if it has one."""
     start = int(raw.mesh_graphadr[raw.geom_dataid[geom]])
     if start < 0:
         return points
@@ -59,7 +59,7 @@ def hull(raw: Any, geom: int, points: Any) -> Array:
 
 
 def apart(left: Array, right: Array) -> float:
-    """How far a point of either set (n, 3) is from all of the other, at most [m]."""
+    """Return how far a point of either set (n, 3) is from all of the other, at most [m]."""
     return max(_farthest(left, right), _farthest(right, left))
 
 
@@ -74,7 +74,7 @@ def _farthest(points: Array, others: Array) -> float:
 
 
 def copied(left: Any, right: Any, ours: int, theirs: int) -> tuple[tuple[Edit, ...], str]:
-    """Edits that make a mesh of the second model one of the first.
+    """Return the edits that make a mesh of the second model one of the first.
 
     Returns:
         The edits, without those of its geoms; and why there are none.
@@ -92,7 +92,7 @@ def copied(left: Any, right: Any, ours: int, theirs: int) -> tuple[tuple[Edit, .
 
 
 def _parts(raw: Any, mesh: int) -> dict[str, slice]:
-    """Where a mesh is in the arrays of a compiled model; its convex hull last."""
+    """Return where a mesh is in the arrays of a compiled model; its convex hull last."""
 
     def part(start: Any, number: Any) -> slice:
         return slice(int(start), int(start) + int(number))
@@ -113,7 +113,7 @@ def _parts(raw: Any, mesh: int) -> dict[str, slice]:
 
 
 def chosen(left: Any, right: Any, pairs: Iterable[tuple[int, int]]) -> dict[int, int]:
-    """Meshes of the second model that its geoms can take to have those of the first.
+    """Return the meshes of the second model that its geoms can take to have those of the first.
 
     A mesh into which another one has to be copied, since no other has that, is nobody's choice.
 
@@ -145,7 +145,7 @@ def _identical_mesh(left: Any, mesh: int, right: Any, own: int) -> int | None:
 
 
 def identical(left: Any, ours: int, right: Any, theirs: int) -> bool:
-    """Whether two meshes have the same vertices, faces and hull, in the same order."""
+    """Tell whether two meshes have the same vertices, faces and hull, in the same order."""
     if left is right and ours == theirs:
         return True
     edits, why = copied(left, right, ours, theirs)
@@ -153,7 +153,7 @@ def identical(left: Any, ours: int, right: Any, theirs: int) -> bool:
 
 
 def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    """What two height fields differ in."""
+    """Yield the differences of two height fields."""
     left, right = sides.raws
     (ours, grid, here), (theirs, other, there) = _field(left, a), _field(right, b)
     if grid != other:
@@ -181,7 +181,7 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 
 def _field(raw: Any, geom: int) -> tuple[int, tuple[int, int], slice]:
-    """The height field of a geom: its id, its rows and columns, and where its data are."""
+    """Return the height field of a geom: its id, its rows and columns, and where its data are."""
     field = int(raw.geom_dataid[geom])
     rows, columns, start = (
         int(getattr(raw, f"hfield_{name}")[field]) for name in ("nrow", "ncol", "adr")

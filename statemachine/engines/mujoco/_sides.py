@@ -25,12 +25,12 @@ Pairs = Sequence[tuple[int, int]]
 
 
 def copies(names: Iterable[str], raw: Any, a: int, b: int) -> tuple[Edit, ...]:
-    """Edits that give an element of another model what one of this has in some arrays."""
+    """Return the edits that copy some arrays of an element to an element of the other model."""
     return tuple((name, (b,), np.array(getattr(raw, name)[a])) for name in names)
 
 
 def zeros(names: Iterable[str], raw: Any, k: int) -> tuple[Edit, ...]:
-    """Edits that set what an element has in some arrays to zero."""
+    """Return the edits that set some arrays of an element to zero."""
     return tuple((name, (k,), 0 * getattr(raw, name)[k]) for name in names)
 
 
@@ -44,7 +44,7 @@ def _own_name(raw: Any, kind: str, index: int) -> str:
 
 
 def name_of(raw: Any, kind: str, index: int) -> str:
-    """The name of an element; without one, its kind, number and owner."""
+    """Return the name of an element; without one, its kind, number and owner."""
     name = _own_name(raw, kind, index)
     if name:
         return name
@@ -85,17 +85,19 @@ class Sides:
         }
 
     def part(self, body: int) -> BodyPair | None:
-        """The rigid part of a body of the first model, with its counterpart."""
+        """Return the rigid part of a body of the first model, with its counterpart."""
         return self._by_one.get(self.solids[0].head(body))
 
     def there(self, side: int, kind: str | None, index: int) -> int:
-        """What an id of either side is in the second model; -1 of nothing."""
+        """Return the id in the second model of an id of either side; -1 where it has none."""
         if side or kind is None or index < 0:
             return index
         return self.ids[kind].get(index, NOBODY)
 
     def _bodies(self) -> Iterator[tuple[int, int]]:
-        """Rigid parts, and the bodies fixed to them: by name, then in their order."""
+        """Yield pairs of rigid parts, and of the bodies fixed to them: by name, then in their
+        order.
+        """
         for pair in self.pairs.solids:
             yield pair.left, pair.right
             heads = zip(self.solids, (pair.left, pair.right), strict=True)
@@ -106,7 +108,7 @@ class Sides:
             yield from one_to_one((*named, *further)).items()
 
     def by_name(self, kind: str) -> Iterator[tuple[int, int]]:
-        """Elements of one name, and those without in their order."""
+        """Yield pairs of the elements of one name, and of those without in their order."""
         left, right = self._names(kind)
         for k, name in enumerate(left):
             if name and name in right:
@@ -115,7 +117,7 @@ class Sides:
                 yield k, k
 
     def _names(self, kind: str) -> list[list[str]]:
-        """Names of the elements of each model."""
+        """Return the names of the elements of each model."""
         names: list[list[str]] = []
         for raw in self.raws:
             count = getattr(raw, f"n{_COUNTED.get(kind, kind)}")
@@ -132,7 +134,7 @@ class Sides:
         back: Iterable[Edit] = (),
         refused: str = "",
     ) -> ModelDifference:
-        """A difference of an element of the first model; the rest as of ModelDifference."""
+        """Return a difference of an element of the first model; the rest as of ModelDifference."""
         name = name_of(self.left, kind, element)
         return ModelDifference(
             subject, kind, name, tuple(values), tuple(edits), tuple(back), refused
@@ -146,7 +148,7 @@ class Sides:
         name: str = "",
         back: bool = False,
     ) -> Iterator[ModelDifference]:
-        """Rows of elements.
+        """Yield the differences of rows of elements.
 
         Args:
             kind: Of the elements.
@@ -183,7 +185,7 @@ class Sides:
         called: str = "",
         what: Callable[[Any, int], str] = lambda _raw, _k: "there",
     ) -> Iterator[ModelDifference]:
-        """Elements that only one model has; without one, that model is as the other.
+        """Yield the elements that only one model has, each with the edits that equalize.
 
         Args:
             kind: Of the elements.
@@ -209,7 +211,7 @@ class Sides:
     def elsewhere(
         self, kind: str, a: int, b: int, wanted: Placement, theirs: Placement
     ) -> ModelDifference:
-        """A body, a geom or a site that is to be elsewhere on its part.
+        """Return the difference of a body, a geom or a site that is elsewhere on its part.
 
         Args:
             kind: Of the element.

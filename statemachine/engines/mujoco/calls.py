@@ -75,7 +75,7 @@ def _bytes(value: Any) -> bytes:
 
 
 def _fields(data: Any) -> tuple[str, ...]:
-    """Names of the numbers and arrays of an MjData, those of the interface first."""
+    """Return the names of the numbers and arrays of an MjData, those of the interface first."""
     names = [
         name
         for name in dir(type(data))

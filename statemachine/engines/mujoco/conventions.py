@@ -36,13 +36,13 @@ mj: Any = require("mujoco")
 
 
 def _loaded(text: str) -> tuple[Any, Any]:
-    """A Model of an MJCF text and a fresh Data."""
+    """Return a Model of an MJCF text and a fresh Data."""
     model = mj.MjModel.from_xml_string(text)
     return model, mj.MjData(model)
 
 
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
-    """Four numbers into the qpos of a free joint."""
+    """Measure which quaternion order qpos has: four numbers into the qpos of a free joint."""
     model, data = _loaded(samples.MARKED_MJCF)
     turned = []
     for four in fours:
@@ -53,7 +53,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
-    """Six numbers into the qvel of a free joint, and one short step."""
+    """Measure the frames of qvel: six numbers into the qvel of a free joint, and one short step."""
     model, data = _loaded(samples.MARKED_MJCF)
     model.opt.timestep = seconds
     data.qpos[:], data.qvel[:] = (*place, *four), six
@@ -65,7 +65,7 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 
 def gravity(steps: int) -> tuple[Array, Array]:
-    """A body in a model that says nothing of gravity, let go."""
+    """Measure gravity by default: a body in a model that states none, let go."""
     model, data = _loaded(
         '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
     )
@@ -74,7 +74,7 @@ def gravity(steps: int) -> tuple[Array, Array]:
 
 
 def timestep() -> OneStep:
-    """A body at 1 m/s, one step."""
+    """Measure the default timestep: a body at 1 m/s, one step."""
     model, data = _loaded(samples.MARKED_MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data)
@@ -82,7 +82,9 @@ def timestep() -> OneStep:
 
 
 def actuation(seconds: float) -> list[LetGo]:
-    """Without an actuator, and with one that is never written to."""
+    """Measure motors by default: a joint without an actuator, and with one that is never written
+    to.
+    """
     runs = []
     for part, actuator in (
         ("no actuator", ""),
@@ -96,7 +98,7 @@ def actuation(seconds: float) -> list[LetGo]:
 
 
 def command(torque: float) -> dict[str, list[float]]:
-    """A motor, without gravity."""
+    """Measure what a command does: a motor, without gravity."""
     model, data = _loaded(samples.PENDULUM_MJCF % '<actuator><motor joint="j"/></actuator>')
     model.opt.gravity[:] = 0
     data.ctrl[0] = torque
@@ -108,7 +110,7 @@ def command(torque: float) -> dict[str, list[float]]:
 
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
-    """A free body for a while; a joint for a step."""
+    """Measure damping by default: of a free body for a while, of a joint for a step."""
     model, data = _loaded(samples.MARKED_MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data, round(seconds / model.opt.timestep))
@@ -120,7 +122,7 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
 
 
 def _tip_read(act: Callable[[Any, Any], object]) -> ReadTwice:
-    """Where the pendulum's tip is, after something was done to its joint."""
+    """Return where the pendulum's tip is, after something was done to its joint."""
     model, data = _loaded(samples.PENDULUM_MJCF % "")
     mj.mj_forward(model, data)
     act(model, data)
@@ -130,7 +132,7 @@ def _tip_read(act: Callable[[Any, Any], object]) -> ReadTwice:
 
 
 def _contact_read(height: float, act: Callable[[Any, Any], object]) -> ReadTwice:
-    """How deep a ball is in the floor, after something was done to it at a height [m]."""
+    """Return how deep a ball is in the floor, after something was done to it at a height [m]."""
     model, data = _loaded(samples.BALL)
     data.qpos[2] = height
     mj.mj_forward(model, data)
@@ -152,7 +154,9 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
-    """A pendulum on its way, and a ball on its way out of the floor."""
+    """Measure which state derived values belong to: of a moving pendulum, and of a ball that
+    leaves the floor.
+    """
 
     def step_at(model: Any, data: Any, dof: int) -> None:
         data.qvel[dof] = speed
@@ -165,7 +169,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
 
 
 def joints() -> dict[str, list[str]]:
-    """The ids of the joints, from a URDF and from an MJCF."""
+    """Measure the order of joints: their ids, from a URDF and from an MJCF."""
     names = {}
     for form, text in (("URDF", samples.TREE_URDF), ("MJCF", samples.TREE_MJCF)):
         model, _ = _loaded(text)
@@ -175,7 +179,9 @@ def joints() -> dict[str, list[str]]:
 
 
 def friction() -> dict[str, Sliding]:
-    """A block on a floor, with elliptic cones: the same friction in every direction."""
+    """Measure friction: a block on a floor, with elliptic cones, which are the same in every
+    direction.
+    """
 
     def speed(block: float, ground: float, lean: float, priority: int = 0) -> float:
         x, y, z = samples.BLOCK
@@ -209,18 +215,18 @@ PILE_MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 
 
 def _owner(scene: MujocoPile, field: str) -> Any:
-    """The Data or the options of the Model."""
+    """Return the owner of a field: the Data, or the options of the Model."""
     return scene.data if hasattr(scene.data, field) else scene.model.opt
 
 
 def _write(scene: MujocoPile, value: float, field: str) -> None:
-    """Every number of it."""
+    """Write one value into every number of a field."""
     owner = _owner(scene, field)
     setattr(owner, field, 0 * getattr(owner, field) + value)
 
 
 def _read(scene: MujocoPile, field: str) -> float:
-    """The number of which all are; NaN if they differ."""
+    """Return the value of all numbers of a field; NaN if they differ."""
     values = np.ravel(getattr(_owner(scene, field), field))
     return float(values[0]) if (values == values[0]).all() else np.nan
 
@@ -239,7 +245,7 @@ _FIELDS = {
 
 
 def _components(*parts: str) -> Save:
-    """Those of masks of mjtState."""
+    """Return a way to save by components of mjtState."""
     spec = sum(int(getattr(mj.mjtState, f"mjSTATE_{part}")) for part in parts)
 
     @contextmanager
@@ -295,7 +301,7 @@ reset, save, future = MujocoPile.reset, MujocoPile.save, MujocoPile.future
 
 
 def _accelerates(n: Any, torque: float) -> bool:
-    """The engine computes with the state, and with the command."""
+    """Tell whether the engine computes with the state, and with the command."""
     n.mujoco.mj_forward(n.m, n.d)
     return near(n.d.qacc[0], acceleration(ANGLE, torque), 1e-9)
 
@@ -310,7 +316,7 @@ def _was_reset(n: Any) -> bool:
 
 
 def _restored(n: Any) -> bool:
-    """And again, from where a hundred steps lead."""
+    """Tell whether a restored state has the same future, from where a hundred steps lead."""
     back = _was_reset(n)
     n.mujoco.mj_step(n.m, n.d, 100)
     away = abs(n.d.qpos[0])

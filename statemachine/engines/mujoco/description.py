@@ -78,7 +78,7 @@ def _frame(raw: Any, site: int, links: list[str]) -> RobotFrame:
 
 
 def _links(raw: Any, body: int, above: str, actuators: tuple[Actuator, ...]) -> list[Link]:
-    """A body as a link; one with several joints as a chain, of which it is the last."""
+    """Return a body as a link; one with several joints as a chain, of which it is the last."""
     place = placed(raw.body_pos[body], raw.body_quat[body])
     name, links = raw.body(body).name or f"body {body}", list[Link]()
     first, count = int(raw.body_jntadr[body]), int(raw.body_jntnum[body])
@@ -122,7 +122,7 @@ def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
 
 
 def _notes(raw: Any, actuators: tuple[Actuator, ...]) -> list[str]:
-    """What no other format has a word for."""
+    """Return what no other format has a word for."""
     of_joints = (raw.eq_type == _EQUALITY_OF_JOINTS) & (raw.eq_obj2id >= 0)
     linear = of_joints & ~raw.eq_data[:, 2:5].any(axis=1)
     freed = np.count_nonzero(raw.body_gravcomp)
@@ -147,7 +147,7 @@ def _notes(raw: Any, actuators: tuple[Actuator, ...]) -> list[str]:
 
 
 def _beyond(raw: Any, i: int, drive: Actuator) -> str:
-    """A servo that may be commanded to where its joint cannot go."""
+    """Return the servos that may be commanded to where their joints cannot go."""
     ends = drive.ctrlrange
     kp, bias = raw.actuator_gainprm[i, 0], raw.actuator_biasprm[i, 1]
     if not kp or bias != -kp or drive.gear != 1 or ends is None:
@@ -173,7 +173,7 @@ def _limited(values: Any, limited: Any) -> Range | None:
 
 
 def _effort(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> float | None:
-    """The largest force of what drives a joint; None where nothing does."""
+    """Return the largest force of what drives a joint; None where nothing does."""
     drives = [
         _most(raw, i, drive) * abs(drive.gear)
         for i, drive in enumerate(actuators)
@@ -194,7 +194,7 @@ def _drives_a_joint(raw: Any, i: int) -> bool:
 
 
 def _most(raw: Any, i: int, drive: Actuator) -> float:
-    """The largest force of an actuator itself."""
+    """Return the largest force of an actuator itself."""
     if drive.forcerange:
         return max(map(abs, drive.forcerange))
     if drive.ctrlrange and not raw.actuator_biastype[i] and not raw.actuator_gaintype[i]:

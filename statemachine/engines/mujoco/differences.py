@@ -68,7 +68,7 @@ _COMPARED = (weights, places, _geoms, elements, equalities, drives, contact_pair
 
 
 def edited(raw: Any, edits: Iterable[Edit]) -> Any:
-    """A copy of a compiled model with these edits, and all that follows from them.
+    """Return a copy of a compiled model with these edits, and all that follows from them.
 
     What the compiler computes once (inverse weights, masks of bodies) is computed again. The tree
     of boxes that sorts out pairs of geoms is not: it is switched off, which changes no contact.
@@ -100,7 +100,7 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
 
 
 def _read(raw: Any, edit: Edit) -> Any:
-    """What stands where an edit goes."""
+    """Return the value at the place of an edit."""
     from ...backends.edits import held
 
     holder, field = held(raw, edit[0])
@@ -111,7 +111,7 @@ def _read(raw: Any, edit: Edit) -> Any:
 
 
 def _frames(raw: Any, edits: Iterable[Edit]) -> None:
-    """What lay in another frame, and was not computed apart, may lie elsewhere now."""
+    """Compute anew the frames that may have moved with what they were given in."""
     for name, index, _ in edits:
         if name in ("geom_pos", "geom_quat", "site_pos", "site_quat"):
             getattr(raw, f"{name[:4]}_sameframe")[index[0]] = 0
@@ -122,7 +122,7 @@ def _frames(raw: Any, edits: Iterable[Edit]) -> None:
 
 
 def _masks(raw: Any) -> None:
-    """What a body can touch, from its geoms."""
+    """Compute anew which masks a body can touch, from its geoms."""
     for mask in ("contype", "conaffinity"):
         body = np.zeros(raw.nbody, dtype=np.int64)
         np.bitwise_or.at(body, raw.geom_bodyid, getattr(raw, f"geom_{mask}"))
@@ -163,7 +163,7 @@ def _unit_of(option: str) -> str:
 
 
 def settings_of(raw: Any) -> dict[str, Any]:
-    """The options and flags of a compiled model by name; what is chosen from a list in words."""
+    """Return the options and flags of a compiled model by name; enumerations in words."""
     names = [name for group in fields.OPTIONS.values() for name in group]
     settings = {name: plain(getattr(raw.opt, name)) for name in names}
     for name, enumeration in fields.OPTION_CHOICES.items():
@@ -175,12 +175,12 @@ def settings_of(raw: Any) -> dict[str, Any]:
 
 
 def integrator(raw: Any) -> str:
-    """The name of the integrator of a compiled model."""
+    """Return the name of the integrator of a compiled model."""
     return settings_of(raw)["integrator"]
 
 
 def _flag_bits() -> Iterator[tuple[str, str, int]]:
-    """The flags that can change a motion: their field, what they are called, their bit."""
+    """Yield the flags that can change a motion: their field, what they are called, their bit."""
     mujoco = require("mujoco")
     for field, bits in zip(fields.FLAGS, (mujoco.mjtDisableBit, mujoco.mjtEnableBit), strict=True):
         for name, bit in bits.__members__.items():
@@ -189,7 +189,7 @@ def _flag_bits() -> Iterator[tuple[str, str, int]]:
 
 
 def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
-    """What is compared as a whole and brought to nothing: plugins."""
+    """Yield the differences that are compared as a whole, and only removed: plugins."""
     names = [name for name in dir(left) if name.startswith("plugin")]
     names = [name for name in names if fields.known(name) == "whole"]
     if not all(same(getattr(left, name), getattr(right, name)) for name in names):

@@ -28,7 +28,7 @@ _TARGETS = {  # a transmission, and the kind of element that it acts on
 
 
 def counts(raw: Any) -> dict[str, int]:
-    """How many actuators a compiled model has, and how many planes are its floor."""
+    """Return how many actuators a compiled model has, and how many planes are its floor."""
     plane = raw.geom_type == int(require("mujoco").mjtGeom.mjGEOM_PLANE)
     touches = (raw.geom_contype | raw.geom_conaffinity) != 0
     return {
@@ -44,7 +44,7 @@ def with_parts(
     names: Mapping[str, Mapping[str, str]],
     options: ReadOptions,
 ) -> Any:
-    """The compiled model of a file that has some parts of another file instead of its own.
+    """Return the compiled model of a file, with some elements of another file instead of its own.
 
     Args:
         taker: The file.

@@ -76,7 +76,7 @@ class MjcfForm(FileForm):
 
     @property
     def _has_several_outputs(self) -> bool:
-        """Whether an actuator has more than one output."""
+        """Tell whether an actuator has more than one output."""
         return bool(np.any(self._raw.actuator_outnum > 1))
 
     def _number(self, kind: str, number: int) -> int:

@@ -74,7 +74,7 @@ class MujocoDrawer:
                 self._scene.flags[flag] = 0
 
     def shot(self, xpos: Array, xquat: Array) -> Shot:
-        """A picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
+        """Return a picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
         self._context.make_current()  # there may be another side, with one of its own
         mj, raw, data, scene = self._mj, self._raw, self._data, self._scene
         turn = matrix_from_quat(xquat)
@@ -102,7 +102,7 @@ class MujocoDrawer:
 
 
 def offscreen_opengl() -> str | None:
-    """The value of MUJOCO_GL with which MuJoCo draws; "" for none set; None if it cannot.
+    """Return the value of MUJOCO_GL with which MuJoCo draws; "" for none set; None if it cannot.
 
     What is set in the environment is tried first.
     """
@@ -129,20 +129,20 @@ def _opengl(asked: str, known: tuple[tuple[str, str], ...]) -> str | None:
 
 
 def environment(opengl: str, known: dict[str, str]) -> dict[str, str]:
-    """An environment in which MuJoCo takes this OpenGL."""
+    """Return an environment in which MuJoCo takes this OpenGL."""
     others = {name: value for name, value in known.items() if name != "MUJOCO_GL"}
     return {**others, "MUJOCO_GL": opengl} if opengl else others
 
 
 def opengl_remedy() -> str:
-    """What to do where there is no OpenGL."""
+    """Return what to do where there is no OpenGL."""
     if platform.system() == "Linux":
         return "on Debian and Ubuntu: apt-get install libegl1 libopengl0 libgl1-mesa-dri"
     return "needs a graphics driver with OpenGL"
 
 
 def diagnosis() -> tuple[bool, str, str]:
-    """Whether it draws here, what was found, and the next step if there is one."""
+    """Tell whether it draws here, what was found, and the next step if there is one."""
     if importlib.util.find_spec("mujoco") is None:
         return False, "needs mujoco", ""
     works = offscreen_opengl()

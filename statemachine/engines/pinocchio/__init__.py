@@ -15,7 +15,7 @@ class PinocchioEngine(RawEngine):
     phrases = function_of(".pinocchio.conventions:phrases")
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
-        """A function of `conventions`."""
+        """Return a function of `conventions`."""
         from . import conventions
 
         return getattr(conventions, question, None)

@@ -40,14 +40,14 @@ def names_with(pin: Any, *words: str) -> tuple[str, ...]:
 
 
 def _marks(model: Any, data: Any, q: Array) -> Array:
-    """The marks in the world (3, 3) [m]."""
+    """Return the marks in the world (3, 3) [m]."""
     pin.framesForwardKinematics(model, data, q)
     frames = [model.getFrameId(f"mark{k}") for k in range(len(samples.MARKS))]
     return np.array([data.oMf[frame].translation for frame in frames])
 
 
 def _free_body() -> tuple[Any, Any]:
-    """A Model of the marked body on a free-flyer, and a Data."""
+    """Return a Model of the marked body on a free-flyer, and a Data."""
     model = pin.buildModelFromXML(samples.MARKED_URDF, pin.JointModelFreeFlyer())
     return model, model.createData()
 
@@ -57,7 +57,7 @@ def _absent(*words: str, part: str = "", figures: tuple[Measurement, ...] = ()) 
 
 
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
-    """Four numbers into the q of a free-flyer."""
+    """Measure the order of a quaternion: four numbers into the q of a free-flyer."""
     model, data = _free_body()
     return [
         (
@@ -69,7 +69,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
-    """Six numbers, times a short time, into integrate."""
+    """Measure the frames of a velocity: six numbers, times a short time, into integrate."""
     model, data = _free_body()
     q = np.array([*place, *four])
     before = _marks(model, data, q)
@@ -77,7 +77,7 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 
 def gravity(_steps: int) -> tuple[Array, Array]:
-    """The acceleration of a free body on which nothing else acts."""
+    """Measure gravity by default: the acceleration of a free body on which nothing else acts."""
     model, data = _free_body()
     still = np.zeros(model.nv)
     # At a pose without turn the body's axes are the world's.
@@ -86,7 +86,7 @@ def gravity(_steps: int) -> tuple[Array, Array]:
 
 
 def timestep() -> Absent:
-    """Whether there is a step at all; integrate takes the time from its caller."""
+    """Tell whether there is a step at all; integrate takes the time from its caller."""
     model, _ = _free_body()
     q, v = pin.neutral(model), np.zeros(model.nv)
     v[0] = 1
@@ -96,7 +96,7 @@ def timestep() -> Absent:
 
 
 def actuation(_seconds: float) -> list[LetGo]:
-    """The acceleration at zero torque: there is nothing else that could act."""
+    """Measure motors by default: the acceleration at zero torque, as nothing else could act."""
     model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     rest = np.zeros(model.nv)
     started = float(pin.aba(model, model.createData(), pin.neutral(model), rest, rest)[0])
@@ -104,7 +104,7 @@ def actuation(_seconds: float) -> list[LetGo]:
 
 
 def _no_step(*_given: float) -> Absent:
-    """Whether there is a step at all; a torque is an argument of each call."""
+    """Tell whether there is a step at all; a torque is an argument of each call."""
     return _absent("step", "simul")
 
 
@@ -112,7 +112,7 @@ command = damping = step = friction = _no_step
 
 
 def write(angle: float, _deep: float) -> list[ReadTwice]:
-    """Another q, handed to one function after the other."""
+    """Measure what a write changes: another q, handed to one function after the other."""
     model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     data, tip = model.createData(), model.getFrameId("tip")
     pin.framesForwardKinematics(model, data, pin.neutral(model))
@@ -126,7 +126,7 @@ def write(angle: float, _deep: float) -> list[ReadTwice]:
 
 
 def joints() -> dict[str, list[str]]:
-    """The names of the joints after the universe, from a URDF and from an MJCF."""
+    """Measure the order of joints: those after the universe, from a URDF and from an MJCF."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "tree.xml"  # of an MJCF it takes files only
         file.write_text(samples.TREE_MJCF, encoding="utf-8")
@@ -138,12 +138,12 @@ def joints() -> dict[str, list[str]]:
 
 
 def reset() -> Absent:
-    """Whether there is anything of the name; its Data has no state to go back to."""
+    """Tell whether there is anything of the name; its Data has no state to go back to."""
     return _absent("reset")
 
 
 def save(*_given: object) -> float:
-    """Whether its Data holds a state: whether anything of its past shows in what comes out."""
+    """Tell whether its Data holds a state: whether anything of its past shows in what comes out."""
     model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     used, new = model.createData(), model.createData()
     q = pin.neutral(model)

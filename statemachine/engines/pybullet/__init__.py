@@ -39,7 +39,7 @@ class PybulletEngine(RawEngine):
     drawer = function_of(".pybullet.rendering:PybulletDrawer")
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
-        """Of a Model with `defaults="engine"`."""
+        """Return the dials of a Model with `defaults="engine"`."""
         from ...backends import pybullet_backend as backend
         from .dials import PybulletDials
 
@@ -88,13 +88,13 @@ class PybulletEngine(RawEngine):
         return (as_targets if model.defaults == "engine" else ignored)(model.plan)
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
-        """A function of `conventions`."""
+        """Return a function of `conventions`."""
         from . import conventions
 
         return getattr(conventions, question, None)
 
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
-        """With the rotors that the backend adds.
+        """Return the mass matrix (nv, nv), with the rotors that the backend adds.
 
         NaN for free bodies, of which the engine does not tell it, and between trees.
         """
@@ -114,7 +114,7 @@ class PybulletEngine(RawEngine):
         return mass
 
     def prime(self, model: Model, data: Data, before: Mapping[str, Array]) -> None:
-        """The servo law knows the forces (nv,) of the step before."""
+        """Set the forces (nv,) of the step before, which the servo law uses."""
         from ...interface import get_state, set_state
 
         forces = {"contact": "qfrc_contact", "friction": "qfrc_friction"}
@@ -122,16 +122,16 @@ class PybulletEngine(RawEngine):
         set_state(model, data, get_state(model, data).with_parts(**given))
 
     def opengl(self) -> str:
-        """Nothing that it needs beside itself."""
+        """Return nothing: the engine needs no OpenGL."""
         require("pybullet")
         return ""
 
     def drawn_by(self, opengl: str) -> str:
-        """It needs no OpenGL."""
+        """Return the engine's name; it needs no OpenGL."""
         return "PyBullet's software renderer"
 
     def backend(self) -> ModuleType:
-        """The backend, which takes what MuJoCo's compiler makes of a file."""
+        """Return the backend, which takes what MuJoCo's compiler makes of a file."""
         from ...backends import pybullet_backend
 
         return pybullet_backend

@@ -225,7 +225,7 @@ class PybulletWatch(CallWatch):
 
 
 def client_of(function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> int | None:
-    """The number of the world that a call is about; None where that cannot be told."""
+    """Return the number of the world that a call is about; None where that cannot be told."""
     if "physicsClientId" in kwargs:
         return int(kwargs["physicsClientId"])
     place = _BEFORE_CLIENT.get(function)

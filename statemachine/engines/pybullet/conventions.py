@@ -32,7 +32,7 @@ from .world import timestep as step_of
 
 @contextmanager
 def _loaded(text: str, fixed: bool = False) -> Iterator[tuple[int, int]]:
-    """A fresh world with a body in it: their numbers."""
+    """Yield the numbers of a fresh world and of a body in it."""
     with fresh_world() as client:
         yield client, load(client, text, fixed)
 
@@ -43,7 +43,7 @@ def _run(client: int, steps: int) -> None:
 
 
 def _marks(client: int, body: int) -> Array:
-    """The marks in the world (3, 3) [m]."""
+    """Return the marks in the world (3, 3) [m]."""
     return np.array(
         [
             pb.getLinkState(body, k, computeForwardKinematics=1, physicsClientId=client)[0]
@@ -53,7 +53,7 @@ def _marks(client: int, body: int) -> Array:
 
 
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
-    """Four numbers into resetBasePositionAndOrientation."""
+    """Measure the order of a quaternion: four numbers into resetBasePositionAndOrientation."""
     turned = []
     with _loaded(samples.MARKED_URDF) as (client, body):
         for four in fours:
@@ -66,7 +66,9 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
-    """Three and three numbers into resetBaseVelocity, in this order, and one short step."""
+    """Measure the frames of a velocity: three and three numbers into resetBaseVelocity, and one
+    short step.
+    """
     with _loaded(samples.MARKED_URDF) as (client, body):
         pb.setTimeStep(seconds, client)
         pb.resetBasePositionAndOrientation(body, place.tolist(), four.tolist(), client)
@@ -77,7 +79,9 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 
 def gravity(steps: int) -> tuple[tuple[float, ...], Array]:
-    """A body in a world that was told nothing, let go; without the damping that bodies have."""
+    """Measure gravity by default: a body let go in a fresh world, without the damping that
+    bodies have.
+    """
     with _loaded(samples.MARKED_URDF) as (client, body):
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         _run(client, steps)
@@ -86,7 +90,9 @@ def gravity(steps: int) -> tuple[tuple[float, ...], Array]:
 
 
 def timestep() -> OneStep:
-    """A body at 1 m/s, one step; and whatever number of the world's has changed in it."""
+    """Measure the default timestep: a body at 1 m/s, one step; and which parameter of the world
+    changed in it.
+    """
     with _loaded(samples.MARKED_URDF) as (client, body):
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         start = pb.getBasePositionAndOrientation(body, client)[0][0]
@@ -103,7 +109,9 @@ def timestep() -> OneStep:
 
 
 def actuation(seconds: float) -> list[LetGo]:
-    """As loadURDF leaves the joint, with gravity set, and with its motor switched off."""
+    """Measure motors by default: the joint as loadURDF leaves it, with gravity, and with its
+    motor switched off.
+    """
     runs = []
     for part, off in (("as loaded", False), ("motor off", True)):
         with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
@@ -123,7 +131,9 @@ def actuation(seconds: float) -> list[LetGo]:
 
 
 def command(torque: float) -> dict[str, list[float]]:
-    """A torque, and a velocity motor that cannot reach its target so soon; without gravity."""
+    """Measure what a command does: a torque, and a velocity motor that cannot reach its target;
+    no gravity.
+    """
     modes = {"TORQUE_CONTROL": {}, "VELOCITY_CONTROL": {"targetVelocity": 1e3}}
     speeds: dict[str, list[float]] = {}
     for mode, values in modes.items():
@@ -140,7 +150,9 @@ def command(torque: float) -> dict[str, list[float]]:
 
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
-    """As loadURDF leaves them; of the joint, the motor is switched off."""
+    """Measure damping by default: bodies as loadURDF leaves them; of the joint, the motor is
+    switched off.
+    """
     with _loaded(samples.MARKED_URDF) as (client, body):
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
         _run(client, round(seconds / step_of(client)))
@@ -153,7 +165,7 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
 
 
 def _tip_read(act: Callable[[int, int], object]) -> ReadTwice:
-    """Where the pendulum's tip is, after something was done to its joint."""
+    """Return where the pendulum's tip is, after something was done to its joint."""
     with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
         tip = partial(pb.getLinkState, body, 1, physicsClientId=client)
         tip(computeForwardKinematics=1)
@@ -163,7 +175,7 @@ def _tip_read(act: Callable[[int, int], object]) -> ReadTwice:
 
 
 def _contact_read(height: float, act: Callable[[int, int], object]) -> ReadTwice:
-    """How deep a ball is in the floor, after something was done to it at a height [m]."""
+    """Return how deep a ball is in the floor, after something was done to it at a height [m]."""
     with fresh_world() as client:
         put_floor(client)
         ball = put(client, pb.GEOM_SPHERE, (0, 0, height), radius=samples.RADIUS)
@@ -191,7 +203,9 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
-    """A limp pendulum on its way, and a ball on its way out of the floor."""
+    """Measure which state derived values belong to: of a limp pendulum, and of a ball that
+    leaves the floor.
+    """
 
     def swing(client: int, body: int) -> None:
         limp(body, client)
@@ -206,13 +220,13 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
 
 
 def joints() -> dict[str, list[str]]:
-    """The indices of the joints, from a URDF."""
+    """Measure the order of joints: their indices, from a URDF."""
     with _loaded(samples.TREE_URDF, fixed=True) as (client, body):
         return {"URDF": [info[1].decode() for info in joint_infos(client, body)]}
 
 
 def friction() -> dict[str, Sliding]:
-    """A block on a floor."""
+    """Measure friction: a block on a floor."""
 
     def speed(block: float, ground: float, lean: float) -> float:
         with fresh_world() as client:
@@ -240,7 +254,7 @@ _SINGLE = 1e-6
 
 
 def _close(n: Any) -> None:
-    """Every world that a cell has made."""
+    """Close every world that a cell has made."""
     for world in (getattr(n, "w", -1), *getattr(n, "worlds", ())):
         with suppress(Exception):  # not made
             n.pb.disconnect(world)
@@ -251,19 +265,21 @@ def _joint(n: Any) -> tuple[float, float]:
 
 
 def _stepped(n: Any) -> bool:
-    """As far as the damping that it gives its bodies lets it."""
+    """Tell whether a step is right, as far as the damping that the engine gives its bodies lets
+    it.
+    """
     angle, speed = accelerated(n.pb.getPhysicsEngineParameters(n.w)["fixedTimeStep"])
     return near(_joint(n)[0], angle, 1e-3 * speed) and near(_joint(n)[1], speed, 1e-3 * speed)
 
 
 def _commanded(n: Any) -> bool:
-    """It shows in the next step only."""
+    """Tell whether a command acts, which shows in the next step only."""
     n.pb.stepSimulation(n.w)
     return _stepped(n)
 
 
 def _recomputed(n: Any) -> bool:
-    """Of a link that was not asked for, too."""
+    """Tell whether the pose is recomputed of a link that was not asked for, too."""
     read = n.pb.getLinkState(n.arm, 1, physicsClientId=n.w)[4]
     return _stepped(n) and near(read, tip_at(_joint(n)[0]), _SINGLE)
 
@@ -278,7 +294,7 @@ def _was_reset(n: Any) -> bool:
 
 
 def _restored(n: Any) -> bool:
-    """And again, from where it was put then."""
+    """Tell whether a restored state has the same future, from where it was put then."""
     back = _joint(n)
     n.pb.resetJointState(n.arm, 0, 1.0, physicsClientId=n.w)
     away = _joint(n)

@@ -50,7 +50,7 @@ class PybulletDials(Dials):
     }
 
     def __init__(self, model: Model, emulated: Model) -> None:
-        """Of a Model as it comes, and of its file behind the contract."""
+        """Take a Model as it comes, and that of its file behind the contract."""
         super().__init__(model, emulated)
         own = cast("PybulletModel", model)
         # All that is in a URDF is one robot to the engine; of an MJCF each tree is one.
@@ -63,7 +63,7 @@ class PybulletDials(Dials):
             self.words = {**self.words, "inertia": f"of shapes, {which} 1 kg"}
 
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
-        """A Model with some dials at "model" or "off", the others as the engine comes.
+        """Return a Model with some dials at "model" or "off", the others as the engine comes.
 
         Args:
             dials: Of gravity, timestep, inertia, servo, armature, damping, frictionloss,
@@ -139,7 +139,9 @@ class PybulletDials(Dials):
 
     @property
     def shapes(self) -> np.ndarray:
-        """(nbody, 3) inertias that the engine takes from the shapes, in the file's axes."""
+        """Return the inertias (nbody, 3) that the engine takes from the shapes, in the file's
+        axes.
+        """
         raw = self.model.compiled
         inertias = np.array(raw.body_inertia)
         with self.model._make_data() as data:
@@ -159,7 +161,9 @@ class PybulletDials(Dials):
 
 
 def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
-    """A Model whose worlds are given some settings; what `forward` computes knows nothing of it."""
+    """Return a Model whose worlds are given some settings; what `forward` computes knows nothing
+    of it.
+    """
     own = cast("PybulletModel", model)
     every = (*own.acts, *acts)
     return PybulletModel(plan or own.plan, own.path, own.substeps, own.defaults, own._asked, every)
@@ -180,7 +184,7 @@ def _has(model: Model, name: str, value: Any) -> bool:
 
 
 def _ranges(model: Model) -> dict[int, tuple[float, float]]:
-    """Range of each joint that has one, by degree of freedom."""
+    """Return the range of each joint that has one, by degree of freedom."""
     return {
         int(model.jnt_dofadr[j]): (float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1]))
         for j in np.flatnonzero(model.jnt_limited)
@@ -201,7 +205,7 @@ def _set_damping(world: World, body: float, joint: np.ndarray) -> None:
 
 
 def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) -> None:
-    """The engine's own limits, of position and of speed; without ranges, none."""
+    """Set the engine's own limits of position and of speed; without ranges, none."""
     for body, index, dof in world.joints():
         low, high = (ranges or {}).get(dof, (-_WIDE, _WIDE))
         world.change(body, index, jointLowerLimit=low, jointUpperLimit=high)
@@ -218,7 +222,7 @@ def _set_surfaces(world: World, surfaces: Surfaces) -> None:
 
 
 def _harden(world: World) -> None:
-    """Contacts as they are in a fresh world: they do not yield."""
+    """Give contacts the parameters of a fresh world: they do not yield."""
     pb.setPhysicsEngineParameter(
         globalCFM=0.0, contactERP=CONTACT_ERP, physicsClientId=world.client
     )

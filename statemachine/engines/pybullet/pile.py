@@ -59,7 +59,7 @@ def _set_target(scene: BulletPile, value: float) -> None:
 
 
 def _push(scene: BulletPile, value: float) -> None:
-    """A force that makes up this speed in one step of 1/240 s; the box weighs 1 kg."""
+    """Apply the force that gives this speed in one step of 1/240 s; the box weighs 1 kg."""
     at = pb.getBasePositionAndOrientation(scene.box, scene.client)[0]
     pb.applyExternalForce(
         scene.box, -1, (240 * value, 0, 0), at, pb.WORLD_FRAME, physicsClientId=scene.client
@@ -67,7 +67,7 @@ def _push(scene: BulletPile, value: float) -> None:
 
 
 def _moved(scene: BulletPile) -> float:
-    """How far the box comes in a step at 100 m/s: what step the engine takes, not what it tells."""
+    """Return how far the box moves in a step at 100 m/s, which tells the step that is taken [m]."""
     pb.resetBaseVelocity(scene.box, (100, 0, 0), (0, 0, 0), scene.client)
     start = _base_position(scene)
     pb.stepSimulation(scene.client)
@@ -95,7 +95,7 @@ def _set_base_velocity(scene: BulletPile, value: float) -> None:
 
 
 def _set_gravity(scene: BulletPile, value: float) -> None:
-    """As much as makes up this speed in one step of 1/240 s."""
+    """Set the gravity that gives this speed in one step of 1/240 s."""
     pb.setGravity(240 * value, 0, 0, scene.client)
 
 

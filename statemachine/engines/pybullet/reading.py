@@ -52,7 +52,7 @@ def _robot(path: Path) -> Robot:
 
 
 def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
-    """The description of all bodies in a world, joints put to zero.
+    """Return the description of all bodies in a world, joints put to zero.
 
     Friction, effort and speed of a joint are what the engine keeps; it applies none of them
     by itself, so friction counts as not said.
@@ -78,7 +78,7 @@ def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
 
 
 def _pose(pos: Sequence[float], quat: Sequence[float]) -> Placement:
-    """PyBullet's position and quaternion (x, y, z, w)."""
+    """Return PyBullet's position and quaternion (x, y, z, w)."""
     return Placement(np.array(pos, dtype=float), matrix_from_quat(wxyz_from_xyzw(quat)))
 
 
@@ -111,7 +111,7 @@ class _Body:
         self.places = {i: centre @ self._inner[i].inverse for i, centre in centres.items()}
 
     def links(self, taken: set[str]) -> Iterator[Link]:
-        """All but a base that is the world, by names that are not taken."""
+        """Yield all links but a base that is the world, by names that are not taken."""
         base, names = self.base, {-1: self.base}
         if base != "world":
             names[-1] = _unique(base, taken)
@@ -127,7 +127,7 @@ class _Body:
     def link(
         self, index: int, name: str, parent: str, place: Placement, joint: RobotJoint | None
     ) -> Link:
-        """One of its links, by its own frame."""
+        """Return one of its links, by its own frame."""
         dynamics, inner = self._dynamics[index], self._inner[index]
         shapes = []
         friction = dynamics[1], dynamics[7], dynamics[6]
@@ -181,7 +181,7 @@ def _joint(info: Sequence[Any], inner: Placement) -> RobotJoint:
 
 
 def _size(kind: str, dimensions: Sequence[float]) -> tuple[float, ...]:
-    """From what PyBullet tells of a shape: edges; length and radius."""
+    """Return the size of a shape as PyBullet reports it: edges, or length and radius."""
     if kind == "box":
         return tuple(edge / 2 for edge in dimensions)
     if kind == "sphere":
@@ -190,7 +190,7 @@ def _size(kind: str, dimensions: Sequence[float]) -> tuple[float, ...]:
 
 
 def _settings() -> dict[str, Setting]:
-    """Of a world that nobody has set anything in."""
+    """Return the settings of a world in which nothing was set."""
     with fresh_world() as client:
         settings = pb.getPhysicsEngineParameters(client)
     return {

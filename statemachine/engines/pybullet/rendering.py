@@ -44,7 +44,7 @@ class PybulletDrawer:
         )
 
     def shot(self, xpos: Array, xquat: Array) -> Shot:
-        """A picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
+        """Return a picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
         turned = xyzw_from_wxyz(xquat)
         for number, body in self._placed:
             pb.resetBasePositionAndOrientation(
@@ -74,7 +74,7 @@ class PybulletDrawer:
         return Shot(rgb, depth)
 
     def _made(self, shape: tuple[Any, Any], rgba: Sequence[float]) -> int:
-        """A body that is only seen; its number."""
+        """Make a body that is only seen, and return its number."""
         vertices, faces = shape
         look = pb.createVisualShape(
             pb.GEOM_MESH,
@@ -90,7 +90,7 @@ class PybulletDrawer:
 def _shapes(
     part: Part, rgba: Sequence[float]
 ) -> Iterator[tuple[tuple[NDArray[Any], NDArray[Any]], Sequence[float]]]:
-    """A part in pieces that PyBullet takes, each face with its own corners: flat shading."""
+    """Yield a part in pieces that PyBullet takes, each face with its own corners: flat shading."""
     if part.endless:
         yield _tiles(part, 0), (*rgba[:3], 1.0)
         yield _tiles(part, 1), (*(0.93 * c for c in rgba[:3]), 1.0)
@@ -101,7 +101,7 @@ def _shapes(
 
 
 def _tiles(plane: Part, dark: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Every other square of a chessboard about the middle of a plane."""
+    """Return every other square of a chessboard about the middle of a plane."""
     a, b, c = plane.vertices[plane.faces[0]].astype(float)
     x = (b - a) / np.linalg.norm(b - a)
     normal = np.cross(b - a, c - a)

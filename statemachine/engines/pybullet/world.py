@@ -31,7 +31,7 @@ Restore = Callable[[HasClient], None]  # puts what was saved into a world
 
 @contextmanager
 def fresh_world() -> Iterator[int]:
-    """The number of a client of its own, which is gone afterwards."""
+    """Yield the number of a client that is disconnected afterwards."""
     client = connect()
     try:
         # Not the default: or a text under a name that was used before is the old text.
@@ -54,18 +54,18 @@ def limp(body: int, client: int, joint: int = 0) -> None:
 
 
 def timestep(client: int) -> float:
-    """What the engine tells of its step [s]."""
+    """Return the step that the engine reports [s]."""
     return pb.getPhysicsEngineParameters(client)["fixedTimeStep"]
 
 
 def gravity_of(client: int) -> tuple[float, float, float]:
-    """What the engine tells of its gravity [m/s²]."""
+    """Return the gravity that the engine reports [m/s²]."""
     parameters = pb.getPhysicsEngineParameters(client)
     return tuple(parameters[f"gravityAcceleration{axis}"] for axis in "XYZ")
 
 
 def poses_and_rates(machine: HasBodies) -> list[tuple[Any, Any]]:
-    """Of each free body position and quaternion, and velocity and rate of turning."""
+    """Return of each free body its position and quaternion, and its linear and angular velocity."""
     client = machine.client
     return [
         (pb.getBasePositionAndOrientation(b, client), pb.getBaseVelocity(b, client))
@@ -75,7 +75,7 @@ def poses_and_rates(machine: HasBodies) -> list[tuple[Any, Any]]:
 
 @contextmanager
 def written(machine: HasBodies) -> Iterator[Callable[[HasBodies], None]]:
-    """What can be read of positions and velocities is written back."""
+    """Yield a restore that writes back what can be read of positions and velocities."""
     bodies = poses_and_rates(machine)
     states = [pb.getJointState(*joint, machine.client)[:2] for joint in machine.joints]
 
@@ -91,7 +91,7 @@ def written(machine: HasBodies) -> Iterator[Callable[[HasBodies], None]]:
 
 @contextmanager
 def saved_in_memory(machine: HasClient) -> Iterator[Restore]:
-    """The engine's saveState: for the world that it was made in."""
+    """Yield a restore by the engine's saveState: for the world that it was made in."""
     state = pb.saveState(machine.client)
     try:
         yield lambda other: pb.restoreState(state, physicsClientId=other.client)
@@ -101,7 +101,7 @@ def saved_in_memory(machine: HasClient) -> Iterator[Restore]:
 
 @contextmanager
 def saved_in_a_file(machine: HasClient) -> Iterator[Restore]:
-    """The engine's file, which another world of the same bodies takes too."""
+    """Yield a restore by the engine's file, which another world of the same bodies takes too."""
     with tempfile.TemporaryDirectory() as folder:
         file = os.fspath(Path(folder) / "world.bullet")
         with silence():
@@ -115,7 +115,7 @@ def saved_in_a_file(machine: HasClient) -> Iterator[Restore]:
 
 
 def put_floor(client: int) -> int:
-    """A plane that does not move; its number."""
+    """Put a plane that does not move, and return its number."""
     return put(client, pb.GEOM_PLANE, mass=0)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...engines import room
 from ...engines.records import KnownChange, RunArrays
+from ...interface import Model
 from ...release_names import engine_of
 from ..recordings import Trace
 from .agreement import Comparison
@@ -25,11 +26,29 @@ def known_changes(run: SidesRun, comparison: Comparison) -> tuple[KnownChange, .
     left, right = run.reruns
     if comparison.outcome not in ("differs", "ended") or left is None or right is None:
         return ()
-    engines = engine_of(left.model.backend), engine_of(right.model.backend)
+    return changes_between((left.model, right.model), (run.left, run.right))
+
+
+def changes_between(
+    models: tuple[Model, Model], traces: tuple[Trace, Trace]
+) -> tuple[KnownChange, ...]:
+    """Return the known changes that concern the runs of two Models.
+
+    They are of one file on two releases of an engine; otherwise there are none.
+
+    Args:
+        models: Of both sides.
+        traces: The run of each.
+
+    Raises:
+        EngineError: A release does not run.
+    """
+    left, right = models
+    engines = engine_of(left.backend), engine_of(right.backend)
     if engines[0] != engines[1]:
         return ()
-    runs = _arrays(run.left), _arrays(run.right)
-    return tuple(room(engines[0]).known_changes(left.model, right.model, runs))
+    runs = _arrays(traces[0]), _arrays(traces[1])
+    return tuple(room(engines[0]).known_changes(left, right, runs))
 
 
 def _arrays(trace: Trace) -> RunArrays:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from ...engines import room
 from ...installed import DEFAULT, ENGINES, engine_version, wheel_here
+from ...program import install_command, pip
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
 
@@ -67,6 +68,7 @@ class DoctorPage(PageContent):
         diagnosis: Of this machine.
         findings: Table of what was looked at.
         packages: Table of the optional packages.
+        install_plot: The command that installs the extra `plot`.
         python: Version of Python; system, machine: what it runs on.
     """
 
@@ -74,6 +76,7 @@ class DoctorPage(PageContent):
     diagnosis: Diagnosis
     findings: Table
     packages: Table
+    install_plot: str
     python: str = platform.python_version()
     system: str = platform.system()
     machine: str = platform.machine()
@@ -140,7 +143,7 @@ def page(diagnosis: Diagnosis) -> Page:
         "Optional packages",
         words={"found", "for", "extra"},
     )
-    return render(DoctorPage(diagnosis, findings, packages))
+    return render(DoctorPage(diagnosis, findings, packages, install_command("plot")))
 
 
 def _engine(name: str) -> HealthCheck:
@@ -154,7 +157,7 @@ def _engine(name: str) -> HealthCheck:
     wheel = wheel_here(ENGINES[name])
     if says_what_to_do or check.next_step or not wheel:
         return check
-    return replace(check, next_step=f"pip install --force-reinstall {wheel.requirement}")
+    return replace(check, next_step=f"{pip()} install --force-reinstall {wheel.requirement}")
 
 
 def _viewer() -> HealthCheck:
@@ -164,7 +167,7 @@ def _viewer() -> HealthCheck:
 
 
 def _imported(name: str, code: str, optional: bool) -> HealthCheck:
-    """Whether something can be imported, and what is said if not."""
+    """Return whether something can be imported, and what is said if not."""
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
         done = subprocess.run(
@@ -184,7 +187,7 @@ def _imported(name: str, code: str, optional: bool) -> HealthCheck:
 
 
 def _version(name: str) -> str | None:
-    """Version of an installed package, which is not imported."""
+    """Return the version of an installed package, which is not imported."""
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:

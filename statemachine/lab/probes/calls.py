@@ -250,7 +250,7 @@ class CallRecorder:
 
 
 def recorded_engines() -> list[str]:
-    """Engines whose rooms say how their calls are watched; none of them is imported."""
+    """Return the engines whose calls can be recorded; none of them is imported."""
     return rooms_with("call_watch")
 
 

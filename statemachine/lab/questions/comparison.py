@@ -11,13 +11,13 @@ from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits
 from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison
+from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.matched import Matched
 from ..runs.floating import Bases
 from .compare_details import details_of
 from .compare_verdict import headline_of, sentence_labels
 from .compared_names import long_labels, shortened, traces_of
 from .finding import VerdictCounts
-from .known_changes_page import ShownChange, known_changes_blocks
 from .next_command import Purpose, next_command
 from .requests.gap import CompareResult
 from .worst import WORST, worst_of

@@ -12,12 +12,12 @@ from ...show.first_screen import MOST_ROWS, first_that_fits
 from ...show.pictures import Bars
 from ...show.templates import PageContent, render, with_answer
 from ..compare import Agreement
+from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
 from ..compare.typed_command import typed_command
 from .compared_names import name_of
 from .finding import leading
-from .known_changes_page import ShownChange, known_changes_blocks
 from .requests.versions import ReleasePair, VersionsResult
 
 _MOST_CHANGES = 3  # known ones that one screen has

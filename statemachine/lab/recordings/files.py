@@ -87,12 +87,15 @@ def read(path: AnyPath) -> Trace:
 
 
 def shipped_names() -> list[str]:
-    """Names as EXPERIMENT.BACKEND, and EXPERIMENT.BACKEND.engine for the engine's defaults."""
+    """Return the names of the shipped traces.
+
+    They read EXPERIMENT.BACKEND, or EXPERIMENT.BACKEND.engine for the engine's defaults.
+    """
     return sorted(path.stem for path in _FOLDER.glob("*.npz"))
 
 
 def shipped(experiment: str, backend: str, defaults: str = "model") -> Trace:
-    """A trace that was recorded elsewhere; its header says on what.
+    """Load a trace that was recorded elsewhere; its header says on what.
 
     Raises:
         UnknownNameError: None was recorded of this.
@@ -107,7 +110,7 @@ def model_file(
     menagerie: AnyPath | None = None,
     beside: AnyPath | None = None,
 ) -> tuple[Path, bool]:
-    """The file of the model that a trace is of, and whether it has the digest of that one.
+    """Return the model's file of a trace, and whether its digest is the one of the header.
 
     A header says folder and name and no machine's path. So the file is looked for under that
     name from here, among the models of the library and in the menagerie, then by its name
@@ -141,7 +144,7 @@ def _known(path: AnyPath) -> Path:
 
 
 def _missing(path: Path) -> TraceError:
-    """The error for a file that is not there, with the nearest name beside it."""
+    """Return the error for a missing file, with the nearest name beside it."""
     message = f"there is no trace {path}"
     if (kind := what_is_there(path)) != "nothing":
         message = f"{path} is {kind}, not a trace"
@@ -207,7 +210,7 @@ def _write_contacts(file: str, trace: Trace) -> None:
 
 
 def column_labels(header: Header, column: str) -> list[str]:
-    """A name for each number of a row of a column: "qpos.box.qw"."""
+    """Return a name for each number of a row of a column: "qpos.box.qw"."""
     if column == "time":
         return ["time"]
     if column == "energy":
@@ -231,7 +234,7 @@ def column_labels(header: Header, column: str) -> list[str]:
 
 
 def coordinate_labels(header: Header, positions: bool) -> list[str]:
-    """A name for each coordinate: the joint's, with parts where it has several."""
+    """Return a name for each coordinate: the joint's, with the component where it has several."""
     labels = []
     ball = ("qw", "qx", "qy", "qz") if positions else ("wx", "wy", "wz")
     parts = {

@@ -41,7 +41,7 @@ def write_npz(trace: Trace, out: BinaryIO) -> None:
 
 
 def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
-    """Header and columns. What the archive says of itself is checked before it is unfolded."""
+    """Read header and columns; what the archive states is checked before it is unpacked."""
     with zipfile.ZipFile(path) as archive:
         entries = _entries(archive)
         if "header" not in entries:
@@ -60,7 +60,7 @@ def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
 
 
 def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
-    """The arrays by name."""
+    """Return the archive's arrays by name."""
     entries: dict[str, zipfile.ZipInfo] = {}
     for entry in archive.infolist():
         name = entry.filename.removesuffix(".npy")
@@ -77,7 +77,7 @@ def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
 def _describe(
     archive: zipfile.ZipFile, entry: zipfile.ZipInfo
 ) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape and kind of an array, from its first bytes."""
+    """Return shape and dtype of an array, from its first bytes."""
     with archive.open(entry) as file:
         version = npy.read_magic(file)
         if version not in ((1, 0), (2, 0)):
@@ -116,7 +116,7 @@ def write_parquet(trace: Trace, out: BinaryIO) -> None:
 
 
 def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
-    """Header and columns; refused unless their digest is the one that was written.
+    """Read header and columns; they are refused unless their digest is the one that was written.
 
     Raises:
         MissingEngineError: pyarrow is not installed.
@@ -136,7 +136,7 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
 
 
 def _pyarrow() -> tuple[Any, Any]:
-    """The package pyarrow, and its part for parquet.
+    """Import the package pyarrow, and its part for parquet.
 
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
@@ -146,7 +146,7 @@ def _pyarrow() -> tuple[Any, Any]:
 
 
 def _digest(text: str, columns: dict[str, Any]) -> str:
-    """SHA-256 of a header and of the numbers that a file keeps, in hexadecimal digits."""
+    """Return the SHA-256 of a header and of the numbers that a file stores, as hex digits."""
     digest = hashlib.sha256(text.encode())
     for name in sorted(columns):
         array = columns[name]
@@ -160,7 +160,7 @@ def _digest(text: str, columns: dict[str, Any]) -> str:
 
 
 def _unfolded_size(metadata: Any, header: Header) -> int:
-    """Bytes of all numbers of a file, as far as it tells the truth.
+    """Return the size of all numbers of a file [bytes], as its metadata state it.
 
     Contacts, whose number no header says, count as they are packed. What the file says of a
     single column is not asked for: where it is damaged, pyarrow ends the process.
@@ -171,7 +171,7 @@ def _unfolded_size(metadata: Any, header: Header) -> int:
 
 
 def _table(trace: Trace, arrow: Any) -> Any:
-    """Columns of one number, or of a list of as many as a row has; contacts as lists of rows."""
+    """Return columns of numbers, or of lists of as many as a row has; contacts as lists of rows."""
     columns, offsets = {}, None
     if "contact_row" in trace:
         counts = np.bincount(trace["contact_row"], minlength=len(trace))

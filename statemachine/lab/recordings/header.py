@@ -145,19 +145,19 @@ class Header:
         }
 
     def shape(self, column: str) -> tuple[int, ...]:
-        """Shape of one row of a column."""
+        """Return the shape of one row of a column."""
         if column in CONTACTS:
             return CONTACTS[column]
         counts = self.counts
         return tuple(counts[w] if isinstance(w, str) else w for w in COLUMNS[column])
 
     def as_json(self) -> str:
-        """The header as text."""
+        """Return the header as JSON."""
         return json.dumps(dataclasses.asdict(self), ensure_ascii=False, allow_nan=True)
 
     @classmethod
     def from_json(cls, text: str) -> Header:
-        """The header that `as_json` wrote.
+        """Parse the header that `as_json` wrote.
 
         Raises:
             TraceError: It is not a header, or of a schema that this version does not know.
@@ -259,7 +259,7 @@ def labels_of_joints(
 
 
 def _frozen(value: Any) -> Any:
-    """Lists of JSON as tuples."""
+    """Return lists of JSON as tuples."""
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
 
 
@@ -287,7 +287,7 @@ def _tuple_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 
 def _option(name: str, value: Any) -> bool:
-    """Whether `Model.replace` or `load` might take this; they look closer."""
+    """Return whether an option may be one of `Model.replace` or `load`, which check it further."""
     known = isinstance(value, bool) or _text(value) or _finite(value) or _tuple_of(_finite)(value)
     return name in (*OPTIONS, *READ_OPTIONS) and known
 

@@ -263,7 +263,7 @@ def _run(
             if not len(times) & 255:
                 progress(len(times) / total)
     except DivergedError as error:
-        if not data._trouble:  # a controller's own, of another Data
+        if not data._unusable:  # a controller's own, of another Data
             raise
         # Without its advice, which is of no use here.
         ended = str(error).partition(". This Data")[0]

@@ -77,7 +77,7 @@ def check_size(unfolded: int, path: Path) -> None:
 
 
 def as_column(name: str, array: Any) -> Any:
-    """An array of a file as a column: int64, or float64."""
+    """Return an array of a file as a column: int64, or float64."""
     return np.asarray(array, dtype=np.int64 if name in WHOLE else np.float64)
 
 
@@ -164,7 +164,7 @@ class Trace:
         return self.columns["ctrl"]
 
     def site(self, name: str) -> tuple[Array, Array]:
-        """Positions (n, 3) [m] and rotation matrices (n, 3, 3) of a site."""
+        """Return positions (n, 3) [m] and rotation matrices (n, 3, 3) of a site."""
         number = index_of("site", name, self.header.sites)
         return self["site_xpos"][:, number], self["site_xmat"][:, number].reshape(-1, 3, 3)
 
@@ -190,7 +190,7 @@ class Trace:
         return overlaps(self._contact_names, geoms, distances)
 
     def touches(self) -> dict[str, NDArray[np.bool_]]:
-        """When each pair of bodies touches: (n,) bool by "gripper on box"."""
+        """Return when each pair of bodies touches: (n,) bool by "gripper on box"."""
         touching = {}
         for pair, places in self.contact_pairs.items():
             touching[pair] = np.zeros(len(self), dtype=bool)

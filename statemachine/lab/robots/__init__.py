@@ -120,7 +120,7 @@ def _below(folder: Path) -> Iterator[Path]:
 
 
 def _root(file: Path) -> str:
-    """The name of a file's root element; of one that is not XML, what it begins to be; or ""."""
+    """Return the name of a file's root element; of one that is not XML, how it begins; or ""."""
     try:
         with file.open("rb") as content:
             for _, element in ElementTree.iterparse(content, events=("start",)):
@@ -135,7 +135,7 @@ def _root(file: Path) -> str:
 
 
 def _has_bodies(file: Path) -> bool:
-    """Whether a body is in an MJCF, or in what it includes; one that is not XML may have."""
+    """Return whether a body is in an MJCF, or in what it includes; one that is not XML may have."""
     # A file that `iterparse` opens itself is closed by the garbage collector, in which a Ctrl-C is
     # printed and lost.
     try:
@@ -218,7 +218,7 @@ def examine_all(
             )
 
     def kept(examined: Mapping[str, ExaminedModel | None]) -> list[ExaminedModel]:
-        """The rows so far in their order, of which the table is made."""
+        """Return the rows so far in their order, of which the table is made."""
         in_order = [row for model in models if (row := examined.get(model.name))]  # None: stopped
         if table is not None:
             write_table(table, in_order)
@@ -238,7 +238,7 @@ def examine_all(
 
 
 def _made_with(quick: bool, seed: int) -> str:
-    """Versions and settings, in one line."""
+    """Return versions and settings in one line."""
     versions = [f"statemachine {__version__}", f"python {platform.python_version()}"]
     for name in ENGINES:
         with suppress(MissingEngineError):
@@ -258,7 +258,7 @@ def _examined(
     seed: int,
     stop: threading.Event,
 ) -> ExaminedModel | None:
-    """A model's row, from a process of its own; None if stopped."""
+    """Return a model's row, from a process of its own; None if stopped."""
     if stop.is_set():
         return None
     began = time.monotonic()

@@ -120,7 +120,7 @@ class _Examination:
 
     @contextmanager
     def _part(self, name: str) -> Iterator[None]:
-        """A part of the examination: an error in it costs this part alone."""
+        """Run a part of the examination: an error in it costs this part alone."""
         self.tell(self.row, name)
         try:
             yield
@@ -139,7 +139,7 @@ class _Examination:
         self.row = replace(self.row, backends={**self.row.backends, backend: row})
 
     def _any(self) -> dict[str, Model]:
-        """For each backend the Model with contacts, else that without."""
+        """Return for each backend the Model with contacts, else the one without."""
         return {**self.without, **self.models}
 
     def _load(self, backend: str) -> None:
@@ -184,7 +184,7 @@ class _Examination:
     def _of_its_own(
         self, backend: str, caught: Sequence[warnings.WarningMessage]
     ) -> tuple[str, ...]:
-        """Warnings of a backend that the default one did not give, too, each once."""
+        """Return the warnings of a backend that the default one did not give, too, each once."""
         texts = [
             one_line(warning.message)
             for warning in caught
@@ -218,7 +218,7 @@ class _Examination:
         return None if theirs is None else rows.tobytes() == theirs[: len(rows)].tobytes()
 
     def _restores(self, model: Model) -> bool | None:
-        """Whether two futures of a State are one, and that of the run itself if promised."""
+        """Return whether two futures of a State are one, and that of the run itself if promised."""
         with self._started(model) as data:
             step(model, data, _FUTURE)
             state = get_state(model, data)
@@ -233,7 +233,7 @@ class _Examination:
 
     @contextmanager
     def _started(self, model: Model) -> Iterator[Data]:
-        """A Data at the start of a run, under the first command."""
+        """Yield a Data at the start of a run, under the first command."""
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))
             data.ctrl[:] = gaps.commands(model, 1, self.seed)[0]
@@ -298,14 +298,14 @@ def _witness_row(model: Model, seed: int) -> WitnessRow:
 
 
 def _features(error: StateMachineError) -> tuple[str, ...]:
-    """What of a model is refused, in a few words each."""
+    """Return what of a model is refused, in a few words each."""
     if isinstance(error, UnsupportedError):
         return error.features or (error.feature,)
     return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)
 
 
 def main(path: str, quick: str, seed: str, answer: str) -> None:
-    """Examine, and keep what is known in the file `answer`, whole at any moment."""
+    """Examine, and store what is known in the file `answer`, whole at any moment."""
 
     def tell(row: ExaminedModel, part: str) -> None:
         replace_bytes(Path(answer), pickle.dumps((part, row)))

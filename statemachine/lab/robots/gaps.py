@@ -23,7 +23,7 @@ _WIDE = 1e3  # a range beyond this says nothing of where an actuator works
 
 
 def commands(model: Model, steps: int, seed: int) -> Array:
-    """Random commands (steps, nu), a new one for all actuators every 50 steps."""
+    """Draw random commands (steps, nu), a new one for all actuators every 50 steps."""
     low, high = model.actuator_ctrlrange.T.copy()
     joints = model.actuator_jntid
     servo = np.isfinite(model.actuator_kp) & (joints >= 0)
@@ -40,13 +40,13 @@ def commands(model: Model, steps: int, seed: int) -> Array:
 
 
 def in_order(orders: Array) -> Controller:
-    """The controller that gives each row of `orders` (n, nu) in turn."""
+    """Return the controller that gives each row of `orders` (n, nu) in turn."""
     rows = iter(orders)
     return lambda _model, _data: next(rows)
 
 
 def keyframe_of(model: Model) -> int | None:
-    """Where a run of a model starts, as in the experiments; None for the default state."""
+    """Return where a run of a model starts, as in the experiments; None for the default state."""
     name = start_keyframe(model)
     return None if name is None else model.key_id(name)
 
@@ -74,7 +74,7 @@ def run(model: Model, orders: Array, nudge: np.random.Generator | None = None) -
 
 
 def run_gap(left: Model, right: Model, seed: int, halve: bool = False) -> RunGap:
-    """How far two Models of one file are apart, under the same commands.
+    """Return how far two Models of one file are apart, under the same commands.
 
     Args:
         left: On one engine.

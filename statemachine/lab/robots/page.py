@@ -325,7 +325,7 @@ def _refusals(name: str, row: BackendRow) -> _BackendRefusals:
 
 
 def _scenario(name: str, row: BackendRow) -> str:
-    """Whether an experiment runs."""
+    """Return whether an experiment runs."""
     word = row.scenarios.get(name)
     if word is None:
         return NONE

@@ -275,7 +275,7 @@ class ExaminedModel:
         return gap.outcome if self.nv else "still"
 
     def wrong(self, default: str) -> tuple[str, ...]:
-        """What must not be, in short sentences.
+        """Return what must not be, in short sentences.
 
         Args:
             default: The backend that the others are compared with.

@@ -27,7 +27,7 @@ _LONGEST = 200  # characters of an error's own text
 
 
 def load_module(name: str, path: Path) -> Any:
-    """A file as a module of a name.
+    """Import a file as the module `name`.
 
     Raises:
         BaseException: Whatever the file raises.
@@ -40,7 +40,10 @@ def load_module(name: str, path: Path) -> Any:
 
 
 def misfit(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
-    """The signature of a function that cannot be called like this, and why; else twice ""."""
+    """Return the signature of a function and why it cannot be called with these arguments.
+
+    Both are "" where it can.
+    """
     try:
         inspect.signature(function).bind(*arguments, **named)
     except TypeError as error:
@@ -51,7 +54,7 @@ def misfit(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
 
 
 def line_of(error: BaseException, file: Path) -> tuple[Path, int, str]:
-    """The last line of the user's that had a part in an error: file, number and text.
+    """Return the last line of the user's own code in an error's traceback: file, number and text.
 
     Of the file, or of another in its folder or below, but for packages that live there; 0 and ""
     if there is none.
@@ -73,7 +76,7 @@ def _is_users(place: Path, file: Path) -> bool:
 
 
 def said(error: BaseException) -> str:
-    """The kind and the text of an error, in one line."""
+    """Return the kind and the text of an error in one line."""
     # A SyntaxError's text names file and line once more.
     words = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
     if len(words) > _LONGEST:
@@ -166,7 +169,7 @@ def function_scenario(
 
 
 def parameters_of(spec: str) -> tuple[str, ...]:
-    """What the function (model, data, …) that "FILE.py:NAME" says takes by keyword.
+    """Return the keyword parameters of the function (model, data, …) that "FILE.py:NAME" names.
 
     Raises:
         BadInputError: There is no such function, or the file fails.
@@ -206,7 +209,7 @@ def function_place(spec: str | Function) -> tuple[Path, str]:
 
 
 def _place(spec: str) -> tuple[Path, str]:
-    """The file and the name of a function."""
+    """Return the file and the name of the function that "FILE.py:NAME" names."""
     file, colon, name = spec.rpartition(":")
     if not colon or name.endswith(".py") or "/" in name or "\\" in name:
         file, name = spec, "controller"
@@ -214,7 +217,7 @@ def _place(spec: str) -> tuple[Path, str]:
 
 
 def _imported(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
-    """A function of a file, which is run for it, that can be called like this."""
+    """Run a file, and return its function `name`, which takes a Model, a Data and `parameters`."""
     function = _function(path, name)
     _check_takes(function, name, path, parameters)
     return function
@@ -259,7 +262,7 @@ def _def_name(name: str) -> str:
 
 
 def _function(path: Path, name: str) -> Function:
-    """A function of a file, which is run for it."""
+    """Run a file, and return its function `name`."""
     if path.suffix != ".py" or not path.is_file():
         raise _missing(path)
     with _errors_of(path, name):

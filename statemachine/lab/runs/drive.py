@@ -16,11 +16,11 @@ Controller = Callable[[Model, Data], Any]  # (model, data) -> ctrl (nu,), or Non
 
 
 def silent(_fraction: float) -> None:
-    """The Progress that shows nothing."""
+    """Show nothing: a Progress for those who want none."""
 
 
 def part_of(progress: Progress, start: float, share: float) -> Progress:
-    """The Progress of a run that is a share of the whole."""
+    """Return the Progress of a stage that is a share of the whole, from `start` on."""
     return lambda fraction: progress(start + share * fraction)
 
 
@@ -30,7 +30,7 @@ _STEPS_MOST = 10_000_000
 
 
 def cost_of_a_second(model: Model) -> float:
-    """Roughly what a simulated second costs by the clock [s], from its first steps."""
+    """Estimate the wall time of a simulated second [s] from the first steps."""
     with make_data(model) as data:
         began = time.perf_counter()
         try:

@@ -36,13 +36,13 @@ _PLANE, _HFIELD = 0, 1  # mjtGeom
 
 
 def is_the_arm(model: Model) -> bool:
-    """Whether the robot is an SO-101, ours or another's: that what is driven has its names."""
+    """Return whether the robot is an SO-101: its driven joints have those names, in order."""
     driven = model.actuator_jntid.tolist()
     return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == ARM
 
 
 def has_floor(model: Model) -> bool:
-    """Whether a plane or a height field that can be touched stands still in the scene."""
+    """Return whether a plane or a height field that can be touched stands still in the scene."""
     compiled = model.compiled
     if compiled is None:
         return False
@@ -52,7 +52,7 @@ def has_floor(model: Model) -> bool:
 
 
 def scalar_joint(model: Model, name: str) -> tuple[int, int]:
-    """Addresses in qpos and qvel of a joint that must be a hinge or a slide."""
+    """Return the addresses in qpos and qvel of a joint that is a hinge or a slide."""
     joint = model.joint_id(name)
     if model.jnt_type[joint] not in (JointType.HINGE, JointType.SLIDE):
         raise BadInputError(f"joint {name!r} is neither a hinge nor a slide")
@@ -60,7 +60,7 @@ def scalar_joint(model: Model, name: str) -> tuple[int, int]:
 
 
 def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
-    """A full ctrl (nu,) from values; the error says how many are needed, or which is invalid."""
+    """Return a full ctrl (nu,) of finite values."""
     array = np.array(list(values), dtype=np.float64)
     if array.shape != (model.nu,):
         raise BadInputError(
@@ -71,7 +71,7 @@ def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
 
 
 def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
-    """These bodies and all that hang on them."""
+    """Return these bodies and all that hang on them."""
     carried = set(bodies)
     for body in range(1, model.nbody):  # parents come before children
         if int(model.body_parentid[body]) in carried:
@@ -85,13 +85,13 @@ def carried_by_joint(model: Model, joint: str) -> frozenset[int]:
 
 
 def moved_by_actuators(model: Model) -> frozenset[int]:
-    """The robot's moving part: what the actuated joints carry."""
+    """Return the robot's moving bodies: those that actuated joints carry."""
     joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
     return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
 
 
 def trees_of_actuators(model: Model) -> frozenset[int]:
-    """The whole robot: each tree of bodies of which an actuator drives a joint, its base included.
+    """Return the robot's bodies: each kinematic tree with an actuated joint, its base included.
 
     Where actuators drive no joint (but a tendon, a site or a body), all trees that move.
     """
@@ -109,7 +109,7 @@ def touching(
     bodies: frozenset[int] | None = None,
     each_other: bool = False,
 ) -> tuple[str, ...]:
-    """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once.
+    """Return what of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once.
 
     Without `bodies`, whatever touches; with `each_other`, also what of them touches one another.
     """
@@ -122,7 +122,7 @@ def touching(
 
 
 def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
-    """How many contacts each pair of bodies has, as {"gripper on box": 6}."""
+    """Count the contacts of each pair of bodies: {"gripper on box": 6}."""
     names = ContactNames.of(model)
     return Counter(names.pair(*geoms) for geoms in contacts.geom.tolist())
 
@@ -171,17 +171,17 @@ def _warn_of_limits(model: Model, qpos: Array) -> None:
 
 
 def home(model: Model) -> str | None:
-    """The keyframe "home" if there is one, as is the custom; None for the default state."""
+    """Return the keyframe "home" if there is one, as is the custom; None for the default state."""
     return usual_start(model)
 
 
 def start_keyframe(model: Model) -> str | None:
-    """Where a lesson starts: the arm in its default state, another robot at home."""
+    """Return where a lesson starts: the arm in its default state, another robot at home."""
     return None if is_the_arm(model) else home(model)
 
 
 def is_servo(model: Model) -> NDArray[np.bool_]:
-    """(nu,) whether each number of ctrl is the target of a position servo on a hinge or slide."""
+    """Return whether each actuator is a position servo on a hinge or slide: (nu,) bool."""
     return np.isfinite(model.actuator_kp) & on_scalar_joint(model)
 
 
@@ -191,7 +191,10 @@ def on_scalar_joint(model: Model) -> NDArray[np.bool_]:
 
 
 def qpos_and_load_at_start(model: Model) -> tuple[Array, Array | None]:
-    """Qpos (nq,) at the start, and the force (nv,) that keeps it there, if that is told."""
+    """Return qpos (nq,) at the start and the force (nv,) that keeps it there [N·m or N].
+
+    The force is None where the engine cannot compute it.
+    """
     with make_data(model) as data:
         reset(model, data, home(model))
         data.qvel[:] = 0
@@ -204,13 +207,16 @@ def qpos_and_load_at_start(model: Model) -> tuple[Array, Array | None]:
 
 
 def load_at_start(model: Model) -> Array:
-    """The size (nv,) of the force that keeps each joint where it starts; zero if not told."""
+    """Return the size (nv,) of the force that keeps each joint where it starts [N·m or N].
+
+    It is zero where the engine cannot compute it.
+    """
     _, load = qpos_and_load_at_start(model)
     return np.zeros(model.nv) if load is None else np.abs(load)
 
 
 def farther(begin: float, ends: tuple[float, float], most: float = np.inf) -> float:
-    """A step from a beginning towards the farther of two ends."""
+    """Return a target a quarter of the range away, towards the farther of two ends."""
     low, high = ends
     begin = min(max(begin, low), high)
     step = min(_PART * (high - low), most)

@@ -54,7 +54,7 @@ class Scenario:
     own: bool = False
 
     def on(self, model: Model) -> Scenario:
-        """This scenario as it is on a Model: its start, and words that are true of it.
+        """Return this scenario adapted to a Model: its start, and a description that is true of it.
 
         It starts where the scenario says; where it says nothing, a robot that is not the arm
         starts at its keyframe "home" if it has one, else in its default state.
@@ -78,7 +78,7 @@ class Scenario:
 
 
 def fitting(model: Model) -> tuple[str, ...]:
-    """Names of the scenarios that make sense on a Model."""
+    """Return the names of the scenarios that make sense on a Model."""
     names = []
     for known in SCENARIOS.values():
         with suppress(BadInputError):
@@ -88,7 +88,7 @@ def fitting(model: Model) -> tuple[str, ...]:
 
 
 def _constant(ctrl: Array | None) -> Controller:
-    """One command from the beginning on; None where nobody writes ctrl."""
+    """Return a controller with one command from the beginning on; None where nobody writes ctrl."""
     return lambda _model, _data: ctrl
 
 
@@ -111,7 +111,7 @@ def _need_actuators(model: Model) -> None:
 
 
 def _waves(model: Model, seed: int) -> Controller:
-    """Every actuator follows a sum of three sines within the middle of its range."""
+    """Return a controller: each actuator follows three sines within the middle of its range."""
     middle, size, frequency, phase = waves(model, seed)
 
     def controller(_model: Model, data: Data) -> Array:
@@ -124,17 +124,17 @@ def _waves(model: Model, seed: int) -> Controller:
 
 
 def _hold(model: Model, _seed: int) -> Controller:
-    """Each position servo is told a pose; any other actuator exerts what holds its joint."""
+    """Return a controller: servos take a pose as target, other actuators hold their joint."""
     return _constant(hold_ctrl(model))
 
 
 def _nothing(_model: Model, _seed: int) -> Controller:
-    """Nobody writes ctrl."""
+    """Return a controller that never writes ctrl."""
     return _constant(None)
 
 
 def _move_the_box(_model: Model, _seed: int) -> Controller:
-    """The arm is told to swing aside, with the jaws closed."""
+    """Return a controller that swings the arm aside with the jaws closed."""
     return _constant(np.array(MOVING))
 
 

@@ -26,13 +26,13 @@ _DIGITS = 4  # of what is computed, so that it can be typed and is the same on e
 
 
 def start_ctrl(model: Model) -> Array:
-    """Ctrl (nu,) at the start: the keyframe's, else zero."""
+    """Return ctrl (nu,) at the start: the keyframe's, else zero."""
     key = home(model)
     return np.zeros(model.nu) if key is None else model.keyframes[model.key_id(key)].ctrl.copy()
 
 
 def hold_ctrl(model: Model) -> Array:
-    """The command (nu,) of `hold`: a pose for the servos, and what holds the other joints.
+    """Return the command (nu,) of `hold`: a pose for the servos, and what holds the other joints.
 
     The SO-101 gets its own pose. Of another robot each position servo is sent from where it
     starts by a quarter of its range, towards the farther end, and by at most 0.5 rad or 0.1 m. A
@@ -69,7 +69,7 @@ def need_actuators(model: Model) -> None:
 
 
 def _reachable(model: Model, i: int) -> tuple[float, float]:
-    """What a servo may be told: its ctrlrange, within what its joint can reach."""
+    """Return the targets that a servo can reach: its ctrlrange, within the limits of its joint."""
     low, high = (float(end) for end in model.actuator_ctrlrange[i])
     joint = model.actuator_jntid[i]
     if model.jnt_limited[joint]:
@@ -80,7 +80,7 @@ def _reachable(model: Model, i: int) -> tuple[float, float]:
 
 
 def _holds(model: Model, i: int) -> bool:
-    """Whether an actuator is a motor on a joint that hangs on no floating base.
+    """Return whether an actuator is a motor on a joint that hangs on no floating base.
 
     The legs of a robot that floats carry what the floor gives back, which is not known.
     """
@@ -98,10 +98,21 @@ def _holds(model: Model, i: int) -> bool:
 
 
 def waves(model: Model, seed: int) -> tuple[Array, Array, Array, Array]:
-    """Waves for every actuator: middle (nu,); size, frequency [Hz], phase (3, nu) of three sines.
+    """Draw the waves that every actuator follows.
 
     They stay within the middle half of its range; without a range, of one from -1 to 1. A robot
     with a keyframe "home" is moved about that one's ctrl.
+
+    Args:
+        model: The robot.
+        seed: Draws sizes, frequencies and phases.
+
+    Returns:
+        The middle (nu,) [unit of the actuator]; size [the same], frequency [Hz] and phase [rad]
+        (3, nu) of three sines.
+
+    Raises:
+        BadInputError: The seed is negative.
     """
     if seed < 0:
         raise BadInputError(f"seed must not be negative; got {seed}")

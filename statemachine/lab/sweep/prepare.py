@@ -235,7 +235,7 @@ def _overlaps_at_start(scenario: Scenario, models: Sequence[Model]) -> list[str]
 
 
 def _cost(model: Model, seconds: float) -> float:
-    """Roughly what a cell costs by the clock [s]: a Model, a Data, the steps."""
+    """Estimate the wall time of a cell [s]: a Model, a Data, the steps."""
     began = time.perf_counter()
     with make_data(model.replace(timestep=model.timestep)):
         begin = time.perf_counter() - began

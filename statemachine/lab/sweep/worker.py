@@ -69,7 +69,7 @@ def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> li
 
 @functools.cache
 def _settle() -> None:
-    """Once in a process of our own: nothing it prints is shown, and it ends with its driver."""
+    """Prepare this process once: its output is discarded, and it ends when its driver does."""
     settle()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
 
@@ -203,7 +203,7 @@ _LATEST: dict[str, Any] = {}
 
 
 def _cached(key: str, make: Callable[[], T]) -> T:
-    """What was made for a key, or is made now; an error is a result too."""
+    """Return the cached result of `make` for a key; an error is a result too."""
     try:
         result: Any = _LATEST.pop(key) if key in _LATEST else make()
     except Exception as error:
@@ -217,7 +217,7 @@ def _cached(key: str, make: Callable[[], T]) -> T:
 
 
 def _on_default(model: Model) -> Model:
-    """`on_default`, whose file is read for the first cell only."""
+    """Return `on_default` of a Model, whose file is read for the first cell only."""
     here = model.backend == DEFAULT
     return model if here else _cached(f"{model.path} on {DEFAULT}", lambda: on_default(model))
 
@@ -227,7 +227,7 @@ _USED: dict[int, Data] = {}  # by the id of its Model, which it keeps
 
 @contextmanager
 def _used_before(model: Model) -> Iterator[Data]:
-    """A Data that an earlier cell has used, if there is one: to make one costs more than `reset`.
+    """Yield a Data that an earlier cell used, if there is one: making one costs more than `reset`.
 
     Not for a user's function, which may have changed what `reset` does not set back.
     """
@@ -303,7 +303,10 @@ def _run(
 
 
 def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
-    """The usual site (3,) [m] in world axes at some positions; `data` of the ended run serves."""
+    """Return positions of the usual site (3,) [m] in world axes, one for each sample of qpos.
+
+    `data` of the run that ended serves to compute them; None where there is no such site.
+    """
     site = usual_site(model.site_names, model.moving_sites)
     if site is None:
         return None
@@ -317,12 +320,12 @@ def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] |
 
 
 def digest_of(function: str) -> str:
-    """A digest of the user's file."""
+    """Return a digest of the user's file."""
     return digest(function_file(function).read_text(encoding="utf-8", errors="replace"))
 
 
 def _is_same(ready: PreparedSweep, model: str = "") -> bool:
-    """Whether the file of a model, or else the user's if there is one, is that of the sweep."""
+    """Return whether a model's file, or else the user's, is the one of the sweep."""
     try:
         if model:
             file = resolve(ready.places[model], ready.sweep.menagerie)
@@ -333,7 +336,7 @@ def _is_same(ready: PreparedSweep, model: str = "") -> bool:
 
 
 def differing(ready: PreparedSweep, version: str) -> str:
-    """What this machine has otherwise than the driver of a sweep; "" if nothing.
+    """Return how this machine differs from the driver of a sweep; "" if it does not.
 
     Args:
         ready: The sweep.

@@ -94,6 +94,7 @@ def explanation_of(search: Search) -> Explanation:
         provenance=(provenance(left), provenance(right)),
         right_file=right.path.name,
         renamed=matched.renamed,
+        changes=trials.known_changes if gap.size > gap.negligible else (),
     )
 
 

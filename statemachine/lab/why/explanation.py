@@ -8,7 +8,7 @@ from typing import Literal
 
 from ...engines.description.file_changes import AttributeChange
 from ...engines.description.lines import SourceLine
-from ...engines.records import DifferingQuantity
+from ...engines.records import DifferingQuantity, KnownChange
 from ...measures import Deviation
 from ..compare.instead import Instead
 from ..compare.matched import RenamedPair
@@ -181,6 +181,8 @@ class Explanation:
         provenance: What each side was computed with.
         right_file: Name of the right's file, without its folder.
         renamed: What was taken for one although the names differ, and nobody said so.
+        changes: Known changes between two releases that concern the runs as they come; empty where
+            there is no gap.
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
     """
@@ -225,6 +227,7 @@ class Explanation:
     provenance: tuple[Provenance, Provenance]
     right_file: str = ""
     renamed: tuple[RenamedPair, ...] = ()
+    changes: tuple[KnownChange, ...] = ()
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
 

@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import Literal
 
 from ...installed import DEFAULT
-from ...measures import Deviation
-from ...show.blocks import Block, Page, Table, Text
+from ...show.blocks import Block, Headline, Page, Table, Text
 from ...show.first_screen import LINES, MOST_ROWS, first_screen, lines_of
-from ...show.templates import PageContent, render, render_blocks
+from ...show.templates import PageContent, render_blocks
 from ..compare.chaos import CLEAR
+from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.labels import lacking
 from .answer_page import amount, answer, missing, parts, proofs, refused
-from .causes_page import causes, nothing_differs, what_is_apart
+from .apart_page import apart
+from .causes_page import causes
 from .changes_page import engine_as_it_comes, steps
 from .explanation import Explanation
 from .rewritten_page import rewritten_blocks
@@ -49,30 +50,11 @@ class WhyPage(PageContent):
     further: Sequence[Block]
 
     @property
-    def answer(self) -> str:
-        """The sentence of the verdict, without its end."""
-        return answer(self.result)
-
-    @property
-    def what(self) -> str:
-        """What is up to so far apart."""
-        return what_is_apart(self.result)
-
-    @property
-    def gap(self) -> Deviation | None:
-        """The gap of the quantity that is explained; None where it is rounding."""
-        result = self.result
-        return result.first[result.quantity] if result.gap > result.negligible else None
-
-    @property
-    def divides(self) -> bool:
-        """Whether it is known what of the gap stays with all causes equalized."""
-        return self.result.verdict.divides and self.conclusion != "stopped"
-
-    @property
-    def nothing_differs(self) -> bool:
-        """Whether nothing differs that is compared."""
-        return nothing_differs(self.result)
+    def known(self) -> Sequence[Block]:
+        """Known changes between two releases that concern the runs."""
+        versions = [side.versions[side.backend] for side in self.result.provenance]
+        changes = [ShownChange(versions[0], versions[1], change) for change in self.result.changes]
+        return known_changes_blocks(changes)
 
     @property
     def causes(self) -> Table:
@@ -211,13 +193,21 @@ def page(result: Explanation, details: bool = False) -> Page:
         details: Whether everything is shown, and not the first screen alone.
     """
     if details:
-        return render(WhyPage(result, MOST_ROWS, render_blocks(WhyDetails(result))))
+        return _page(WhyPage(result, MOST_ROWS, render_blocks(WhyDetails(result))))
 
     def page_with(rows: int) -> Page:
-        return render(WhyPage(result, rows, ()))
+        return _page(WhyPage(result, rows, ()))
 
     shown = first_screen(page_with)
     return shown if lines_of(shown) <= LINES else page_with(0)
+
+
+def _page(content: WhyPage) -> Page:
+    """Return the page of a content, below its verdict."""
+    result = content.result
+    headline = Headline(answer(result), end=apart(result), holds=result.verdict.holds)
+    title = f"{result.experiment}: why {' and '.join(result.labels)} differ"
+    return Page(title, "", render_blocks(content), headline)
 
 
 def _conclusion(result: Explanation) -> Conclusion:

@@ -9,18 +9,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
 
 from ...backends import on_default
+from ...engines.records import KnownChange
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Model
 from ...measures import Deviation
 from ...processes.parallel import forks_for, in_forks
 from ..compare import perturbed
+from ..compare.known_changes import changes_between
 from ..compare.matching import Matched
 from ..compare.perturbed import Uncertainty, perturbed_run
 from ..recordings import Rerun, Trace
@@ -110,6 +112,11 @@ class Trials:
     def count(self) -> int:
         """How many runs were made, but for those of the floor."""
         return self._repeated + sum(trial.was_begun for trial in self._trials.values())
+
+    @cached_property
+    def known_changes(self) -> tuple[KnownChange, ...]:
+        """The known changes between the releases of both sides that concern them as they come."""
+        return changes_between(self.setup.models, self.traces)
 
     def touch(self, quantity: str) -> FirstTouch | None:
         """Find the first contact of either side as they come.

@@ -22,6 +22,6 @@ class MyEngine(RawEngine):
         return room("mujoco").stepper(model, qpos, qvel, ctrl)
 
     def read(self, path: Path) -> ModelReading:
-        """What it makes of a file, under the engine's own name."""
+        """Return what the engine makes of a file, under its own name."""
         reading = room("mujoco").read(path)
         return replace(reading, reader=reading.reader.replace("mujoco", self.name))

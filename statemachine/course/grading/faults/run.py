@@ -24,6 +24,7 @@ from ....lab.runs.drive import Progress, silent
 from ....models import AnyPath
 from ....processes import checked_jobs, sandbox
 from ....processes.parallel import in_parallel, unwinding
+from ....program import install_command
 from ..links import refusal_of
 from ..recording import copied_to, named_by, start_of
 from . import FAULTS, IMPORT, Fault
@@ -145,7 +146,7 @@ def _ready(backend: str) -> str:
     require(backend)
     if importlib.util.find_spec("pytest") is None:
         raise MissingEngineError(
-            "pytest is not installed here: pip install 'statemachine-sim[faults]'",
+            f"pytest is not installed here: {install_command('faults')}",
             engine="pytest",
         )
     return engine_version(backend)

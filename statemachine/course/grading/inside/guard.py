@@ -30,7 +30,7 @@ PUBLIC = (
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
     *PUBLIC, "_models", "atomic_files", "engines", "freshness", "gym", "installed", "measures",
-    "model_files", "processes", "release_names", "releases", "robot_packages", "show",
+    "model_files", "processes", "program", "release_names", "releases", "robot_packages", "show",
     "typed_numbers", "witness",
 )  # fmt: skip
 

@@ -26,12 +26,12 @@ from statemachine.interface import DERIVED
 
 from .support.backends import registered
 from .support.claims import refused
+from .support.data_uses import meanwhile
 from .support.motions import bits, opened
 from .support.patches import interrupted_at
 from .support.processes import runs_in_silence
 from .support.requirements import ROOT
 from .support.small_models import crowded
-from .support.turns import meanwhile
 
 Use = Callable[[sm.Model, sm.Data], object]
 USES: dict[str, Use] = {
@@ -167,7 +167,7 @@ def test_an_interrupted_verb_completes_or_undoes_or_refuses(
     at, stride = 0, 25 if verb == "read" else 1  # which goes through thousands of lines
     sm.set_state(model, data, start)
     while interrupted_at(at := at + stride, lambda: call(model, data), "statemachine"):
-        if data._trouble:
+        if data._unusable:
             uses = sm.step, sm.forward, sm.get_state, lambda _, data: data.contacts
             refused(*((DivergedError, "interrupted", partial(use, model, data)) for use in uses))
             call(model, data)

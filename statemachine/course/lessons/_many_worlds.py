@@ -1,4 +1,4 @@
-"""Many worlds: what a shared Model saves, in time and memory."""
+"""Many worlds of one Model: what each costs, in time and memory."""
 
 from __future__ import annotations
 
@@ -9,52 +9,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...backends import load as load_model
 from ...interface import Data, Model, make_data
 from ...interface import reset as reset_data
 from ...interface import step as step_data
-from ...interface.checks import as_count
 from ...lab.runs.drive import Progress, part_of
 from ...lab.runs.in_turns import Ratio, in_turns
-from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import count, duration
 from ...processes import free_memory, resident_memory
 from ...show.blocks import Block, Table
-from ...show.lesson_template import by_engine
+from ...show.lesson_template import Words, by_engine
 from ...show.pictures import Traces
 from ...worlds import make_worlds, reset, step
-from .session import CodeRun, Options
 
 _ROUNDS = 5
 _ROUND = 0.04  # s that each way takes in a round, about
 _MOST_APART = 16  # worlds, where each has an engine's world of its own
 _SIZES = 16  # numbers of worlds to try, each four times the one before
-_LOADS, _MANY, _FEW = 3, 200, 2
+_MANY, _FEW = 200, 2  # Data that are made to see what one takes in memory
 _CAUTION = 3  # a world may take that many times the memory that one Data was measured to take
-
-
-def code(model: Model, options: Options, load: str) -> str:
-    """Write code that steps some worlds by the clock, once."""
-    as_count(options["most"], "most")
-    return f"""\
-import time
-import statemachine as sm
-from statemachine.worlds import make_worlds, reset, step
-
-model = {load}
-
-def cost(n, nstep=20):
-    with make_worlds(model, n) as worlds:
-        if model.keyframes:
-            reset(worlds, keyframe=0)
-        step(worlds, nstep)
-        began = time.perf_counter()
-        step(worlds, nstep)
-        return (time.perf_counter() - began) / (n * nstep)
-
-for n in (1, 4):
-    print(f"worlds: {{n}}, {{cost(n) * 1e6:.1f}} µs for a step of one")
-"""
 
 
 @dataclass(frozen=True)
@@ -77,46 +49,39 @@ class WorldsCost:
 
 
 @dataclass(frozen=True)
-class WorldsResult:
-    """What a shared Model saves, in time and memory.
+class ManyWorlds:
+    """What each of many worlds of one Model costs, in time and memory.
 
     Attributes:
-        load: Median wall time of `load` [s].
-        make_data: Median wall time of `make_data` [s].
         data_bytes: Memory of one Data [bytes]; None where it cannot be measured.
         world_bytes: Memory of one of many worlds [bytes]; None where it cannot be measured.
         shared: Whether several Data share one compiled model.
         costs: What some numbers of worlds cost, from the smallest on.
         limit: Why there are no more worlds; "" if nothing limits them here.
-        provenance: What it was computed with.
     """
 
-    load: float
-    make_data: float
     data_bytes: float | None
     world_bytes: float | None
     shared: bool
     costs: tuple[WorldsCost, ...]
     limit: str
-    provenance: Provenance
-
-    @property
-    def ratio(self) -> float:
-        """Return the number of Data that are made in the time of a load."""
-        return self.load / self.make_data
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> WorldsResult:
-    """Measure what is made, then the steps of more and more worlds."""
-    model, most = play.model, options["most"]
+def measured(model: Model, most: int, progress: Progress) -> ManyWorlds:
+    """Measure the memory of a Data, then the steps of more and more worlds.
+
+    Args:
+        model: The Model of all worlds.
+        most: The largest number of worlds.
+        progress: Told the fraction that is done.
+    """
     shared = model.capabilities.shared_model
     world_bytes = None
     if shared:  # first: freed memory is used again
         world_bytes = _world_bytes(model, most)
-    play()
-    loads = _walls(lambda: load_model(model.path, backend=model.backend), _LOADS)
     before, several = resident_memory(), list[Data]()
-    makes = _walls(lambda: several.append(make_data(model)), _MANY if shared else _FEW)
+    for _ in range(_MANY if shared else _FEW):
+        several.append(make_data(model))
     for data in several:
         step_data(model, data)
     data_bytes = _share(before, len(several))
@@ -128,16 +93,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> WorldsResult:
         most, limit = _limit(most, data_bytes)
     with several[0] as data:
         costs = _costs(model, data, most, progress)
-    return WorldsResult(
-        load=statistics.median(loads),
-        make_data=statistics.median(makes),
-        data_bytes=data_bytes,
-        world_bytes=world_bytes,
-        shared=shared,
-        costs=tuple(costs),
-        limit=limit,
-        provenance=provenance(model),
-    )
+    return ManyWorlds(data_bytes, world_bytes, shared, tuple(costs), limit)
 
 
 def _costs(model: Model, data: Data, most: int, progress: Progress) -> list[WorldsCost]:
@@ -230,29 +186,13 @@ def _walls(call: Callable[[], object], times: int) -> list[float]:
     return in_turns({"": call}, times)[""]
 
 
-def slots(result: WorldsResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
+def slots_of_worlds(worlds: ManyWorlds) -> dict[str, Any]:
+    """Return what the page's slots take of many worlds."""
+    gaining = _gaining(worlds.costs)
+    best = max(gaining if gaining else worlds.costs, key=lambda cost: cost.faster.median)
     return {
-        "right": _right(result),
-        "load": duration(result.load),
-        "make": duration(result.make_data),
-        "most_worlds": count(result.costs[-1].n, "world"),
-        **_gain_slots(result),
-    }
-
-
-def _right(result: WorldsResult) -> int:
-    """Return the number of the right choice: how many Data a load is worth."""
-    if result.ratio < 4:
-        return 0
-    return 1 if result.ratio <= 100 else 2
-
-
-def _gain_slots(result: WorldsResult) -> dict[str, Any]:
-    """Return what the page says of how much faster many worlds are than one Data."""
-    gaining = _gaining(result.costs)
-    best = max(gaining if gaining else result.costs, key=lambda cost: cost.faster.median)
-    return {
+        "limit": worlds.limit,
+        "most_worlds": count(worlds.costs[-1].n, "world"),
         "gain": bool(gaining),
         "gain_from": count(gaining[0].n if gaining else 0, "world"),
         "best": count(best.n, "world"),
@@ -269,33 +209,23 @@ def _gaining(costs: Sequence[WorldsCost]) -> Sequence[WorldsCost]:
     return costs[start:]
 
 
-def tables(
-    results: Mapping[str, WorldsResult], _first: WorldsResult
-) -> dict[str, Block | Sequence[Block]]:
-    """Return what is made once, what each world costs, and how that goes with their number."""
-    return {
-        "made": _made(results),
-        "costs": [_cost_table(name, result) for name, result in results.items()],
-        "curves": _curves(results),
+def world_tables(results: Mapping[str, ManyWorlds], say: Words) -> list[Block]:
+    """Show what each world takes in memory, what it costs, and how that goes with their number.
+
+    Args:
+        results: By backend.
+        say: The words of the lesson.
+    """
+    memory: dict[str, Callable[[ManyWorlds], str]] = {
+        say("data_memory"): lambda worlds: _memory(worlds.data_bytes),
+        say("world_memory"): lambda worlds: _memory(worlds.world_bytes),
     }
+    blocks: list[Block] = [by_engine(results, memory, say("memory"))]
+    blocks += [_cost_table(name, worlds, say) for name, worlds in results.items()]
+    return [*blocks, _curves(results, say)]
 
 
-def _made(results: Mapping[str, WorldsResult]) -> Table:
-    """Return what is made once, and what for each world, by engine."""
-    times: dict[str, Callable[[WorldsResult], str]] = {
-        "load a model": lambda r: duration(r.load),
-        "make a Data of it": lambda r: duration(r.make_data),
-        "Data made in the time of a load": lambda r: f"{r.ratio:,.0f}",
-    }
-    memory: dict[str, Callable[[WorldsResult], str]] = {
-        "memory of a Data": lambda r: _memory(r.data_bytes),
-        "memory of a world": lambda r: _memory(r.world_bytes),
-    }
-    title = "What is made once, and what for each world, on this machine, now"
-    return by_engine(results, {**times, **memory}, title)
-
-
-def _cost_table(engine: str, result: WorldsResult) -> Table:
+def _cost_table(engine: str, result: ManyWorlds, say: Words) -> Table:
     """Return the wall time with the number of worlds on an engine."""
     rows = []
     for cost in result.costs:
@@ -309,27 +239,21 @@ def _cost_table(engine: str, result: WorldsResult) -> Table:
             )
         )
     return Table(
-        ("worlds", "workers", "to make them", "a step of one", "speed, one Data = 1"),
+        ("worlds", "workers", "to make them", "a step of one", say("faster")),
         rows,
-        title=f"Wall time with the number of worlds: {engine}",
+        title=say("world_costs", engine=engine),
         words=frozenset(),
     )
 
 
-def _curves(results: Mapping[str, WorldsResult]) -> Traces:
+def _curves(results: Mapping[str, ManyWorlds], say: Words) -> Traces:
     """Return the wall time of a step over the number of worlds, a curve for each engine."""
-    curves = {}
+    curves: dict[str, tuple[list[float], list[float]]] = {}
     for engine, result in results.items():
         powers = [math.log2(cost.n) for cost in result.costs]
         microseconds = [cost.step * 1e6 for cost in result.costs]
-        curves[f"{engine}: a step of one world"] = (powers, microseconds)
-    return Traces(
-        "What a step of one world costs",
-        "number of worlds: 2 to the power of",
-        "wall time of a step of one world [µs]",
-        curves,
-        log=True,
-    )
+        curves[engine] = (powers, microseconds)
+    return Traces(say("step_of_world"), say("powers"), say("microseconds"), curves, log=True)
 
 
 def _memory(size: float | None) -> str:

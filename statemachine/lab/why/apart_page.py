@@ -1,0 +1,53 @@
+"""How far two sides are apart, as the second sentence of an explanation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...measures import Deviation
+from ...show.templates import PageContent
+from .answer_page import sentence_of
+from .causes_page import nothing_differs, what_is_apart
+from .explanation import Explanation
+
+
+@dataclass(frozen=True)
+class ApartSentence(PageContent):
+    """How far the sides are apart, as a sentence.
+
+    Attributes:
+        result: The explanation.
+    """
+
+    template = "why_apart.md.j2"
+    result: Explanation
+
+    @property
+    def what(self) -> str:
+        """What is up to so far apart."""
+        return what_is_apart(self.result)
+
+    @property
+    def gap(self) -> Deviation | None:
+        """The gap of the quantity that is explained; None where it is rounding."""
+        result = self.result
+        return result.first[result.quantity] if result.gap > result.negligible else None
+
+    @property
+    def divides(self) -> bool:
+        """Whether it is known what of the gap stays with all causes equalized."""
+        verdict = self.result.verdict
+        return verdict.divides and verdict.answer != "stopped"
+
+    @property
+    def nothing_differs(self) -> bool:
+        """Whether nothing differs that is compared."""
+        return nothing_differs(self.result)
+
+
+def apart(result: Explanation) -> str:
+    """Say how far the sides are apart, in a sentence; "" where there is nothing to say."""
+    content = ApartSentence(result)
+    if content.gap is None and not content.nothing_differs:
+        return ""
+    return sentence_of(content)

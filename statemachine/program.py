@@ -1,0 +1,111 @@
+"""How the user calls this program, and pip: what is printed runs as printed, where they are."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+NAME = "statemachine"
+_DISTRIBUTION = "statemachine-sim"
+# A command of ours within a text: the name of the program, and a word behind it.
+_COMMAND = re.compile(r"(?<![\w./\\-])statemachine(?= (?:[a-z]|--help))")
+
+
+def program() -> str:
+    """Return the words that call this program again: `statemachine` where a shell finds it.
+
+    Elsewhere it is the file as it was called, such as `.venv/bin/statemachine`, or
+    `.venv/bin/python -m statemachine`. In a program of somebody else's it is `statemachine`.
+    """
+    called = sys.argv[0] if sys.argv else ""
+    file = Path(called)
+    if file.name == "__main__.py" and file.parent.name == NAME:
+        if _is_on_path(Path(sys.executable).with_name(NAME)):
+            return NAME
+        return f"{python()} -m {NAME}"
+    is_ours = file.stem == NAME and file.suffix in ("", ".exe")
+    if not is_ours or called == file.name or _is_on_path(file):  # a bare name: the shell found it
+        return NAME
+    return _typed_path(file)
+
+
+def as_called(text: str) -> str:
+    """Return a text whose commands of ours begin as the user called this program.
+
+    Args:
+        text: In which the program is called `statemachine`.
+    """
+    if NAME not in text:
+        return text
+    words = program()
+    return _COMMAND.sub(lambda _: words, text)
+
+
+def command_as_called(command: str) -> str:
+    """Return a command, ours or one of Python, as the user types it.
+
+    Args:
+        command: In which the program is called `statemachine`, and Python `python`.
+    """
+    if command.startswith("python "):
+        command = python() + command.removeprefix("python")
+    return as_called(command)
+
+
+def python() -> str:
+    """Return what starts the Python that runs this: `python` where a shell finds it."""
+    file = Path(sys.executable)
+    for name in ("python", "python3"):
+        if _is_on_path(file.with_name(name)):
+            return name
+    return _typed_path(file)
+
+
+def pip() -> str:
+    """Return what starts the pip that installs into the Python that runs this."""
+    return f"{python()} -m pip"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra of this library, into the Python that runs it.
+
+    Args:
+        extra: Its name.
+    """
+    folder = _clone()
+    if folder is None:
+        what = [f"{_DISTRIBUTION}[{extra}]"]
+    elif folder == Path.cwd():
+        what = ["-e", f".[{extra}]"]
+    else:
+        what = ["-e", f"{folder}[{extra}]"]
+    return f"{pip()} install {shlex.join(what)}"
+
+
+def _clone() -> Path | None:
+    """Return the folder of the sources that this runs from; None where it is installed."""
+    folder = Path(__file__).absolute().parent.parent
+    return folder if (folder / "pyproject.toml").is_file() else None
+
+
+def _is_on_path(file: Path) -> bool:
+    """Tell whether a shell that is given the name of a file starts that file."""
+    there = shutil.which(file.stem)
+    return there is not None and Path(there).absolute() == file.absolute()
+
+
+def _typed_path(file: Path) -> str:
+    """Return a path as one types it from the current folder."""
+    typed = file.absolute()
+    folder = Path.cwd()
+    if folder in typed.parents:
+        typed = typed.relative_to(folder)
+        if len(typed.parts) == 1:  # a shell looks for a bare name elsewhere
+            return f".{os.sep}{typed}"
+    if os.name == "nt":
+        return f'"{typed}"' if " " in str(typed) else str(typed)
+    return shlex.quote(str(typed))
