@@ -35,7 +35,7 @@ from ..show.blocks import (
     Verdict,
 )
 from ..show.html.diagram import figure
-from ..show.pictures import Bars, Diagram, Picture, Pipeline, RobotPicture, Slots, Traces
+from ..show.pictures import Bars, Diagram, Picture, RobotPicture, Traces
 from ..show.terminal import judged
 from ..show.text_blocks import together
 from .lessons import LESSONS, Lesson, check_lesson, module
@@ -83,7 +83,10 @@ class Shown:
     def _repr_markdown_(self) -> str:
         parts = [f"*{self.page.origin}*"]
         letters = iter(self.prediction)
-        for block in self.page.blocks[len(_leading(self.page)) :]:  # they stand there already
+        leading = _leading(self.page)
+        for block in self.page.blocks:
+            if block in leading:
+                continue  # it stands in a cell above
             if isinstance(block, Question):
                 if block.always:
                     parts.append(block.text)
@@ -200,12 +203,13 @@ def _page(entry: Lesson, backend: str, options: dict[str, Any]) -> Page:
 
 
 def _leading(page: Page) -> list[Text]:
-    """Return the paragraphs with which a page begins."""
-    paragraphs = []
+    """Return the paragraphs with which a page begins, below a picture if it opens the page."""
+    paragraphs: list[Text] = []
     for block in page.blocks:
-        if not isinstance(block, Text):
+        if isinstance(block, Text):
+            paragraphs.append(block)
+        elif paragraphs or not isinstance(block, RobotPicture):
             break
-        paragraphs.append(block)
     return paragraphs
 
 
@@ -244,7 +248,7 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
     """Yield the page under its heading, block by block.
 
     What follows a question is folded away, up to the next one: it would give the answer away.
-    So is what follows a heading, under the heading's own words.
+    So is what follows a heading, under the heading's own words. A diagram stands below such a fold.
     """
     yield f"*{_escaped(page.origin)}*"
     if page.headline:
@@ -256,12 +260,15 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
         groups[-1].append(block)
     yield from (block_as_markdown(block, picture) for block in groups[0])
     for opening, *rest in groups[1:]:
+        diagrams = [block for block in rest if isinstance(block, Diagram)]
+        rest = [block for block in rest if not isinstance(block, Diagram)]  # noqa: PLW2901
         inside = [block_as_markdown(block, picture) for block in rest]
         if isinstance(opening, Question):
             inside.insert(_place_of_answer(opening, rest), answer(opening))
             yield f"{asked(opening)}\n\n{_folded(inside)}"
         elif isinstance(opening, Heading):
             yield _folded(inside, _escaped(opening.text))
+        yield from (block_as_markdown(diagram, picture) for diagram in diagrams)
 
 
 def _place_of_answer(question: Question, blocks: Sequence[Block]) -> int:
@@ -282,7 +289,7 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return ""
         case RobotPicture():
             return _robot_picture(block, picture)
-        case Traces() | Slots() | Pipeline() | Bars():
+        case Traces() | Bars():
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
         case Diagram():

@@ -19,7 +19,7 @@ from ..installed import require_extra
 from ..interface import Array
 from .blocks import Block
 from .diagrams import figure as diagram_figure
-from .pictures import Bars, Diagram, Pipeline, Slots, Traces
+from .pictures import Bars, Diagram, Traces
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
@@ -27,7 +27,6 @@ _WRITTEN_OUT = range(-3, 4)  # powers of ten; others as 1e6
 _TITLE = 80  # letters of a line of it
 _LINES = ("-", "--", ":", "-.")
 _FLOOR = "#bdbdbd"
-_CENTRE: dict[str, Any] = {"ha": "center", "va": "center"}
 # A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
 SIDES: tuple[dict[str, Any], ...] = (
     {"color": "#f0a830", "linewidth": 2.0, "linestyle": "-", "solid_capstyle": "butt"},
@@ -36,7 +35,7 @@ SIDES: tuple[dict[str, Any], ...] = (
 GAP: dict[str, Any] = {"color": INK, "linewidth": 1.0}  # of the sides
 Box = tuple[float, float, float, float]
 
-Drawn = Traces | Slots | Pipeline | Bars | Diagram
+Drawn = Traces | Bars | Diagram
 _DOTS = 150  # a PNG has to an inch
 SUFFIXES = (".svg", ".png", ".pdf")
 # The same figures give the same bytes: no settings of the user's, no random names, no date, no
@@ -153,10 +152,6 @@ def draw_picture(axes: Any, picture: Drawn) -> None:
     match picture:
         case Traces():
             _traces(axes, picture)
-        case Slots():
-            _slots(axes, picture)
-        case Pipeline():
-            _pipeline(axes, picture)
         case Bars():
             _bars(axes, picture)
         case Diagram():
@@ -280,62 +275,6 @@ def _parted(x: Array, y: Array) -> tuple[Array, Array]:
     return np.insert(x, breaks, np.nan), np.insert(y, breaks, np.nan)
 
 
-def _slots(axes: Any, picture: Slots) -> None:
-    """Rows of numbered boxes, one above the other, coloured by owner."""
-    owners = list(dict.fromkeys(owner for row in picture.rows.values() for owner, _, _ in row))
-    for level, (name, row) in enumerate(picture.rows.items()):
-        y = -2.0 * level
-        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace")
-        for owner, start, stop in row:
-            slots = range(start, stop)
-            colour = _COLOURS[owners.index(owner) % len(_COLOURS)]
-            boxes = axes.bar(slots, 1, 1, y, align="edge", **_pale(colour))
-            axes.bar_label(boxes, slots, label_type="center")
-            if level == 0:
-                # A name does not fit over one slot.
-                slope = {"ha": "left", "rotation": 35} if len(slots) == 1 else {"ha": "center"}
-                axes.text((start + stop) / 2, y + 1.15, owner, fontsize="small", **slope)
-    widest = max(stop for row in picture.rows.values() for _, _, stop in row)
-    axes.set_xlim(-1.5, widest + 0.5)
-    axes.set_ylim(-2.0 * len(picture.rows) + 1.7, 3.2)
-    axes.set_aspect("equal")
-    axes.axis("off")
-
-
-def _pale(colour: str) -> dict[str, str]:
-    return {"facecolor": colour + "30", "edgecolor": colour}
-
-
-def _pipeline(axes: Any, picture: Pipeline) -> None:
-    """Boxes from left to right; under them, what each call covers."""
-    deepest = max(len(content) for _, content in picture.stages)
-    top = deepest * 0.32 + 0.9
-    for k, (heading, content) in enumerate(picture.stages):
-        x, colour = 3.2 * k, _COLOURS[k % len(_COLOURS)]
-        axes.bar(x, top, 2.6, align="edge", **_pale(colour))
-        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold")
-        for line, text in enumerate(content):
-            y = top - 0.85 - 0.32 * line
-            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8)
-        if k:
-            axes.annotate(
-                "",
-                (x - 0.05, top / 2),
-                (x - 0.55, top / 2),
-                arrowprops={"arrowstyle": "->", "color": INK},
-            )
-    for k, (name, first, last) in enumerate(picture.spans):
-        y, left, right = -0.5 - 0.6 * k, 3.2 * first, 3.2 * last + 2.6
-        axes.annotate(
-            "", (right, y), (left, y), arrowprops={"arrowstyle": "|-|, widthA=.3, widthB=.3"}
-        )
-        paper = {"facecolor": _PAPER, "edgecolor": "none", "pad": 2}
-        axes.text((left + right) / 2, y, name, family="monospace", bbox=paper, **_CENTRE)
-    axes.set_xlim(-0.2, 3.2 * len(picture.stages) - 0.4)
-    axes.set_ylim(-0.6 * len(picture.spans) - 0.5, top + 0.1)
-    axes.axis("off")
-
-
 def _bars(axes: Any, picture: Bars) -> None:
     """Bars from left to right, those of a name one below the other."""
     high = 0.8 / len(picture.bars)
@@ -355,13 +294,8 @@ def _size_of(picture: Drawn) -> tuple[float, float]:
     match picture:
         case Traces():
             return 7.0, 3.4
-        case Slots():
-            return 7.5, 2.6
         case Bars(names=names):
             return 7.0, 0.9 + 0.42 * len(names)
-        case Pipeline(stages=stages):
-            longest = max(len(content) for _, content in stages)
-            return 7.5, 0.26 * longest + 1.6
         case Diagram(shapes=shapes):
             return diagram_figure.size_in_inches(shapes)
 

@@ -43,34 +43,6 @@ class Traces:
 
 
 @dataclass(frozen=True)
-class Slots:
-    """Two rows of numbered slots and who owns them; shown where pictures can be.
-
-    Attributes:
-        title: What they show.
-        rows: For each row its name and the (owner, start, stop) of its slots.
-    """
-
-    title: str
-    rows: Mapping[str, Sequence[tuple[str, int, int]]]
-
-
-@dataclass(frozen=True)
-class Pipeline:
-    """Stages from left to right, and what covers which; shown where pictures can be.
-
-    Attributes:
-        title: What it shows.
-        stages: Heading and content of each stage.
-        spans: Name of each call, with the first and last stage that it covers.
-    """
-
-    title: str
-    stages: Sequence[tuple[str, Sequence[str]]]
-    spans: Sequence[tuple[str, int, int]]
-
-
-@dataclass(frozen=True)
 class Bars:
     """Bars for each name; shown where pictures can be.
 
@@ -126,4 +98,4 @@ class Diagram:
     shapes: Sequence[Shape]
 
 
-Picture = Traces | Slots | Pipeline | Bars | RobotPicture
+Picture = Traces | Bars | RobotPicture

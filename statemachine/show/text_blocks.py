@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.text import Text as RichText
 
-    from .diagrams.shapes import Look
-
 
 # Spellings for where there is no Unicode; what is not here becomes a question mark.
 _SPELLINGS = {
@@ -104,6 +102,12 @@ def _shown(text: str, plain: bool) -> str:
     return non_breaking(text.translate(ASCII) if plain else text).replace("\u00a0", NO_BREAK)
 
 
+def _spelled(text: str, plain: bool) -> str:
+    """Return a text of a diagram, of which no line is broken, in letters that there are."""
+    text = _shown(text, plain).replace(NO_BREAK, " ")
+    return text.encode("ascii", "replace").decode() if plain else text
+
+
 def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[RenderableType]:
     """What a block looks like, from top to bottom; nothing of a picture. Of a page the heading."""
     from rich.text import Text as RichText
@@ -139,7 +143,9 @@ def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[Ren
             mark = RichText(_shown("✓" if holds else "✗", plain), "green" if holds else "red")
             return ["", _hanging(mark, coded(text))]
         case Diagram():
-            return ["", *_diagram(block, plain, width)]
+            from .diagrams.terminal import lines  # here, for most pages have none
+
+            return ["", *lines(block, width, lambda text: _spelled(text, plain))]
     return []
 
 
@@ -181,41 +187,6 @@ def _as_typed(text: str, is_code: bool) -> str:
     if text.startswith((f"{NAME} ", "python ")):
         return command_as_called(text).replace(" ", NO_BREAK)
     return text
-
-
-# Colours of what a diagram is about; no colour says anything alone.
-_DIAGRAM_STYLES: Mapping[Look, str] = {
-    "plain": "",
-    "constant": "blue",
-    "state": "yellow",
-    "derived": "green",
-    "call": "magenta",
-    "apart": "bold red",
-    "faint": "dim",
-}
-
-
-def _diagram(block: Diagram, plain: bool, width: int) -> list[RenderableType]:
-    """Return the lines of a diagram; where it is too wide, what there is to be seen."""
-    from rich.text import Text as RichText
-
-    from .diagrams.canvas import painted
-    from .diagrams.shapes import size_of
-
-    if size_of(block.shapes)[0] > width:
-        return [RichText(_shown(f"{block.title}. {block.words}", plain))]
-    lines: list[RenderableType] = [RichText(_shown(block.title, plain), "italic")]
-
-    def spelled(text: str) -> str:
-        text = _shown(text, plain).replace(NO_BREAK, " ")  # no line of a diagram is broken
-        return text.encode("ascii", "replace").decode() if plain else text
-
-    for parts in painted(block.shapes, spelled):
-        line = RichText()
-        for part in parts:
-            line.append(part.text, _DIAGRAM_STYLES[part.look])
-        lines.append(line)
-    return lines
 
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:

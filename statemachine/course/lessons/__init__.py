@@ -4,10 +4,11 @@ A lesson is a page `NAME.md`, a template (see `lesson_template`), and a module `
 functions, in the order in which one reads them: `code(model, options, load)` is what a student
 types for a Model, where `load` is the call that loads it; `run(play, options, progress)` calls
 `play` (a `session.CodeRun`) once, which runs that code, looks on, and returns what was measured;
-`slots(result)` gives what the page's slots take beside the fields of the result; and
+`slots(result)` gives what the page's slots take beside the fields of the result;
 `tables(results, first)` its tables and curves, if it has any, from the results by backend, of which
-`first` is the first. One whose options depend on the robot also has `fit(model, options)`, which
-gives them back with nothing left open. Terminal, documentation and notebook show the same page.
+`first` is the first; and `diagram(model)` its diagram, if it has one. One whose options depend on
+the robot also has `fit(model, options)`, which gives them back with nothing left open. Terminal,
+documentation and notebook show the same page.
 """
 
 from __future__ import annotations

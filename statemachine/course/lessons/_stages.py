@@ -17,7 +17,7 @@ from ...lab.runs.usual_commands import hold_ctrl
 from ...measures.text import grouped
 from ...show.blocks import Block, Table
 from ...show.lesson_template import Words
-from ...show.pictures import Pipeline, Traces
+from ...show.pictures import Traces
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
@@ -192,10 +192,10 @@ def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
     )
 
 
-def change_tables(results: Mapping[str, Sequence[ArrayChange]], say: Words) -> list[Block]:
+def change_tables(results: Mapping[str, Sequence[ArrayChange]], say: Words) -> list[Table]:
     """Show the arrays that a write, forward and step changed, in groups that behave alike."""
     engines_by_rows = grouped((_change_rows(changes), name) for name, changes in results.items())
-    tables: list[Block] = [
+    return [
         Table(
             (", ".join(engines), "a write", "forward", "step"),
             rows,
@@ -204,16 +204,6 @@ def change_tables(results: Mapping[str, Sequence[ArrayChange]], say: Words) -> l
         )
         for rows, engines in engines_by_rows.items()
     ]
-    first = next(iter(results.values()))
-    stored = [change.name for change in first if change.stored]
-    computed = [change.name for change in first if not change.stored and change.forward]
-    moved = [change.name for change in first if change.stored and change.step]
-    pipeline = Pipeline(
-        say("cover"),
-        (("stored", stored), ("derived", computed), ("integrated", moved)),
-        (("forward", 0, 1), ("step", 0, 2)),
-    )
-    return [*tables, pipeline]
 
 
 def _change_rows(changes: Sequence[ArrayChange]) -> tuple[tuple[str, ...], ...]:

@@ -20,6 +20,7 @@ from ...measures import largest
 from ...measures.text import count, millimetres, short_time, vector
 from ...show.blocks import Block, Table
 from ...show.lesson_template import Blocks, Results, Words, differences, emulated
+from ...show.pictures import Diagram
 from ._robot import coordinate, with_joint
 from ._stages import (
     ArrayChange,
@@ -33,6 +34,7 @@ from ._stages import (
     own_tables,
 )
 from ._write import WriteEffects, effects_of, in_engine, refusals, write_slots
+from .diagrams.pipeline import pipeline
 from .session import CodeRun, Options
 
 _SAY = Words("course/lessons/forward")
@@ -194,6 +196,11 @@ def _steps(model: Model, options: Options) -> int:
     """Return over how many steps to look at the lag."""
     seconds = options["seconds"]
     return steps_in(model, _SECONDS if seconds is None else seconds)
+
+
+def diagram(model: Model) -> Diagram:
+    """Draw what the lesson is about."""
+    return pipeline(model)
 
 
 def slots(result: ForwardResult) -> dict[str, Any]:

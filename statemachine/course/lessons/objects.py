@@ -20,7 +20,9 @@ from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import count, duration, milliseconds
 from ...show.blocks import Table
 from ...show.lesson_template import Blocks, Results, Words, by_engine, differences
+from ...show.pictures import Diagram
 from ._many_worlds import ManyWorlds, measured, slots_of_worlds, world_tables
+from .diagrams.model_and_data import model_and_data
 from .session import CodeRun, Options
 
 _SAY = Words("course/lessons/objects")
@@ -178,6 +180,11 @@ def _arrays(model: Model) -> dict[str, bytes]:
     return {
         name: array.tobytes() for name, array in fields.items() if isinstance(array, np.ndarray)
     }
+
+
+def diagram(model: Model) -> Diagram:
+    """Draw what the lesson is about."""
+    return model_and_data(model)
 
 
 def slots(result: ObjectsResult) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from ...interface import Array, make_data, reset, step
 from ...lab.runs.robot import TARGET, UNACTUATED
 from ...show.blocks import Page, Printed
 from ...show.pictures import RobotPicture
+from . import PATH
 
 _ARM, _BOX = "so101/scene", "so101/scene_box"
 _EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later
@@ -28,11 +29,14 @@ _Poses = tuple[Array, Array | None]  # qpos (n, nq) of what is drawn solid, and 
 
 
 def with_picture(page: Page, lesson: str) -> Page:
-    """Return the page of a lesson with a picture of the robot after what its code printed."""
+    """Return the page of a lesson with a picture of the robot.
+
+    It opens the path. In the other lessons it stands after what their code printed.
+    """
     printed = [k for k, block in enumerate(page.blocks) if isinstance(block, Printed)]
     if lesson not in PICTURES or not printed:
         return page
-    at = printed[0] + 1
+    at = 0 if lesson == PATH[0].name else printed[0] + 1
     return replace(page, blocks=[*page.blocks[:at], PICTURES[lesson], *page.blocks[at:]])
 
 

@@ -27,6 +27,7 @@ from . import Lesson, module
 if TYPE_CHECKING:
     from ...lab.probes.calls import Recording
     from ...show.lesson_template import HasProvenance
+    from ...show.pictures import Diagram
 
 Options = Mapping[str, Any]  # of a lesson, by key
 L = TypeVar("L")  # what is looked at after a step
@@ -195,6 +196,7 @@ class LessonRun:
         arm: Whether it was taken on an SO-101, which is what its text is about.
         calls: What the code made the engine do; None where that was not asked for, or where the
             engine's room cannot tell.
+        diagram: What its module draws of the model; None where it draws nothing.
     """
 
     result: HasProvenance
@@ -202,6 +204,7 @@ class LessonRun:
     printed: str
     arm: bool
     calls: Recording | None = None
+    diagram: Diagram | None = None
 
 
 def take(
@@ -233,7 +236,9 @@ def take(
     with CodeRun(code, model) as play:
         result = lesson_module.run(play, values, progress)
     recording = _recorded(code, backend) if calls else None
-    return LessonRun(result, code, play.printed, is_the_arm(model), recording)
+    draw = getattr(lesson_module, "diagram", None)
+    diagram = draw(model) if draw else None
+    return LessonRun(result, code, play.printed, is_the_arm(model), recording, diagram)
 
 
 def _recorded(code: str, backend: str) -> Recording | None:
@@ -263,8 +268,12 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
     blocks: dict[str, Block | Sequence[Block]] = {
         "code": Code(_code_shown(taken).splitlines()),
         "printed": Printed({name: run.printed for name, run in taken.items()}),
-        "diagram": [],
     }
+    blocks["diagram"] = []
+    if first.diagram is not None:
+        from .diagrams import told_apart  # here, for most lessons have none
+
+        blocks["diagram"] = told_apart({name: run.diagram for name, run in taken.items()})
     if hasattr(lesson_module, "tables"):
         blocks |= lesson_module.tables(results, first.result)
     page = template.page(f"course/lessons/{lesson.name}", results, slots, blocks, prose=first.arm)

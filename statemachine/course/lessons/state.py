@@ -13,7 +13,8 @@ from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import grouped, listed
 from ...show.blocks import Block, Table
 from ...show.lesson_template import differences
-from ...show.pictures import Slots
+from ...show.pictures import Diagram
+from .diagrams.joint_slots import joint_slots
 from .session import CodeRun, Options
 
 NO_NAME = "(no name)"
@@ -142,6 +143,11 @@ def _slots_of(model: Model, joint: int) -> JointSlots:
     )
 
 
+def diagram(model: Model) -> Diagram:
+    """Draw what the lesson is about."""
+    return joint_slots(model)
+
+
 def slots(result: StateResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
     shifted = [_name(joint) for joint in result.joints if is_shifted(joint)]
@@ -162,13 +168,12 @@ def is_shifted(joint: JointSlots) -> bool:
 
 
 def tables(
-    results: Mapping[str, StateResult], first: StateResult
+    results: Mapping[str, StateResult], _first: StateResult
 ) -> dict[str, Block | Sequence[Block]]:
     """Return sizes, and who owns which slots; engines that say the same share a table."""
     return {
         "sizes": _sizes(results),
         "owners": _owners(results),
-        "picture": _picture(first),
         "terms": [_terms_table(name, result) for name, result in results.items() if result.terms],
         "differences": differences(results, {"names, sizes and slots": _compared}),
     }
@@ -203,17 +208,6 @@ def _slots_table(joints: Sequence[JointSlots], engines: Sequence[str]) -> Table:
         },
         title=title,
         words=("type",),
-    )
-
-
-def _picture(result: StateResult) -> Slots:
-    """Return the slots of each joint as a picture."""
-    return Slots(
-        "Which slots are whose",
-        {
-            "qpos": [(joint.name, joint.qpos_start, joint.qpos_stop) for joint in result.joints],
-            "qvel": [(joint.name, joint.qvel_start, joint.qvel_stop) for joint in result.joints],
-        },
     )
 
 
