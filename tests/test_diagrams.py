@@ -14,11 +14,15 @@ from markdown_it import MarkdownIt
 
 import statemachine as sm
 from statemachine.course import notebook
+from statemachine.course.lessons import LESSONS
+from statemachine.course.lessons.diagrams import told_apart
 from statemachine.course.lessons.diagrams.joint_slots import joint_slots
 from statemachine.course.lessons.diagrams.model_and_data import model_and_data
 from statemachine.course.lessons.diagrams.pipeline import pipeline
+from statemachine.course.lessons.session import page_of_lesson, take
 from statemachine.interface.records import DERIVED
 from statemachine.show import terminal
+from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Page
 from statemachine.show.diagrams.canvas import painted
 from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Shape, Words, cut, length_of
@@ -29,6 +33,7 @@ from statemachine.show.text_blocks import ASCII
 
 from .support.browser import browser
 from .support.claims import assert_in
+from .support.files import written
 from .support.small_models import loaded, mjcf, model_of
 
 THREE = (model_and_data, joint_slots, pipeline)
@@ -51,6 +56,14 @@ def chain(count: int, base: str = "") -> str:
         for k in range(count)
     )
     return f"<body>{base}<geom size='.1'/>{bodies}{'</body>' * count}</body>"
+
+
+def free_bodies(count: int, first: int = 0) -> str:
+    """Return free bodies in a row."""
+    return "".join(
+        f"<body pos='{k} 0 0'><freejoint/><geom size='.1'/></body>"
+        for k in range(first, first + count)
+    )
 
 
 def quoted(name: str) -> str:
@@ -224,8 +237,9 @@ def test_a_quadruped_is_shown_whole_in_rows(tmp_path: Path) -> None:
 
 
 def test_many_free_bodies_are_not_all_drawn_and_it_is_said_how_many(tmp_path: Path) -> None:
-    both = "<body><freejoint/><geom size='.1'/></body><body><joint/><geom size='.1'/></body>"
-    model = loaded(tmp_path, both * 40)
+    hinge = "<body pos='0 9 0'><joint/><geom size='.1'/></body>"
+    bodies = [f"{free_bodies(1, first=k)}{hinge.replace('9', str(k))}" for k in range(1, 41)]
+    model = loaded(tmp_path, "".join(bodies))
     diagram = joint_slots(model)
     more = [text for text in texts(diagram) if text.endswith("more joints")]
     shown = [text for text in texts(diagram) if text.endswith(("hinge", "free"))]
@@ -306,7 +320,7 @@ def test_what_is_emulated_is_what_the_capabilities_say() -> None:
     params=[
         pytest.param((MIXED, MOTOR), id="mixed"),
         pytest.param((chain(60, "<freejoint/>"), ""), id="sixty"),
-        pytest.param(("<body><freejoint/><geom size='.1'/></body>" * 150, ""), id="free"),
+        pytest.param((free_bodies(150), ""), id="free"),
         pytest.param(("<geom size='.1'/>", ""), id="static"),
         pytest.param(
             (
@@ -444,6 +458,36 @@ def test_markdown_has_it_as_one_block_of_html(drawn: Sequence[Diagram]) -> None:
         (token,) = MarkdownIt("commonmark").parse(text)
         assert token.type == "html_block"
         assert token.content == text == figure(diagram)
+
+
+@pytest.mark.parametrize("name", ["objects", "state", "forward"])
+def test_each_stands_in_its_lesson_and_in_no_fold(name: str, backend: str, tmp_path: Path) -> None:
+    entry = LESSONS[name]
+    model = loaded(tmp_path, MIXED.replace("ball", "hinge"), MOTOR, backend=backend)
+    options = {"site": "tip", "joint": "knee"} if name == "forward" else {}
+    page = page_of_lesson(entry, {backend: take(entry, model, backend, options)})
+    (diagram,) = [block for block in page.blocks if isinstance(block, Diagram)]
+    assert figure(diagram) in re.sub(
+        "<details>.*?</details>", "", notebook.markdown(page, lambda _: ""), flags=re.DOTALL
+    )
+
+
+@pytest.mark.usefixtures("bullet")
+def test_engines_of_which_the_same_is_drawn_share_a_diagram(tmp_path: Path) -> None:
+    file = written(tmp_path / "m.xml", mjcf(MIXED.replace("ball", "hinge"), MOTOR))
+    models = {name: sm.load(file, backend=name) for name in ("mujoco", "pybullet")}
+    slots_of = {name: joint_slots(model) for name, model in models.items()}
+    assert told_apart(slots_of) == [slots_of["mujoco"]]
+    flows = {name: pipeline(model) for name, model in models.items()}
+    first, second = told_apart(flows)
+    assert first.title == f"mujoco: {flows['mujoco'].title}"
+    assert second.shapes == flows["pybullet"].shapes
+
+
+def test_a_lesson_s_json_has_no_diagram() -> None:
+    taken = take(LESSONS["state"], sm.load("so101/scene_box"), "mujoco")
+    assert taken.diagram == joint_slots(sm.load("so101/scene_box"))
+    assert "shapes" not in dumps(taken.result)
 
 
 def test_no_diagram_stands_in_a_picture_s_stead(mixed: sm.Model) -> None:

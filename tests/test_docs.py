@@ -23,7 +23,8 @@ from statemachine.errors import BadInputError
 from statemachine.show import terminal
 from statemachine.show.blocks import Heading, Page, Printed, Question, Table, Text
 from statemachine.show.charts import drawn
-from statemachine.show.pictures import Pipeline, Slots, Traces
+from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Words
+from statemachine.show.pictures import Diagram, Traces
 from tools.docs_pages import make_path
 
 from .support.claims import assert_in, refused
@@ -34,13 +35,16 @@ from .support.requirements import ROOT
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 
 
+_BOX = Box(0, 0, 9, 3, "call", "step", is_rounded=True)
+_BRACKET = Bracket(11, 0, 2, "step")
+
+
 @pytest.mark.parametrize(
     "picture",
     [
         Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
         Traces("t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True),
-        Slots("s", {"qpos": [("a", 0, 1), ("b", 1, 8)], "qvel": [("a", 0, 1), ("b", 1, 7)]}),
-        Pipeline("p", (("stored", ["qpos"]), ("derived", ["xpos"])), (("forward", 0, 1),)),
+        Diagram("d", "w", (_BOX, Words("a", 2, 1, 5), Arrow(((9, 1), (4, 1))), _BRACKET)),
     ],
     ids=lambda each: type(each).__name__,
 )
@@ -102,6 +106,8 @@ _ELSEWHERE = re.compile(
     r'|<link\b(?=[^>]*\brel="(?:stylesheet|icon|preload)")[^>]*\bhref="[^"]*//'
 )
 _FOLDED = re.compile(r"<details[ >].*?</details>", re.DOTALL)
+# It stands open, below the fold: it is what a lesson is to be remembered by.
+_DIAGRAM = re.compile(r'<figure class="diagram">.*?</figure>', re.DOTALL)
 # A paragraph that was meant to be a table.
 _RAW_TABLE = re.compile(r"<p>\s*\|[^<]*\|")
 _SMALL: dict[str, dict[str, Any]] = {
@@ -120,7 +126,7 @@ def test_no_page_of_the_path_shows_its_answers_open(name: str) -> None:
     questions = blocks(page, Question)
     assert questions
     text = md.markdown(page, lambda _: "picture")
-    shown, asks = _FOLDED.sub("", text), _opening(page)
+    shown, asks = _DIAGRAM.sub("", _FOLDED.sub("", text)), _opening(page)
     # The notebook asks before the cell that answers.
     assert not re.search("[✓✗]", shown + asks)
     before, _, after = shown.partition(md.asked(questions[0]))
@@ -155,6 +161,7 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
         assert not _ELSEWHERE.findall(text)
         assert "✗" not in text
         assert "✓" not in _FOLDED.sub("", text)
+    assert sum(len(_DIAGRAM.findall(_FOLDED.sub("", text))) for text in pages) == 3
     for file in (tmp_path / "o").rglob("*.html"):
         assert not _RAW_TABLE.search(file.read_text()), file
     images = re.findall(r"<img\b[^>]*>", "".join(pages))

@@ -16,6 +16,7 @@ from statemachine import cli
 from statemachine.course import notebook as md
 from statemachine.course.lessons import LESSONS, PATH
 from statemachine.course.lessons.pictures import PICTURES, with_picture
+from statemachine.course.lessons.poses import POSES
 from statemachine.course.quiz import Reader
 from statemachine.errors import MissingEngineError
 from statemachine.lab.questions import film
@@ -75,8 +76,24 @@ def test_it_stands_after_what_the_code_printed() -> None:
     page = Page("t", "o", [question, Printed({"x": "1"}), Text("rest")])
     kinds = [type(block) for block in with_picture(page, "state").blocks]
     assert kinds == [Question, Printed, RobotPicture, Text]
+    opening = with_picture(page, PATH[0].name).blocks  # the path opens with it
+    assert [type(block) for block in opening] == [RobotPicture, Question, Printed, Text]
     assert with_picture(page, "questions") is page
     assert with_picture(Page("t", "o"), "state").blocks == []
+
+
+def test_a_picture_is_drawn_for_each_lesson_s_own_name() -> None:
+    assert POSES.keys() == PICTURES.keys()
+
+
+def test_a_picture_above_the_text_repeats_no_text_in_a_notebook() -> None:
+    page = Page(
+        "t", "o", [_picture(), Text("above"), Question("q", ("a", "b"), 0, "so"), Text("z")]
+    )
+    shown = md.Shown(page)._repr_markdown_()
+    assert_in(shown, "the words", "z")
+    assert "above" not in shown  # a cell above has it
+    assert "above" in md._opening(page)
 
 
 def test_without_a_renderer_a_page_has_the_words(

@@ -134,7 +134,7 @@ def _last_place(shape: Shape) -> Place:
     """Return the last column and the last row of a shape."""
     match shape:
         case Words(text, column, row, room):
-            length = min(length_of(text), room)
+            length = min(length_of(clean(text)), room)
             if shape.is_centered:
                 return first_column(column, length) + length - 1, row
             return column + length - 1, row
