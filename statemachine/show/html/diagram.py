@@ -43,13 +43,15 @@ _COLOURS: dict[Look, str] = {
     "apart": "#d8433f",
     "faint": "#757575",
 }
+# On every page, in a notebook, too.
+_FIGURE, _CAPTION = "margin:1.2em 0;overflow-wrap:normal", "font-size:.9em;margin-top:.4em"
 Point = tuple[float, float]
 
 
 def figure(diagram: Diagram) -> Html:
     """Return a diagram with its title below it, on one line."""
-    caption = tag("figcaption", literal(diagram.title))
-    return tag("figure", svg(diagram), caption, class_="diagram")
+    caption = tag("figcaption", literal(diagram.title), style=_CAPTION)
+    return tag("figure", svg(diagram), caption, class_="diagram", style=_FIGURE)
 
 
 def svg(diagram: Diagram) -> Html:

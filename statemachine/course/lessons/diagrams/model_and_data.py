@@ -10,11 +10,11 @@ from ....show.pictures import Diagram
 from ....show.templates import PageContent
 from .texts import diagram_of, file_of, lines, rows_of, stored_arrays
 
-_WIDTH = 74
+_WIDTH = 71
 _MODEL_TOP = 3
 _STEP = 18  # columns of its box
-_DATA_LEFT, _DATA = 30, 23  # column and columns of its box
-_OTHER_LEFT = 55
+_DATA_LEFT, _DATA = 30, 21  # column and columns of its box
+_OTHER_LEFT = 53
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from ....show.pictures import Diagram
 from ....show.templates import PageContent
 from .texts import diagram_of, lines, rows_of, stored_arrays
 
-_LEFT, _WIDTH = 5, 48  # of the boxes
+_LEFT, _WIDTH = 4, 44  # of the boxes
 _BACK = 1  # column of the line from the last box to the first
-_FORWARD, _STEP = 55, 68  # columns of the brackets
+_FORWARD, _STEP = 50, 63  # columns of the brackets
 _ROOM = _WIDTH - 4
 _MIDDLE = _LEFT + _WIDTH // 2
 _COMPUTED = ("places", "contacts", "forces", "accelerations")
