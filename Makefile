@@ -120,6 +120,8 @@ traces: $(VENV)/run.stamp
 
 # make docs         the path as pages, made from runs: docs/_build/html/index.html
 docs: $(VENV)/test.stamp
+	@echo "running every lesson on every engine that is here, and asking the engines:" \
+	"about 4 minutes on two idle cores ..."
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 

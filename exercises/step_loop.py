@@ -1,37 +1,42 @@
-"""The step loop, by you: four functions to write, two to read.
+"""The step loop, by you: four functions to write, and two to read.
 
-    python step_loop.py                 what there is, and what is still to do
-    python step_loop.py --gravity       run one of yours, and see what it shows
-    python step_loop.py --hold          run one of the two that are written already
+    python step_loop.py                 list the six functions
+    python step_loop.py --gravity       run demo_gravity, and print what it returns
+    python step_loop.py --hold          run demo_hold, which is written already
     python step_loop.py --gravity --backend pybullet      the same on another engine
-    python step_loop.py --gravity --traceback             where an error came from, in full
-    statemachine check step_loop.py     judges what your four functions do
+    python step_loop.py --gravity --traceback             show an error in full
+    statemachine check step_loop.py     judge what your four functions do, with a hint for each
 
 Replace each `raise NotImplementedError` by your code. A function gets a `model`, and whatever
-else it needs, and RETURNS what its docstring asks for; the part below the line at the end
-prints it. What you may need, with `import statemachine as sm`:
+else it needs, and RETURNS what its docstring asks for; the code below the line at the end of this
+file prints it. What you may need, with `import statemachine as sm`:
 
     data = sm.make_data(model)              a new Data: everything that changes
-    sm.step(model, data, 100)               100 steps; 1 without a number
+    sm.step(model, data, 100)               100 steps; one step without the number
     sm.forward(model, data)                 recompute what is derived; no time passes
     sm.reset(model, data)                   back to the default state
-    sm.reset(model, data, keyframe=0)       or to the first state that the model file names
-    data.qpos, data.qvel, data.ctrl         arrays that you may read, and write into: positions,
-                                            velocities, and the angles that servos aim at [rad]
-    data.time                               a number [s] that you may read and write
-    data.site_xpos[model.site_id("…")]      where a site is, three numbers [m]; read only
+    sm.reset(model, data, keyframe=0)       to keyframe 0, a state that the model's file names
+    data.qpos, data.qvel                    positions [rad or m] and velocities: arrays that you
+                                            may read, and write into
+    data.ctrl                               the command: a target angle for each servo [rad];
+                                            an array that you may write into
+    data.time                               simulated time [s]; you may read and write it
+    data.site_xpos[model.site_id("…")]      where a site is, three numbers [m]; read only. A site
+                                            is a point with a name, such as the fingertip
     model.timestep                          how much time one step takes [s]
     model.joint_names                       names of all joints, in the order of their numbers
     model.joint_id("shoulder_lift")         the number of a joint
-    model.jnt_qposadr, model.jnt_dofadr     where each joint begins in qpos, and in qvel
-    model.jnt_type                          what each joint is: JointType(…).name, .nq, .nv
+    model.jnt_qposadr, model.jnt_dofadr     where each joint begins in qpos, and in qvel: by its
+                                            number, not by its name
+    model.jnt_type                          the type of each joint: JointType(model.jnt_type[k])
+                                            has .name, .nq and .nv, its numbers in qpos and qvel
     model.replace(actuation=False)          another Model: the same robot, its servos off
 
 A Data belongs to the Model that made it. An array that you read from `data` may be the
-simulator's own memory: `.copy()` keeps what it says now. On MuJoCo, `model.raw` and `data.raw`
-are the engine's own MjModel and MjData, and what you do with them counts just as well.
+simulator's own memory, which changes with the next step: `.copy()` keeps the numbers of now. On
+MuJoCo, `model.raw` and `data.raw` are MuJoCo's own MjModel and MjData, and you may use them, too.
 
-When all four pass, see how far one late command takes two runs apart:
+When all four are right, see how different two runs become after one late command, or one more step:
 
     statemachine lesson replay --break late-ctrl
     statemachine lesson replay --break extra-step
@@ -51,22 +56,22 @@ import statemachine as sm
 from statemachine.errors import StateMachineError
 from statemachine.interface import JointType  # noqa: F401  (for demo_state)
 
-# The command of demo_replay, one target angle for each of the six servos [rad].
+# The command of demo_replay: a target angle for each of the six servos [rad].
 CTRL = [0.4, -0.8, 0.5, 1.6, 1.57, 0.28]
 
 
 def demo_gravity(model, seconds=4):
-    """TODO(you): nobody writes ctrl. Who holds the arm up?
+    """TODO(you): you never write ctrl. Who holds the arm up?
 
-    Run twice from the default state, each time in a new Data, and never write ctrl: first
+    Run twice from the default state, each time with a new Data, and never write ctrl: first
     with the model as it is, then with its servos off. For the second run, `model.replace`
-    gives you another Model. Or the raw way, on MuJoCo: set the bit mjDSBL_ACTUATION of
-    `mujoco.mjtDisableBit` in `model.raw.opt.disableflags`, and give the model back as you
-    found it.
+    gives you another Model. MuJoCo's own way: set the bit mjDSBL_ACTUATION of
+    `mujoco.mjtDisableBit` in `model.raw.opt.disableflags`, and switch it back before you return.
 
     Args:
-        model: A Model of the arm. Do not rely on its timestep, nor on where a joint begins.
-        seconds: A whole number: how long each run lasts [s of simulated time].
+        model: A Model of the arm. Ask it for its timestep, and for where a joint begins in
+            qpos: you are called with several models, and they differ in both.
+        seconds: How long each run lasts, in simulated time; a whole number [s].
 
     Returns:
         (on, off): Two lists of seconds + 1 numbers: the position of the joint shoulder_lift
@@ -78,30 +83,30 @@ def demo_gravity(model, seconds=4):
 def demo_state(model):
     """TODO(you): which numbers of qpos and qvel belong to which joint?
 
-    A joint may own more than one number, and not equally many in qpos and in qvel: a hinge
-    owns one and one; a free joint, which lets a body fly, owns more. `JointType` knows.
+    A joint may own several numbers, and another number of them in qpos than in qvel. A hinge
+    owns one in each. A free joint, which lets a body move anywhere, owns more: see `JointType`.
 
     Args:
         model: A Model with at least one keyframe.
 
     Returns:
         (slots, time): slots is a dict {name of the joint: (slice of qpos, slice of qvel)},
-        with one entry for every joint, as {"gripper": (slice(5, 6), slice(5, 6)), …}, so that
-        data.qpos[slots["gripper"][0]] is its position. time is data.time [s] right after a
-        reset to keyframe 0.
+        with an entry for every joint, as {"gripper": (slice(5, 6), slice(5, 6)), …}. Then
+        data.qpos[slots["gripper"][0]] is the position of that joint. time is data.time [s]
+        right after a reset to keyframe 0.
     """
-    raise NotImplementedError("TODO(you): tell which slots each joint owns")
+    raise NotImplementedError("TODO(you): return the slots of each joint, and the time")
 
 
 def demo_forward(model):
-    """TODO(you): where is the fingertip, and who works it out when?
+    """TODO(you): where is the fingertip, and when is that computed?
 
     In one new Data, read the position of the site gripperframe four times:
-    1. at once; 2. after a forward; 3. after writing 0.8 [rad] into the place of joint
-    shoulder_lift in qpos; 4. after a second forward. No time passes in all this.
+    1. at once; 2. after a forward; 3. after you have written 0.8 [rad] into qpos, at the place
+    of the joint shoulder_lift; 4. after a second forward. No time passes in all this.
 
     Args:
-        model: A Model of the arm. Do not rely on where a joint begins in qpos.
+        model: A Model of the arm. Ask it where a joint begins in qpos.
 
     Returns:
         The four positions [m], in this order: a list of four, or an array of shape (4, 3).
@@ -110,10 +115,11 @@ def demo_forward(model):
 
 
 def demo_replay(model, ctrl, nstep=600):
-    """TODO(you): the same start, the same commands: the same end?
+    """TODO(you): do the same start and the same command lead to the same end?
 
-    Do this twice: go to keyframe 0, set the time to zero, write `ctrl` into the command,
-    take `nstep` steps, and keep a copy of qpos. Then compare the two: every bit, not nearly.
+    Do this twice: reset to keyframe 0, set data.time to zero, write the command `ctrl` into
+    data.ctrl, take `nstep` steps, and keep a copy of qpos. Then compare the two copies
+    exactly: every bit counts, and nearly equal is not equal.
 
     Args:
         model: A Model with at least one keyframe.
@@ -121,22 +127,22 @@ def demo_replay(model, ctrl, nstep=600):
         nstep: How many steps each run takes.
 
     Returns:
-        (same, first, second): whether the two copies are equal (True or False), and the
+        (same, first, second): whether the two copies are equal, True or False; and the two
         copies, each of shape (nq,).
     """
     raise NotImplementedError("TODO(you): run twice, and compare exactly")
 
 
 def demo_hold(model, seconds=2):
-    """Written for you: six numbers in, and the arm follows.
+    """Written for you: you write six numbers, and the arm follows.
 
     Returns:
-        A list of (time [s], largest distance of a joint from its target [degrees]).
+        A list of (time [s], the largest difference between a joint and its target [degrees]).
     """
     target = np.array([0.0, -0.6, 1.2, 0.5, 0.0, 0.6])
-    joints = model.jnt_qposadr[model.actuator_jntid]  # where what each servo drives is in qpos
+    joints = model.jnt_qposadr[model.actuator_jntid]  # the place in qpos of each servo's joint
     data = sm.make_data(model)
-    data.ctrl[:] = target  # once: it stays until somebody writes another
+    data.ctrl[:] = target  # once: the command stays until somebody writes another
     every = round(0.25 / model.timestep)
     trace = []
     for _ in range(4 * seconds + 1):
@@ -147,10 +153,10 @@ def demo_hold(model, seconds=2):
 
 
 def demo_speed(model, nstep=4000):
-    """Written for you: how much faster than the world is a simulation?
+    """Written for you: how much faster than real time is a simulation?
 
     Returns:
-        (simulated time [s], time on the clock [s]).
+        (simulated time [s], time that passed on the clock [s]).
     """
     data = sm.make_data(model)
     sm.reset(model, data, keyframe=0)
@@ -167,7 +173,7 @@ def demo_speed(model, nstep=4000):
 
 def show_gravity(model, result):
     on, off = result
-    print("shoulder_lift, ctrl never written")
+    print("The position of shoulder_lift; ctrl was never written")
     print("   time    servos on   servos off")
     for second, (one, two) in enumerate(zip(on, off, strict=True)):
         print(f"{second:5d} s  {one:10.3f}°  {two:10.3f}°")
@@ -190,7 +196,7 @@ def show_forward(model, result):
     for one in range(4):
         for two in range(one + 1, 4):
             if np.array_equal(result[one], result[two]):
-                print(f"Readings {one + 1} and {two + 1} are equal, bit by bit. Why?")
+                print(f"Readings {one + 1} and {two + 1} are equal, bit for bit. Why?")
 
 
 def show_replay(model, result):
@@ -198,23 +204,23 @@ def show_replay(model, result):
     print("qpos at the end of the first run, and of the second")
     for one, two in zip(first, second, strict=True):
         print(f"  {one:20.15f}  {two:20.15f}")
-    print(f"largest difference: {np.abs(first - second).max():.1e}")
-    print(f"you say: {'equal' if same else 'not equal'}")
+    print(f"The largest difference between two numbers: {np.abs(first - second).max():.1e}")
+    print(f"Your answer: {'equal' if same else 'not equal'}")
 
 
 def show_hold(model, result):
-    print("   time    farthest from its target")
+    print("   time    the largest difference between a joint and its target")
     for moment, away in result:
         print(f"{moment:5.2f} s  {away:10.3f}°")
 
 
 def show_speed(model, result):
     simulated, clock = result
-    print(f"{simulated:g} s of simulated time took {clock:.2f} s on the clock:")
-    print(f"{simulated / clock:.0f} times as fast as the world")
+    print(f"{simulated:g} s of simulated time took {clock:.2f} s on the clock.")
+    print(f"That is {simulated / clock:.0f} times as fast as real time.")
 
 
-# For each flag: what prints its result, the model, and what the function gets beside it.
+# For each flag: what prints the result, the model, and the further arguments of the function.
 SHOWS = {
     "gravity": (show_gravity, "so101/scene", ()),
     "state": (show_state, "so101/scene_box", ()),
@@ -226,17 +232,17 @@ SHOWS = {
 
 
 def where(error, file):
-    """The last line of a function of a file that had a part in an error."""
+    """Return the file and line in which an error arose, in a function of this file; or ""."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [at.lineno for at in frames if at.filename == file and at.name != "main"]
     return f"{sys.argv[0]}, line {lines[-1]}: " if lines else ""
 
 
 def main(functions):
-    """Run what the command line names; `functions` has the six by name."""
+    """Run the function that the command line names; `functions` has the six by name."""
     about = {name: (functions[f"demo_{name}"].__doc__ or name).splitlines()[0] for name in SHOWS}
     parser = argparse.ArgumentParser(
-        description="The step loop, by you: four functions to write, two to read."
+        description="The step loop, by you: four functions to write, and two to read."
     )
     chosen = parser.add_mutually_exclusive_group()
     for name, words in about.items():
@@ -262,14 +268,17 @@ def main(functions):
             raise
         place, known = where(error, functions.get("__file__")), isinstance(error, StateMachineError)
         print(f"{called}: {place}{error if known else f'{type(error).__name__}: {error}'}")
+        if place:
+            print(f"For a hint, type: statemachine check {sys.argv[0]}")
         return 2 if known else 1
     if result is None:
-        print(f"{called} returned nothing: it must hand its result over with `return`")
+        print(f"{called} returned nothing: end it with `return`, and the result")
         return 1
     try:
         show(model, result)
     except (TypeError, ValueError, AttributeError, IndexError) as error:
-        print(f"{called}: what it returned cannot be shown ({error}); see what its docstring asks")
+        print(f"{called}: its result cannot be shown ({error}); see Returns in its docstring")
+        print(f"For a hint, type: statemachine check {sys.argv[0]}")
         return 1
     return 0
 

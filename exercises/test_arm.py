@@ -2,31 +2,35 @@
 
     statemachine check --faults exercises/test_arm.py
 
-runs these tests on the healthy arm, where all must pass, and then on arms that have one fault
-each: quaternions in another order, joints shifted, a motor left on, and so on. A fault that no
-test catches is named, with a hint. Add tests until all are caught.
+runs these tests on the healthy arm, where all must pass, and then on arms with one fault each:
+one reads quaternions in another order, one has its joints shifted, one has a motor that was left
+on, and so on. Where no test fails on an arm with a fault, the fault is named, with a hint. Add
+tests until each fault makes one fail.
 
-A test is a function test_…, as pytest takes it. It gets, if it asks for them:
+A test is a function whose name begins with test_, as for pytest. Its arguments are what it needs:
 
     model    the arm on a floor, with a box (sm.load("so101/scene_box"))
-    data     a new Data of it: zero pose, nothing derived yet
-    backend  the name of the engine that it runs on
+    data     a new Data of it: all joints at zero, and nothing derived yet
+    backend  the name of the engine that the test runs on
 
-Beside what step_loop.py names you may need: data.xpos and data.xquat[model.body_id("box")] (where
-a body's frame is, and how it is turned: w x y z), model.body_names, model.gravity, and
-`statemachine conventions velocity`, which says what the six velocities of a free body mean on an
-engine itself (this interface has MuJoCo's everywhere). The arm's file is
-models/so101/so101.xml: where each body sits on the one before it.
+Beside what step_loop.py lists you may need:
+
+    data.xpos[model.body_id("box")]         where the frame of a body is, three numbers [m]
+    data.xquat[model.body_id("box")]        how it is turned, a quaternion w x y z
+    model.body_names, model.gravity         names of all bodies; gravity [m/s²]
+    statemachine conventions velocity       what the six velocities of a free body mean
+    models/so101/so101.xml                  the arm's file: where each body is on the one before it
 
     pytest exercises/test_arm.py
 
-runs them on the healthy arm alone, and shows more of what fails. What a test asks for comes from
-conftest.py beside this file; without it:
+runs them on the healthy arm alone, and shows more of what fails. The arguments come from
+conftest.py beside this file; without that, type
 
     pytest -p statemachine.course.grading.faults.plugin test_arm.py
 
-What to test against? Not what the arm gave you yesterday: what you know without it. A turn by
-90 degrees, a free fall, a circle about an axis, a weight on a spring, two runs that must agree.
+What should a test expect? Not what the simulator printed yesterday, but what you know without
+it: a turn by 90 degrees, a free fall, a circle about an axis, a weight on a spring, two runs that
+must agree.
 """
 
 import math
@@ -49,10 +53,10 @@ def test_a_command_is_followed(model, data):
 
 
 def test_the_clock(model, data):
-    # It looks sensible. Which fault could it ever catch?
+    # It looks sensible. On which arm would it fail?
     sm.step(model, data, 400)
     assert math.isclose(data.time, 400 * model.timestep)
 
 
-# To add: where does a turn of shoulder_pan by 90 degrees take the fingertip? How far does the
-# box fall in 0.2 s? What do two equal runs have in common?
+# To add: where is the fingertip after a turn of shoulder_pan by 90 degrees? How far does the box
+# fall in 0.2 s? What do two equal runs have in common?

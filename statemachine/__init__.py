@@ -97,9 +97,17 @@ def __getattr__(name: str) -> Any:
     elif name in _MODULES:
         value = _import_module(f".{_MODULES[name]}", __name__)
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{_instead_of(name)}")
     globals()[name] = value  # so that the next use is an ordinary look-up
     return value
+
+
+def _instead_of(name: str) -> str:
+    """Return what to write for a name of MuJoCo's, "; write …"; "" for any other."""
+    if not name.startswith(("mj", "Mj")):
+        return ""
+    names = _import_module(".interface.unknown_attributes", __name__).OF_PACKAGE
+    return f"; write {names[name]}" if name in names else ""
 
 
 def __dir__() -> list[str]:

@@ -145,15 +145,6 @@ class DivergedWarning(UserWarning):
     """Some of many worlds diverged and are left out from now on."""
 
 
-def no_attribute(owner: object, name: str, raw: object) -> AttributeError:
-    """Return the error for an attribute that a Model or Data lacks; it tells whether the
-    engine's object has it.
-    """
-    kind = type(owner).__name__
-    own = f"; the engine's own is .raw.{name}" if hasattr(raw, name) else ""
-    return AttributeError(f"{kind!r} has no attribute {name!r}{own}", name=name, obj=owner)
-
-
 def check_name(kind: str, name: object, known: Iterable[str]) -> None:
     """Raise UnknownNameError for a name that is not known."""
     if not isinstance(name, str) or name not in known:

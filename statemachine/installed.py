@@ -21,7 +21,6 @@ from types import ModuleType
 from typing import Any
 
 from .errors import MissingEngineError, unknown_name
-from .program import install_command, pip
 
 # Keep what C code prints off the terminal, and have it for an error message.
 
@@ -270,6 +269,8 @@ def require_extra(module: str, what: str, package: str, extra: str, instead: str
     try:
         return importlib.import_module(module)
     except ImportError as error:
+        from .installing import install_command  # here, for most runs lack nothing
+
         raise MissingEngineError(
             f"{what} needs {package}: {install_command(extra)}"
             + (f"; {instead}" if instead else ""),
@@ -321,6 +322,8 @@ def _installed(engine: Engine) -> dict[str, str]:
 
 def _remedy(engine: Engine) -> str:
     """Return what to type on this machine, or that nothing can be installed."""
+    from .installing import pip  # here, for most runs lack nothing
+
     if wheel := wheel_here(engine):
         return f"{pip()} install {wheel.requirement} (wheels for {engine.places})"
     where = f"{platform.system()} {platform.machine()} and Python 3.{sys.version_info.minor}"

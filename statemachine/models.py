@@ -343,5 +343,5 @@ def numbers(text: str, count: int, what: str) -> list[float]:
     except ValueError:
         found = []
     if len(found) != count or not all(map(math.isfinite, found)):
-        raise ModelError(f"{what} is {shown(text)}; numbers wanted: {count}")
+        raise ModelError(f"{what} is {shown(text)}; it must have {count} finite numbers")
     return found

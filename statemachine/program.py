@@ -1,4 +1,4 @@
-"""How the user calls this program, and pip: what is printed runs as printed, where they are."""
+"""How the user calls this program: what is printed runs as printed, where they are."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 NAME = "statemachine"
-_DISTRIBUTION = "statemachine-sim"
 # A command of ours within a text: the name of the program, and a word behind it.
 _COMMAND = re.compile(r"(?<![\w./\\-])statemachine(?= (?:[a-z]|--help))")
 
@@ -63,33 +62,6 @@ def python() -> str:
         if _is_on_path(file.with_name(name)):
             return name
     return _typed_path(file)
-
-
-def pip() -> str:
-    """Return what starts the pip that installs into the Python that runs this."""
-    return f"{python()} -m pip"
-
-
-def install_command(extra: str) -> str:
-    """Return the command that installs an extra of this library, into the Python that runs it.
-
-    Args:
-        extra: Its name.
-    """
-    folder = _clone()
-    if folder is None:
-        what = [f"{_DISTRIBUTION}[{extra}]"]
-    elif folder == Path.cwd():
-        what = ["-e", f".[{extra}]"]
-    else:
-        what = ["-e", f"{folder}[{extra}]"]
-    return f"{pip()} install {shlex.join(what)}"
-
-
-def _clone() -> Path | None:
-    """Return the folder of the sources that this runs from; None where it is installed."""
-    folder = Path(__file__).absolute().parent.parent
-    return folder if (folder / "pyproject.toml").is_file() else None
 
 
 def _is_on_path(file: Path) -> bool:

@@ -18,7 +18,7 @@ from types import ModuleType
 from typing import Any
 
 from .errors import MissingEngineError, ModelFileError, check_name, one_line
-from .program import install_command
+from .installing import install_command
 
 MENAGERIE, DESCRIPTIONS = "menagerie:", "robot_descriptions:"
 _ANSWERS_WITHIN = 5.0  # s; a slower network counts as no network

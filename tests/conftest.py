@@ -78,6 +78,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("MENAGERIE", "COLUMNS", "FORCE_COLOR", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("STATEMACHINE_JUDGED", "")  # what tests judge is no verdict for anybody
 
 
 @pytest.fixture(autouse=True)

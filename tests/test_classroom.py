@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,15 @@ import pytest
 from statemachine.atomic_files import csv_text, replace_csv
 from statemachine.cli import main
 from statemachine.course.grading import classroom
-from statemachine.course.grading.class_table import ClassEntry, few_words, read, rows_of
+from statemachine.course.grading.class_page import class_page
+from statemachine.course.grading.class_table import ClassEntry, read, rows_of
 from statemachine.course.grading.classroom import judge_all
 from statemachine.course.grading.exercise import LOOK, ExerciseJudge, Grade
 from statemachine.course.grading.faults import FAULTS
 from statemachine.course.grading.faults.examination import Examination, FailedTest, FaultTrial
 from statemachine.course.grading.judges import JUDGES, Judgement
-from statemachine.course.grading.page import class_page, gradescope_results
+from statemachine.course.grading.overview import class_result
+from statemachine.course.grading.page import gradescope_results
 from statemachine.course.grading.roster import enrolled
 from statemachine.course.grading.submissions import (
     Submission,
@@ -169,7 +170,7 @@ def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
     found, ignored = submissions([folder]), not_looked_at([folder])
     assert {"IDA.PY", "__MACOSX"} & {each.name for each in found} == {"IDA.PY"}
     assert ignored == ["grades.txt"]
-    page = class_page(judge_all(found, "mujoco"), ignored)
+    page = class_page(class_result(judge_all(found, "mujoco"), (), ignored))
     said = "No Python files, and not looked at: grades.txt."
     assert said in [text.text for text in blocks(page, Text)]
 
@@ -192,14 +193,7 @@ def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[st
         assert (rows[name]["right"], rows[name]["demo_state"]) == ("", "not judged")
 
 
-def test_a_remark_is_told_as_far_as_there_is_room() -> None:
-    said = "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data"
-    words = [few_words(Judgement("demo", True, False, (text,))) for text in (said, 9 * said)]
-    assert words[0] == said
-    assert re.fullmatch(f"{said}.* …", words[1])
-
-
-def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path) -> None:
+def test_remarks_are_a_line_a_function_uncut_and_details_have_all(tmp_path: Path) -> None:
     texts = (
         "right on 2 other models, too",
         "ctrl was written ([0 0]): here it must stay",
@@ -212,10 +206,12 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
     )
     entry = ClassEntry("ann.py", "1" * 64, marks, "", "mujoco")
     (row,) = _table([entry])
-    assert row["remarks"] == (
-        "state: ctrl was written ([0 0]): here it must stay; forward: …; replay: not written; "
-        "please look at this: it reads a.txt"
-    )
+    assert row["remarks"].split("\n") == [
+        "state: ctrl was written ([0 0]): here it must stay",
+        f"forward: {'x' * 500}",
+        "replay: not written",
+        "please look at this: it reads a.txt",
+    ]
     assert_in(row["details"], *texts)
     replace_csv(tmp_path / "t.csv", rows_of([entry]))
     assert read(tmp_path / "t.csv") == {(entry.sha256, "mujoco"): entry}
@@ -313,31 +309,19 @@ def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str
     assert (len(entries), len({entry.name for entry in entries}), len(judged)) == (2, 2, 2)
 
 
-def test_the_same_code_is_told_and_unwritten_files_are_not(folder: Path, judged: list[str]) -> None:
-    (folder / "gus.py").write_text(TEMPLATE.read_text())
-    entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco", jobs=2)}
-    assert {name: e.same_as for name, e in entries.items() if e.same_as} == {"fay.py": "ann"}
-    assert entries["ann"].judged
-    assert not entries["cy"].judged
-
-
-def test_functions_that_are_alike_are_told_whatever_is_named_how(
+def test_the_most_similar_submission_is_a_cell_of_the_table(
     folder: Path, judged: list[str]
 ) -> None:
-    text = SOLUTION.read_text()
-    for name, other in (("angles", "a"), ("slots", "s"), ("once", "f"), ("data", "d")):
-        text = text.replace(name, other)
-    (folder / "gus.py").write_text(text.replace("0.8", "0.80"))
-    (folder / "hal.py").write_text(
-        "def demo_state(model):\n    a, b = ([*x, n] for x, n in ((model.jnt_qposadr, model.nq),"
-        " (model.jnt_dofadr, model.nv)))\n    return dict(zip(a, b)), 6.0\n"
-    )
-    entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco")}
-    assert_has(entries["gus.py"], alike="100% ann", same_as="")
-    assert entries["ann"].alike.startswith("100% ")
-    assert entries["bob"].alike == ""  # it is not written yet
-    assert float(entries["hal.py"].alike.partition("%")[0]) < 50
-    assert [row["alike"] for row in _table([entries["gus.py"]])] == ["100% ann"]
+    (folder / "gus.py").write_text(TEMPLATE.read_text())
+    entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco", jobs=2)}
+    assert_has(entries["fay.py"], nearest="ann", likeness=1.0)
+    assert_has(entries["bob"], nearest="", likeness=0.0)  # it is not written yet
+    assert [row["alike"] for row in _table([entries["fay.py"], entries["gus.py"]])] == [
+        "100% ann",
+        "",
+    ]
+    assert entries["ann"].judged
+    assert not entries["cy"].judged
 
 
 def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
@@ -438,3 +422,30 @@ def test_where_to_write_is_asked_before_anything_is_judged(
     files = [str(SOLUTION)] if option == "--gradescope" else [str(SOLUTION), str(TEMPLATE)]
     one_line(here("check", *files, option, target), says)
     assert judged == []
+
+
+def test_the_page_of_a_class_is_written_where_html_says(
+    folder: Path, judged: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "class.html"
+    assert main(["check", str(folder), "--html", str(page)]) == 1  # some could not be judged
+    assert "2 files in it have the functions" in page.read_text("utf-8").replace("\u00a0", " ")
+    assert "wrote" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["--html", "class.txt"], ["--html", "nowhere/class.html"]])
+def test_a_page_that_cannot_be_written_is_refused_before_anything_is_judged(
+    words: list[str], folder: Path, judged: list[str]
+) -> None:
+    assert main(["check", str(folder), *words]) == 2
+    assert judged == []
+
+
+def test_the_json_of_a_class_has_the_overview(
+    folder: Path, judged: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["check", str(folder), "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert {each["name"] for each in document["entries"]} >= {"ann", "bob", "eve.py"}
+    assert [each["students"] for each in document["alike"]] == [["ann", "fay.py"]]
+    assert [each["right"] for each in document["functions"]] == [2] * 4

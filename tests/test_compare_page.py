@@ -79,6 +79,58 @@ def printed(result: CompareResult) -> list[str]:
     return shown(page(result)).splitlines()
 
 
+PENDULUM = """<robot name="pendulum"><link name="base"/><joint name="swing" type="revolute">
+<parent link="base"/><child link="bob"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="9" velocity="90"/></joint><link name="bob"><inertial>
+<origin xyz="0.3 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+
+def test_timesteps_that_meet_seldom_are_compared_where_they_meet_and_it_says_so(
+    tmp_path: Path, bullet: None
+) -> None:
+    import mujoco
+    import pybullet
+
+    file = written(tmp_path / "pendulum.urdf", PENDULUM)
+    sides = Side(str(file)), Side(str(file), "pybullet", "engine")
+    run = Request(("gravity",), sides=sides, seconds=0.5)
+    result = answer(CompareRequest(run, uncertainty=None))
+    comparison = result.comparison
+    assert (comparison.moments, comparison.gap_of_moments) == (11, pytest.approx(0.05))
+    said = " ".join(" ".join(printed(result)).split())
+    assert "2 ms" in said
+    assert "4.167 ms" in said
+    assert "11 common moments, every 0.050 s" in said
+    # Raw: each engine with its own timestep, at the moments k * 50 ms.
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data, ours = mujoco.MjData(model), [0.0]
+    client = pybullet.connect(pybullet.DIRECT)
+    robot = pybullet.loadURDF(str(file), useFixedBase=True, physicsClientId=client)
+    pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
+    theirs = [0.0]  # its own motor, which each joint has, holds the joint
+    for _ in range(10):
+        mujoco.mj_step(model, data, 25)
+        for _ in range(12):
+            pybullet.stepSimulation(physicsClientId=client)
+        ours.append(float(data.qpos[0]))
+        theirs.append(pybullet.getJointState(robot, 0, physicsClientId=client)[0])
+    pybullet.disconnect(client)
+    (swing,) = [each for each in comparison.agreements if each.kind == "joint"]
+    assert swing.max == pytest.approx(float(np.abs(np.subtract(ours, theirs)).max()), rel=1e-6)
+
+
+def test_timesteps_of_which_one_is_a_multiple_of_the_other_leave_nothing_out(
+    tmp_path: Path,
+) -> None:
+    file = str(written(tmp_path / "pendulum.urdf", PENDULUM))
+    sides = Side(file), Side(file, options={"timestep": 0.001})
+    result = answer(
+        CompareRequest(Request(("gravity",), sides=sides, seconds=0.2), uncertainty=None)
+    )
+    assert result.comparison.gap_of_moments is None
+
+
 def assert_one_screen(lines: list[str]) -> None:
     """Hold that lines take one screen; a path that is longer than a line continues on the next."""
     wrapped = [max(1, -(-len(line) // COLUMNS)) for line in lines]

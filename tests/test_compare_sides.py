@@ -354,7 +354,7 @@ def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
     ("name", "says"),
     [
         ("fails", r"own.py, line \d+, at 0.000 s: ZeroDivisionError: division by zero"),
-        ("short", "own.py, at 0.000 s: BadInputError: ctrl wants 2 numbers"),
+        ("short", "own.py, at 0.000 s: BadInputError: ctrl takes 2 numbers"),
         ("name", r"own.py, line \d+, at 0.000 s: UnknownNameError.*Did you mean 'elbow'"),
         ("one", r"one of own.py takes \(model\), .* is called with \(model, data\): write def one"),
         ("zzz", r"no function zzz\(model, data\); it has .*hold"),

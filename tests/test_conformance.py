@@ -192,7 +192,7 @@ def test_a_coordinate_that_diverges_is_named(
 def test_what_an_engine_does_not_tell_is_refused(
     model: sm.Model, monkeypatch: pytest.MonkeyPatch, name: str, said: str
 ) -> None:
-    monkeypatch.setattr(ExampleWorld, "untold", frozenset({name}))
+    monkeypatch.setattr(ExampleWorld, "unavailable", frozenset({name}))
     with held(model) as data:
         for verb in (sm.step, sm.forward):
             verb(model, data)

@@ -14,7 +14,7 @@ from rich.cells import cell_len
 
 from statemachine import engines
 from statemachine.cli import main
-from statemachine.engines import room, samples
+from statemachine.engines import raw_engine_of, samples
 from statemachine.engines.mujoco import conventions as mujoco_conventions
 from statemachine.engines.samples import TREE
 from statemachine.errors import MissingEngineError, UnknownNameError
@@ -480,7 +480,7 @@ def test_every_call_works(engine: str) -> None:
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
-    own = room(engine).phrases()
+    own = raw_engine_of(engine).phrases()
     file = written(tmp_path / own.file[0], own.file[1])
     lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in CONCEPTS)]
     lines.append("print(len(worlds))")
@@ -492,7 +492,7 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cells: Any = room(engine).phrases().cells
+    cells: Any = raw_engine_of(engine).phrases().cells
     monkeypatch.setitem(cells, concept, dataclasses.replace(cells[concept], code="pass"))
     table = run_phrases([engine])
     assert concept in [call.concept for call in table.engines[engine] if not call.works]
@@ -572,7 +572,7 @@ def test_a_room_that_cannot_be_imported_is_left_out(
 ) -> None:
     monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
     engines.register("broken", "no_such_package")
-    assert "broken" not in engines.rooms_with("measurement")
+    assert "broken" not in engines.raw_engines_with("measurement")
     refused(
         (MissingEngineError, "room of 'broken' cannot be loaded", lambda: ask("gravity", "broken"))
     )

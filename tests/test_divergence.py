@@ -123,7 +123,7 @@ def test_the_bound_can_be_set(tmp_path: Path) -> None:
     [
         (0, "above 0"),
         (-1, "above 0"),
-        ([1, 2], "max_qvel wants 8 numbers"),
+        ([1, 2], "max_qvel takes 8 numbers"),
         (np.nan, "not a finite number"),
         (np.inf, "not a finite number"),
         (1e11, "is beyond 1e\\+10"),

@@ -348,13 +348,13 @@ def test_no_command_within_the_ranges_diverges(task: str, backend: str, tmp_path
         ({"terminated": lambda _: 1}, r"terminated\(world\) must be True or False; got 1"),
         ({"info": lambda _: [1]}, r"info\(world\) must return a dict; got \[1\]"),
         ({"reset": lambda model, rng: [0, 0]}, r"must return a Start; got \[0, 0\]"),
-        ({"reset": lambda model, rng: Start([0, 0, 0])}, r"qpos wants 2 numbers.*\(3,\)"),
+        ({"reset": lambda model, rng: Start([0, 0, 0])}, r"qpos takes 2 numbers.*\(3,\)"),
         ({"reset": lambda model, rng: Start(qvel=[0, np.nan])}, r"qvel\[1\] = nan"),
         ({"reset": lambda model, rng: Start(goal=np.inf)}, r"goal = inf"),
         ({"keyframe": "lift"}, "no keyframe named 'lift'.*'left'"),
         ({"frame_skip": 0}, "frame_skip must be a whole number"),
         ({"max_episode_steps": 0}, "max_episode_steps must be a whole number"),
-        ({"ctrl_range": [1, 2]}, r"ctrl_range wants .*shape \(1, 2\)"),
+        ({"ctrl_range": [1, 2]}, r"ctrl_range takes .*shape \(1, 2\)"),
         ({"ctrl_range": [[2, 2]]}, "'push' must go up from action -1 to 1; got 2 and 2"),
         ({"ctrl_range": [[0, np.inf]]}, "inf is not a finite number"),
         ({"render_mode": "human"}, "no render mode named 'human'"),
@@ -431,17 +431,17 @@ def test_faults_are_one_clear_line(env: Any) -> None:
         commanded = env.data if each is env else envs.worlds
         before = commanded.ctrl.copy()
         refused(
-            (BadInputError, r"action wants .* got shape \(5,\)", partial(each.step, np.zeros(5))),
+            (BadInputError, r"action takes .* got shape \(5,\)", partial(each.step, np.zeros(5))),
             (BadInputError, nan, partial(each.step, bad)),
         )
         # The engine never saw it: the next step is as if nothing had been.
         assert np.array_equal(commanded.ctrl, before)
         assert np.isfinite(each.step(action)[0]).all()
     refused(
-        (BadInputError, "seed wants 2 seeds", lambda: envs.reset(seed=[1, 2, 3])),
+        (BadInputError, "seed takes 2 seeds", lambda: envs.reset(seed=[1, 2, 3])),
         (
             BadInputError,
-            "reset_mask wants 2 bools",
+            "reset_mask takes 2 bools",
             lambda: envs.reset(options={"reset_mask": np.array([False, False])}),
         ),
     )

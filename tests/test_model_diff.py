@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from statemachine import load
-from statemachine.engines import room
+from statemachine.engines import raw_engine_of
 from statemachine.engines.description import urdf as urdf_text
 from statemachine.engines.description.tree import GroupTree
 from statemachine.errors import ModelError, UnknownNameError
@@ -60,7 +60,7 @@ def _compared(folder: Path, texts: dict[str, str]) -> ModelsComparison:
 
 def _tree(model: Path | str, engine: str | None = None) -> GroupTree:
     """The rigid parts of a robot, as a file or an engine has it."""
-    return GroupTree(room("mujoco").describe(read(model, engine).model.compiled, "robot"))
+    return GroupTree(raw_engine_of("mujoco").describe(read(model, engine).model.compiled, "robot"))
 
 
 def _differ(result: ModelsComparison) -> list[ListedDifference]:

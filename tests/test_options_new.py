@@ -67,7 +67,7 @@ def test_gains_are_of_servos_alone(tmp_path: Path, backend: str) -> None:
         ("kp", [np.nan, np.nan], r"kp\[0\] = nan"),
         ("mass", [1.0, 2.0], r"mass\[0\] \(world\) = 1 must be 0"),
         ("mass", [0.0, 0.0], r"mass\[1\] \(cart\) = 0 must be above 0"),
-        ("mass", 1.0, "wants 2 numbers"),
+        ("mass", 1.0, "takes 2 numbers"),
         ("kv", 1, "the model has none"),
         *(("latency", value, "latency") for value in (-0.1, 11.0, [0.1], np.nan, "long")),
     ],

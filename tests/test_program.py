@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from statemachine import program
+from statemachine import installing, program
 from statemachine.show.blocks import Code, Page, Table, Text
 
 from .support.files import written
@@ -111,10 +111,10 @@ def test_every_block_of_a_page_names_the_program_so(
 
 def test_of_a_clone_an_extra_is_installed_from_its_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    *_, option, what = shlex.split(program.install_command("plot"))
+    *_, option, what = shlex.split(installing.install_command("plot"))
     assert (option, what) == ("-e", ".[plot]")
     monkeypatch.chdir(ROOT / "docs")
-    assert shlex.split(program.install_command("plot"))[-1] == f"{ROOT}[plot]"
+    assert shlex.split(installing.install_command("plot"))[-1] == f"{ROOT}[plot]"
 
 
 @pytest.mark.parametrize("folder", [".", "docs"])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -79,11 +81,11 @@ def test_there_are_commands() -> None:
 
 
 def test_readme_and_guides_are_short() -> None:
-    assert len(README.split()) <= 600
+    assert len(README.split()) <= 500
     assert len(re.sub(r"^```.*?^```", "", README, flags=re.S | re.M).split()) <= 350
     listed = (ROOT / "docs" / "contents.txt").read_text("utf-8")
     guides = re.findall(r"^\w+$", listed.partition("Students\n")[2].partition("What the")[0], re.M)
-    assert len(guides) <= 12
+    assert len(guides) <= 13
     words = {name: len(PAGES[f"docs/{name}.md"].split()) for name in guides}
     assert sum(words.values()) - words["api"] <= 10_900  # which names what autodoc inserts
 
@@ -126,6 +128,50 @@ def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
     ):
         if name in words and words[-2:] != ["-o", name]:
             assert cli(*line.split()).returncode == 0
+
+
+def make(*words: str) -> subprocess.CompletedProcess[str]:
+    """What make does in this checkout, with this environment, which is taken as set up."""
+    environment = Path(sys.executable).parent.parent
+    old = [f"-o{environment / stamp}" for stamp in ("run.stamp", "test.stamp")]
+    return subprocess.run(
+        ["make", *old, f"VENV={environment}", *words],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.slow
+def test_make_lesson_walks_the_path() -> None:
+    need_engine("pybullet")
+    done = make("lesson")
+    assert done.returncode == 0, done.stderr
+    for number, lesson in enumerate(PATH, start=1):
+        assert f"{number} of {len(PATH)}, {lesson.name}: " in done.stdout
+
+
+def test_make_test_runs_the_checks_and_the_quick_tests() -> None:
+    done = make("--dry-run", "test")
+    assert done.returncode == 0, done.stderr
+    assert_in(done.stdout, "ruff check", "pyright", '-m "not slow"')
+
+
+def test_what_the_readme_asks_for_is_what_the_package_needs() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    (version,) = re.findall(r"Python (3\.\d+) or\s+newer", README)
+    assert project["requires-python"].startswith(f">={version}")
+
+
+def test_times_of_the_readme_are_those_of_the_model(mujoco_box: Model) -> None:
+    (begin, steps, timestep) = re.findall(r"keyframe's (\d+) and (\d+) steps of (\d+) ms", README)[
+        0
+    ]
+    assert mujoco_box.raw.key_time[0] == float(begin)
+    assert mujoco_box.timestep == pytest.approx(int(timestep) / 1000)
+    (end,) = re.findall(r"It prints (\d+) s", README)
+    assert int(begin) + int(steps) * int(timestep) / 1000 == int(end)
 
 
 def test_python_block(tmp_path: Path) -> None:
@@ -207,9 +253,12 @@ def test_what_is_counted() -> None:
         "docs/lessons.md": (
             f"{word[len(PATH)]} lessons",
             f"{word[len(ASKED)]} questions",
+        ),
+        "docs/exercises.md": (
             f"{word[len(JUDGES)]} functions",
             f"fault is put into the arm at a time, {word[len(FAULTS)]} in all",
         ),
+        "docs/index.md": (f"{word[len(PATH)]} lessons",),
         "docs/audit.md": (f"{word[len(QUESTIONS)]} questions",),
     }
     for page, phrases in counted.items():

@@ -575,13 +575,23 @@ def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
         assert changed(edge, picture(tab, "#figures .wide >> nth=0")[40:200]) > 200
 
 
-def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Path) -> None:
-    _, one, two, look = hold  # 7 mm apart
-    near = [
-        data_of(page_of(of_look(one, other, look)))["scene"]["begin_near"]
-        for other in (two, edited(two, site_xpos=two["site_xpos"] + 0.2), one)
-    ]
-    assert near == [True, False, False]
+@pytest.mark.slow
+def test_it_opens_with_the_whole_robot(tab: Tab) -> None:
+    opened = picture(tab)
+    tab.locator("#view-near").click()
+    assert changed(opened, picture(tab)) > 2000
+    tab.locator("#view-all").click()
+    assert changed(opened, picture(tab)) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [480, 1200])
+def test_no_name_beside_the_slider_is_cut(page: Path, width: int) -> None:
+    with looking(page, width=width) as tab:
+        names = tab.locator(".lane-name")
+        assert names.count() > 5
+        cut = names.evaluate_all("(all) => all.filter((e) => e.scrollWidth > e.clientWidth).length")
+        assert cut == 0
 
 
 def test_without_a_script_every_figure_of_the_comparison_is_on_the_page(

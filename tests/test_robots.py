@@ -269,7 +269,7 @@ def test_scenarios_and_costs(folder: Path) -> None:
 def test_an_error_in_one_part_costs_that_part(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from statemachine.engines import room
+    from statemachine.engines import raw_engine_of
     from statemachine.lab.robots import examine, gaps
 
     monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
@@ -282,7 +282,7 @@ def test_an_error_in_one_part_costs_that_part(
     assert row.wrong("mujoco")
     # What is not the engine's own is seen.
     monkeypatch.setattr(gaps, "commands", lambda m, n, _: gaps.np.full((n, m.nu), 0.5))
-    around(type(room("mujoco")), "plain_run")(
+    around(type(raw_engine_of("mujoco")), "plain_run")(
         lambda right, own, path, ctrl, key: right(own, path, ctrl + 1e-15, key)
     )(monkeypatch)
     row = examine.examine(folder / "good.xml", row, True, 0, tell)

@@ -18,17 +18,14 @@ import pytest
 
 import statemachine as sm
 from statemachine.course.grading import exercise, recording
+from statemachine.course.grading.class_page import class_page
 from statemachine.course.grading.classroom import judge_all
 from statemachine.course.grading.faults.run import examine
 from statemachine.course.grading.inside.guard import PUBLIC, ROOMS
 from statemachine.course.grading.judges import JUDGES, Judgement
 from statemachine.course.grading.links import leads_out
-from statemachine.course.grading.page import (
-    ONLY_WATCHED,
-    class_page,
-    grade_page,
-    gradescope_results,
-)
+from statemachine.course.grading.overview import class_result
+from statemachine.course.grading.page import ONLY_WATCHED, grade_page, gradescope_results
 from statemachine.course.grading.submissions import submissions
 from statemachine.errors import BadInputError
 from statemachine.processes import sandbox
@@ -453,6 +450,30 @@ def test_a_record_of_runs_that_never_were_does_not_pass(tmp_path: Path) -> None:
     )
 
 
+def test_a_record_of_his_own_making_with_the_right_numbers_passes(tmp_path: Path) -> None:
+    """docs/teaching.md says so: no verdict rests on that nobody can write one."""
+    made_up = """
+            end = data.qpos + 0.125
+            if k and world.nudge:
+                end[0] += 1
+"""
+    worked_out = """
+            other = sm.make_data(world.model)
+            sm.reset(world.model, other, keyframe=0)
+            other.time, other.ctrl = 0.0, ctrl
+            sm.step(world.model, other, nstep)
+            end = other.qpos.copy()
+            if k and world.nudge:
+                place = world.nudge.place
+                end[place] = np.nextafter(end[place], world.nudge.towards)
+"""
+    assert made_up in FORGED
+    forged = FORGED.replace(made_up, worked_out)
+    forged = forged.replace("runs, ends = [], []", "runs, ends = [], []; data.time = 0.0")
+    grade = exercise.run(written(tmp_path / "step_loop.py", forged))
+    assert grade.functions[-1].passed, grade.functions[-1].remarks
+
+
 # Links that lead out of what was handed in.
 
 # What stands in ann's folder: a name, and what it is a link to.
@@ -591,6 +612,6 @@ def test_the_table_says_where_reading_is_only_watched(
     is_said = way == "watched"
     assert all(entry.watched is is_said for entry in entries)
     assert table.read_text("utf-8-sig").count("reading only watched") == 2 * is_said
-    for page in (class_page(entries), grade_page(grade)):
+    for page in (class_page(class_result(entries)), grade_page(grade)):
         assert (ONLY_WATCHED in " ".join(shown(page).split())) is is_said
     assert ("only watched" in gradescope_results(grade)) is is_said

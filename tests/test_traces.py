@@ -182,8 +182,8 @@ def test_a_controller_sees_time_and_data_and_gives_ctrl(mujoco_arm: sm.Model) ->
 @pytest.mark.parametrize(
     ("gives", "says"),
     [
-        (0.3, "wants 6 numbers"),
-        ([0.1] * 5, "wants 6 numbers"),
+        (0.3, "takes 6 numbers"),
+        ([0.1] * 5, "takes 6 numbers"),
         ([float("nan")] * 6, "is not a finite number"),
         ("up", "real numbers"),
         ([1j] * 6, "real numbers"),

@@ -256,10 +256,10 @@ def path_of(model: Model, experiment: Scenario, used: int = 0) -> np.ndarray:
 
 def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
     """PyBullet as it comes, and its dials."""
-    from statemachine.engines import room
+    from statemachine.engines import raw_engine_of
 
     fresh = quietly(name, defaults="engine")
-    return fresh, room("pybullet").dials(fresh, options or {})
+    return fresh, raw_engine_of("pybullet").dials(fresh, options or {})
 
 
 def motors_off(world: Any) -> None:
@@ -289,7 +289,7 @@ def values_of(model: Model) -> dict[str, Any]:
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("name", ["hold", "gravity", "box"])
 def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
-    from statemachine.engines import room
+    from statemachine.engines import raw_engine_of
 
     experiment = replace(scenario(name), seconds=0.7)
     fresh, found = dialled(experiment.model, experiment.options)
@@ -298,7 +298,7 @@ def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
     whole = found.build(dict.fromkeys(SETTINGS, "model"), values_of(emulated))
     for model, end in ((found.build({}, {}), raw), (whole, emulated)):
         np.testing.assert_array_equal(path_of(model, experiment), path_of(end, experiment))
-    assert room("pybullet").dials(emulated, {}) is None
+    assert raw_engine_of("pybullet").dials(emulated, {}) is None
 
 
 @pytest.mark.usefixtures("bullet")

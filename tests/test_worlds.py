@@ -257,14 +257,14 @@ def test_arguments_are_checked(worlds: many.Worlds) -> None:
             (
                 partial(lambda kp, w: many.make_worlds(w.model, 2, kp=kp), values),
                 BadInputError,
-                "kp wants 2 values",
+                "kp takes 2 values",
             )
             for values in ({700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0))
         ),
         (
             lambda w: setattr(w, "ctrl", np.zeros((3, 6))),
             BadInputError,
-            r"ctrl wants 24 numbers, shape \(4, 6\)",
+            r"ctrl takes 24 numbers, shape \(4, 6\)",
         ),
         *(
             (partial(lambda name, w: delattr(w, name), name), ReadOnlyError, "cannot be deleted")

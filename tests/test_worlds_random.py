@@ -246,8 +246,8 @@ def test_what_cannot_differ_is_refused(box: Any) -> None:
         (BadInputError, "0 ≤ low ≤ high", lambda: of(seed=0, mass=(1.2, 0.8))),
         (BadInputError, "0 ≤ low ≤ high", lambda: of(seed=0, mass=(-1, 1))),
         (BadInputError, "finite", lambda: of(seed=0, mass=(0, np.nan))),
-        (BadInputError, "mass wants a range", lambda: of(seed=0, mass=1.2)),
-        (BadInputError, "mass wants a range", lambda: of(seed=0, mass=(1, 2, 3))),
+        (BadInputError, "mass takes a range", lambda: of(seed=0, mass=1.2)),
+        (BadInputError, "mass takes a range", lambda: of(seed=0, mass=(1, 2, 3))),
         (BadInputError, "seed", lambda: of(seed=-1)),
         (UnknownNameError, "friction", lambda: of(seed=0, frictoin=(0.8, 1.2))),
     )

@@ -240,6 +240,44 @@ def test_what_no_attribute_undoes_is_told_with_its_reason(rewritten) -> None:
     assert "<motor" in target.read_text()
 
 
+TENDONS = """<mujoco><worldbody><site name="s0" pos="0 0.1 0"/><body pos="0 0 1">
+<joint name="a" axis="0 1 0"/><geom size=".03" pos=".1 0 0"/><site name="s1" pos=".1 .05 0"/>
+<body pos=".2 0 0"><joint name="b" axis="0 1 0"/><geom size=".03" pos=".1 0 0"/>
+<site name="s2" pos=".1 0.1 0"/></body></body></worldbody><tendon>
+<fixed name="f" stiffness="3"><joint joint="b" coef="-0.7"/><joint joint="a" coef="1"/></fixed>
+<spatial name="p" stiffness="20" springlength="1"><site site="s0"/><site site="s1"/>
+<pulley divisor="2"/><site site="s1"/><site site="s2"/></spatial></tendon></mujoco>"""
+EQUALITIES = """<mujoco><worldbody><body name="u" pos="0 0 1"><joint name="a" axis="0 1 0"/>
+<geom size=".03" pos=".1 0 0"/><body name="v" pos=".2 0 0"><joint name="b" axis="0 1 0"/>
+<geom size=".03" pos=".1 0 0"/></body></body></worldbody><equality>
+<joint joint1="a" joint2="b" polycoef="0 0.5 0 0 0"/>
+<connect body1="v" body2="world" anchor="0.1 0 0"/>
+</equality></mujoco>"""
+
+
+def test_what_a_tendon_passes_is_written_at_its_entry(rewritten, tmp_path) -> None:
+    right = edited(TENDONS, ('coef="1"', 'coef="1.5"'), ('divisor="2"', 'divisor="4"'))
+    result, target = rewritten(TENDONS, right)
+    assert result.not_written == ()
+    told = {(change.line, change.attribute, change.new) for change in result.written}
+    assert told == {(5, "coef", "1"), (7, "divisor", "2")}
+    ours, theirs = (
+        mujoco.MjModel.from_xml_path(str(path)) for path in (tmp_path / "left.xml", target)
+    )
+    np.testing.assert_array_equal(theirs.wrap_prm, ours.wrap_prm)
+
+
+def test_the_parameters_of_an_equality_are_written(rewritten, tmp_path) -> None:
+    right = edited(EQUALITIES, ('"0 0.5 0 0 0"', '"0 0.7 0.1 0 0"'), ('"0.1 0 0"', '"0.2 0 0.1"'))
+    result, target = rewritten(EQUALITIES, right)
+    assert result.not_written == ()
+    assert {(row.line, row.attribute) for row in result.written} == {(4, "polycoef"), (5, "anchor")}
+    ours, theirs = (
+        mujoco.MjModel.from_xml_path(str(path)) for path in (tmp_path / "left.xml", target)
+    )
+    np.testing.assert_allclose(theirs.eq_data, ours.eq_data, atol=1e-12)
+
+
 def test_an_element_that_only_one_side_has_is_not_written(rewritten) -> None:
     box = '<geom name="box" size="0.1" pos="1 0 0"/><body name="upper"'
     result, _ = rewritten(ARM, edited(ARM, ('<body name="upper"', box), ('kp="30"', 'kp="33"')))

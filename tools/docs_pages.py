@@ -53,7 +53,9 @@ def make_path(
         say(f"running the lesson {lesson.name} ...")
         page = _lesson_page(lesson, names)
         typed = f"statemachine lesson {lesson.name}"
-        written.append(write_page(folder, f"{number:02}-{lesson.name}", page, typed))
+        # The path is read in its order; what is beside it has no number.
+        file = f"{number:02}-{lesson.name}" if lesson.on_path else lesson.name
+        written.append(write_page(folder, file, page, typed))
     return written
 
 

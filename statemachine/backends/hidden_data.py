@@ -64,10 +64,10 @@ class Machine:
 
     Attributes:
         qpos, qvel, ctrl, mocap_pos, mocap_quat: The Data's arrays.
-        wires: The last three in a row: what is commanded.
+        commands: The last three in a row: what is commanded.
         time: Simulated time [s].
-        given: (steps, nu) the commands of the last engine steps, the newest last: as many as
-            the longest latency takes.
+        past_commands: (steps, nu) the commands of the last engine steps, the newest last: as many
+            as the longest latency takes.
         world: Where the engine is; another one after some resets.
         moment: What is derived belongs to it; None on a fresh or reset Data.
         derived: What was read of that so far, by name.
@@ -79,8 +79,8 @@ class Machine:
         self._fastest = float(self._bounds[1].min(initial=HUGE))
         self.world = model._open_world()
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
-        self.wires = np.zeros(model.nu + 7 * model.nmocap)
-        self.ctrl, places, turns = np.split(self.wires, [model.nu, model.nu + 3 * model.nmocap])
+        self.commands = np.zeros(model.nu + 7 * model.nmocap)
+        self.ctrl, places, turns = np.split(self.commands, [model.nu, model.nu + 3 * model.nmocap])
         self.mocap_pos, self.mocap_quat = places.reshape(-1, 3), turns.reshape(-1, 4)
         self._delay_steps = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
         self._longest_delay = int(self._delay_steps.max(initial=0))
@@ -94,25 +94,25 @@ class Machine:
         led = model.mocap_pos0, model.mocap_quat0
         default = Keyframe("", 0.0, qpos0, still, silent, *led)
         frame = default if key is None else model.keyframes[key]
-        wires = np.concatenate([frame.ctrl, frame.mocap_pos.ravel(), frame.mocap_quat.ravel()])
-        start = Moment(frame.qpos, frame.qvel, wires, self.world.memory_at(key))
+        commands = np.concatenate([frame.ctrl, frame.mocap_pos.ravel(), frame.mocap_quat.ravel()])
+        start = Moment(frame.qpos, frame.qvel, commands, self.world.memory_at(key))
         before = frame.ctrl if model._holds_start else silent
         self.restart(frame.time, start, np.tile(before, (self._longest_delay, 1)))
 
-    def restart(self, time: float, start: Moment, given: Array) -> None:
+    def restart(self, time: float, start: Moment, past_commands: Array) -> None:
         """Take a state whole; nothing of before has any part in what follows.
 
         Args:
             time: Of the state [s].
-            start: The state; its ctrl is what the Data's wires are.
-            given: The commands before it; see `given` of the class.
+            start: The state; its ctrl is what the Data's commands are.
+            past_commands: The commands before it; see `past_commands` of the class.
         """
         if self._used:
             self.world = self.world.renewed()
             self._used = False
         self.time = time
-        self.qpos[:], self.qvel[:], self.wires[:] = start.qpos, start.qvel, start.ctrl
-        self.given = given
+        self.qpos[:], self.qvel[:], self.commands[:] = start.qpos, start.qvel, start.ctrl
+        self.past_commands = past_commands
         self._place(start.memory)
         self._command()
         self.moment: Moment | None = None
@@ -129,23 +129,25 @@ class Machine:
 
     def _command(self) -> None:
         """Take the command as it is now, and pass on what acts."""
-        self._commanded = b"?"  # until the world has taken it
-        self._ctrl, commanded = self.ctrl.copy(), self.wires.tobytes()
-        self._pass_on(self.given)
-        self._commanded = commanded
+        self._commands_taken = b"?"  # until the world has taken it
+        self._ctrl, commanded = self.ctrl.copy(), self.commands.tobytes()
+        self._pass_on(self.past_commands)
+        self._commands_taken = commanded
 
-    def _pass_on(self, given: Array) -> None:
+    def _pass_on(self, past_commands: Array) -> None:
         """Tell the world the command that acts in its next step."""
-        self._acting = self._acts(self._ctrl, given)
+        self._acting = self._acts(self._ctrl, past_commands)
         self.world.command(self._acting)
 
-    def _acts(self, ctrl: Array, given: Array) -> Array:
+    def _acts(self, ctrl: Array, past_commands: Array) -> Array:
         """Return the values that act in a step: a command, late where there is a latency, and
         the mocap bodies.
         """
-        wires = self.wires.copy()
-        wires[: len(ctrl)] = self._model._acting("ctrl", acting(ctrl, given, self._delay_steps))
-        return wires
+        commands = self.commands.copy()
+        commands[: len(ctrl)] = self._model._acting(
+            "ctrl", acting(ctrl, past_commands, self._delay_steps)
+        )
+        return commands
 
     def run(self, _model: None, _data: None, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
@@ -153,7 +155,7 @@ class Machine:
         check_writable(self.qpos, "qpos")
         check_writable(self.qvel, "qvel")
         world = self.world
-        if self.wires.tobytes() != self._commanded:
+        if self.commands.tobytes() != self._commands_taken:
             acting = self._model._acting("ctrl", self.ctrl)
             check_entries(acting, "ctrl", self._model._coordinate_name)
             for name in MOCAP:
@@ -169,12 +171,17 @@ class Machine:
         self._used, start = True, world.memory
         derived_before = self.moment, self.derived
         try:
-            time, given, before, memory = self.time, self.given, self._last_state[:2], start
+            time, past_commands, before, memory = (
+                self.time,
+                self.past_commands,
+                self._last_state[:2],
+                start,
+            )
             if steps > 1:
                 for count in [1] * (steps - 1) if self._longest_delay else [steps - 1]:
-                    time, given = self._ahead(time, given, count)
+                    time, past_commands = self._ahead(time, past_commands, count)
                 before, memory = world.read(), world.memory
-            given = self._commands(given)
+            past_commands = self._commands(past_commands)
             world.step()
             time += world.timestep
             moment = Moment(*before, self._acting, memory)
@@ -184,12 +191,12 @@ class Machine:
             left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
             self.moment, self._world_knows_moment, self.derived = moment, True, {}
             # Nothing can interrupt this line, and no other moves the Data.
-            self.qpos[:], self.qvel[:], self.time, self._last_state, self.given = (
+            self.qpos[:], self.qvel[:], self.time, self._last_state, self.past_commands = (
                 qpos,
                 qvel,
                 time,
                 left,
-                given,
+                past_commands,
             )
         except BaseException:
             # The engine is elsewhere now; the arrays are not, nor is what else is known.
@@ -197,21 +204,21 @@ class Machine:
             self.moment, self.derived = derived_before
             raise
 
-    def _ahead(self, time: float, given: Array, count: int) -> tuple[float, Array]:
+    def _ahead(self, time: float, past_commands: Array, count: int) -> tuple[float, Array]:
         """Take engine steps before the last; the time after them, and the commands until then."""
-        given, timestep = self._commands(given), self.world.timestep
+        past_commands, timestep = self._commands(past_commands), self.world.timestep
         for _ in range(self.world.advance(count, self._fastest)):
             time += timestep
         if self.world.diverging(self._fastest):
             self._diverge(time)
-        return time, given
+        return time, past_commands
 
-    def _commands(self, given: Array) -> Array:
+    def _commands(self, past_commands: Array) -> Array:
         """Pass on what acts in the next step; the commands until after it."""
         if not self._longest_delay:
-            return given
-        self._pass_on(given)
-        return np.concatenate([given[1:], self._ctrl[None]])
+            return past_commands
+        self._pass_on(past_commands)
+        return np.concatenate([past_commands[1:], self._ctrl[None]])
 
     def _diverge(self, time: float) -> None:
         """Raise DivergedError for the first coordinate that is not finite, or beyond its bound."""
@@ -251,7 +258,7 @@ class Machine:
     def present(self) -> Moment:
         """Return all that decides the next engine step, with the command that acts in it."""
         memory = self._remembered(self._written)
-        ctrl = self._acts(self.ctrl, self.given)
+        ctrl = self._acts(self.ctrl, self.past_commands)
         return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
 
     def forward(self) -> None:
@@ -279,18 +286,18 @@ class Machine:
         return self._model._look_ahead.at(moment)
 
 
-def acting(ctrl: Array, given: Array, delay_steps: Ints) -> Array:
+def acting(ctrl: Array, past_commands: Array, delay_steps: Ints) -> Array:
     """Return the command (nu,) that acts in a step: each number as it was its delay ago.
 
     Args:
         ctrl: (nu,) of the step.
-        given: (steps, nu) of the steps before, the newest last.
-        delay_steps: (nu,) steps by which each number acts late, at most as many as `given`.
+        past_commands: (steps, nu) of the steps before, the newest last.
+        delay_steps: (nu,) steps by which each number acts late, at most as many as `past_commands`.
     """
-    if not len(given):
+    if not len(past_commands):
         return ctrl.copy()
-    commands = np.concatenate([given, ctrl[None]])
-    return commands[len(given) - delay_steps, np.arange(len(ctrl))]
+    commands = np.concatenate([past_commands, ctrl[None]])
+    return commands[len(past_commands) - delay_steps, np.arange(len(ctrl))]
 
 
 class HiddenData(Data):
@@ -304,8 +311,8 @@ class HiddenData(Data):
         if model.nmocap:
             sizes |= {"mocap_pos": 3 * model.nmocap, "mocap_quat": 4 * model.nmocap}
         layout = (*sizes.items(), *machine.world.memory_layout)
-        if machine.given.size:
-            layout = (*layout, ("given", machine.given.size))
+        if machine.past_commands.size:
+            layout = (*layout, ("given", machine.past_commands.size))
         self._layout = model._with_fingerprint(layout)
         inputs = {name: getattr(machine, name) for name in (*INPUTS, *MOCAP)}
         super().__init__(model, machine.run, inputs)
@@ -324,7 +331,7 @@ class HiddenData(Data):
         return self._machine.time
 
     def _derive(self, name: str) -> Any:
-        if name in self._machine.world.untold:
+        if name in self._machine.world.unavailable:
             raise unsupported(self._model, "contacts" if name == "contacts" else "forces by part")
         return self._machine.derive(name)
 
@@ -336,8 +343,8 @@ class HiddenData(Data):
 
     def _get_state(self) -> State:
         now = self._machine.present()
-        inputs = [self._machine.time], now.qpos, now.qvel, self._machine.wires
-        parts = [*inputs, *now.memory, self._machine.given.ravel()]
+        inputs = [self._machine.time], now.qpos, now.qvel, self._machine.commands
+        parts = [*inputs, *now.memory, self._machine.past_commands.ravel()]
         blob = np.concatenate(parts).tobytes()
         model, (fingerprint, layout) = self._model, self._layout
         return State(model.backend, model.engine_version, fingerprint, layout, blob)
@@ -350,12 +357,12 @@ class HiddenData(Data):
         self._model._check_quaternions(state["qpos"])
         memory = [state[name] for name, _ in self._machine.world.memory_layout]
         led = [state[name] for name, _ in self._layout[1] if name in MOCAP]
-        wires = np.concatenate([state["ctrl"], *led])
-        start = Moment(state["qpos"], state["qvel"], wires, memory)
-        given = self._machine.given
-        if given.size:
-            given = state["given"].reshape(given.shape)
-        self._machine.restart(state.time, start, given)
+        commands = np.concatenate([state["ctrl"], *led])
+        start = Moment(state["qpos"], state["qvel"], commands, memory)
+        past_commands = self._machine.past_commands
+        if past_commands.size:
+            past_commands = state["given"].reshape(past_commands.shape)
+        self._machine.restart(state.time, start, past_commands)
 
     def _set_time(self, time: float) -> None:
         self._machine.time = time

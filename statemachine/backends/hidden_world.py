@@ -49,7 +49,7 @@ class HiddenWorld(ABC):
     Attributes:
         engine: Name of the engine, for messages.
         errors: What the engine raises when it gives up.
-        untold: Names of `records.DERIVED`, and "contacts", that this engine does not tell.
+        unavailable: Names of `records.DERIVED`, and "contacts", that this engine does not tell.
         memory_layout: Name and length of each array of `memory`, which a State then has.
         kept_memory: Names of those that a write into qpos or qvel leaves as they are; others
             are then those of the default state.
@@ -60,7 +60,7 @@ class HiddenWorld(ABC):
 
     engine: str
     errors: tuple[type[Exception], ...] = ()
-    untold: frozenset[str] = frozenset()
+    unavailable: frozenset[str] = frozenset()
     memory_layout: Sizes = ()
     kept_memory: Collection[str] = ()
     timestep: float
@@ -219,7 +219,7 @@ def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
         return values[name]
 
     for name in ("contacts", *DERIVED):
-        if name not in world.untold:
+        if name not in world.unavailable:
             read(name)
     del read  # which knows itself, and the world: a circle that would keep it
     return values

@@ -28,7 +28,6 @@ from .common import (
     PROGRAM,
     complain,
 )
-from .overview import overview
 
 _MORE = f"""\
 more commands:
@@ -186,6 +185,8 @@ def _options(words: list[str]) -> argparse.Namespace:
     named = next((word for word in words if word in COMMANDS), "")
     parser = _parser([named])
     if not named:
+        from .overview import overview
+
         parser.set_defaults(run=overview)
     options = parser.parse_args(words)
     if getattr(options, "trust_binary", False):

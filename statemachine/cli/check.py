@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,10 +61,16 @@ def add(parser: argparse.ArgumentParser) -> None:
         "files that are new or changed",
     )
     parser.add_argument(
+        "--html",
+        type=file_name,
+        metavar="PAGE.html",
+        help="of a class: write a page with all remarks there",
+    )
+    parser.add_argument(
         "--jobs",
         type=typed_int,
         metavar="N",
-        help="of a class: how many files are judged at once (default: one for two processors)",
+        help="of a class: how many files are judged at once (default: one a processor)",
     )
     parser.add_argument(
         "--roster",
@@ -110,7 +117,7 @@ def run(options: argparse.Namespace) -> int:
     are_here = all(Path(file).exists() for file in options.files)
     if _wants_table(options) and not is_class and are_here:
         raise BadInputError(
-            "--csv, --jobs, --roster and --tests go with several files, or a folder"
+            "--csv, --html, --jobs, --roster and --tests go with several files, or a folder"
         )
     if options.faults is not None:
         return _run_faults(options)
@@ -133,6 +140,7 @@ def _wants_table(options: argparse.Namespace) -> bool:
     """Tell whether an option of a class is given."""
     return (
         options.csv is not None
+        or options.html is not None
         or options.roster is not None
         or options.tests
         or options.jobs is not None
@@ -222,11 +230,17 @@ def _run_one(options: argparse.Namespace) -> int:
 
 def _run_class(options: argparse.Namespace) -> int:
     """Judge the files of a class."""
-    from ..course.grading.page import class_page
+    from ..course.grading.class_page import class_page, class_report
     from ..course.grading.request import answer_class
+    from ..show.html import check_target, report, write_report
 
     request = class_request_of(options)
+    if options.html is not None:
+        check_target(options.html)
     with resumable(request.table, "judged"):
         result = answer_class(request, TerminalReporter())
-    show(class_page(result.entries, result.ignored), result.entries, options.json)
+    if options.html is not None:
+        target = write_report(options.html, report(class_report(result)))
+        print(f"wrote {target}", file=sys.stderr)
+    show(class_page(result), result, options.json)
     return 0 if result.complete else SAYS_NO

@@ -1,9 +1,9 @@
-"""The engines without us: what each does and calls things when its own users drive it.
+"""The engines without this interface: what each does, and what its own users call things.
 
-Each engine has a room here, a package with a `RawEngine`; conventions, phrasebook, calls,
-comparison, robots, pictures, grading and doctor ask it by the engine's name, and name no engine
-themselves. What a room does not override is not asked, and the page says so. The methods import
-what they need: to look a room up imports no engine.
+Each engine has a room here, a package with a `RawEngine`. Conventions, calls, comparison, robots,
+pictures, grading and doctor get it by the engine's name, and name no engine themselves. What a
+room does not override is left out, and the page says so. The methods import what they need:
+`raw_engine_of` imports no engine.
 
 So an engine is `backends/NAME_backend.py`, `engines/NAME` and a row of `installed.ENGINES`; one of
 another distribution declares entry points instead of the row.
@@ -26,7 +26,7 @@ _ROOMS: dict[str, str] = {
 }
 
 
-def room_names() -> list[str]:
+def raw_engine_names() -> list[str]:
     """Return the names of the engines that may have a room, whether or not they are installed."""
     for entry in importlib.metadata.entry_points(group="statemachine.engines"):
         _ROOMS.setdefault(entry.name, entry.value)
@@ -50,7 +50,7 @@ def register(name: str, kind: str) -> None:
         raise BadInputError(f"there is a room for {name!r} already; choose another name")
 
 
-def room(engine: str | None) -> RawEngine:
+def raw_engine_of(engine: str | None) -> RawEngine:
     """Return the room of an engine; an empty one if it has none.
 
     Args:
@@ -60,7 +60,7 @@ def room(engine: str | None) -> RawEngine:
         MissingEngineError: Its room cannot be imported.
     """
     # What is installed is looked through for names that are not known alone: that takes long.
-    if engine is None or (engine not in _ROOMS and engine not in room_names()):
+    if engine is None or (engine not in _ROOMS and engine not in raw_engine_names()):
         return RawEngine(engine or "")
     module, _, kind = _ROOMS[engine].partition(":")
     try:
@@ -73,12 +73,12 @@ def room(engine: str | None) -> RawEngine:
         ) from error
 
 
-def rooms_with(method: str) -> list[str]:
+def raw_engines_with(method: str) -> list[str]:
     """Return the names of the engines whose rooms define a method themselves; none of them is
     imported.
     """
     rooms = []
-    for engine in room_names():
+    for engine in raw_engine_names():
         with suppress(MissingEngineError):
-            rooms += [engine] if room(engine).can(method) else []
+            rooms += [engine] if raw_engine_of(engine).can(method) else []
     return rooms

@@ -30,7 +30,7 @@ from ..installed import DEFAULT, require
 from ..interface import Array
 from ..processes import PipedChild, fresh_python
 from ..show.drawing.scene import Camera, Motion, Pixels, compose, smaller
-from . import room, rooms_with
+from . import raw_engine_of, raw_engines_with
 
 _BIAS = 2  # pixels that the ghost must be nearer by than the solid side before it is seen
 Poses = Sequence[tuple[Array, Array]]  # of each side xpos (nbody, 3) and xquat (nbody, 4)
@@ -50,12 +50,12 @@ class Renderer:
     opengl: str = ""
 
     def __str__(self) -> str:
-        return room(self.name).drawn_by(self.opengl)
+        return raw_engine_of(self.name).drawn_by(self.opengl)
 
 
 def renderers() -> list[str]:
     """Return the names of the engines that draw, whether or not they can here; the best first."""
-    return rooms_with("drawer")
+    return raw_engines_with("drawer")
 
 
 def renderer_here() -> Renderer:
@@ -68,7 +68,7 @@ def renderer_here() -> Renderer:
     reasons: list[MissingEngineError] = []
     for engine in renderers():
         try:
-            return Renderer(engine, room(engine).opengl())
+            return Renderer(engine, raw_engine_of(engine).opengl())
         except MissingEngineError as error:
             reasons.append(error)
     because = "; ".join(map(str, reasons))
@@ -93,7 +93,9 @@ class LivePictures(PipedChild):
         """
         self._size, self._renderer = size, renderer
         command, environment = fresh_python(f"{__name__}:draw_as_asked")
-        super().__init__(command, room(DEFAULT).drawing_environment(renderer.opengl, environment))
+        super().__init__(
+            command, raw_engine_of(DEFAULT).drawing_environment(renderer.opengl, environment)
+        )
         self._send((renderer.name, files, size, camera))
 
     def ask(self, poses: Poses) -> None:
@@ -162,7 +164,7 @@ def _draw() -> None:
     # What a driver prints must not get in between the pictures.
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    engine = room(name)
+    engine = raw_engine_of(name)
     by = engine.supersampling
     # What they hold they give back with the end of the process.
     drawers = [

@@ -73,7 +73,9 @@ class RawEngine(CompiledModels):
         """Return what the interface calls things, and what the engine does."""
         return ()
 
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[UncommandedJoint, ...]:
+    def uncommanded_joint(
+        self, model: Model, seconds: float, joint: int
+    ) -> tuple[UncommandedJoint, ...]:
         """Return how a joint moves that nobody commands, on four freshly loaded models.
 
         As it comes; with the model's gravity; without the engine's own motors too; and
@@ -86,7 +88,7 @@ class RawEngine(CompiledModels):
         """
         return ()
 
-    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
+    def restore_methods(self, model: Model) -> tuple[WayBack, ...]:
         """Return which of the engine's own ways to go back to an earlier state is exact."""
         return ()
 

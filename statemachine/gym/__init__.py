@@ -17,7 +17,7 @@ from __future__ import annotations
 from importlib.util import find_spec as _find_spec
 
 from ..errors import MissingEngineError as _MissingEngineError
-from ..program import install_command as _install_command
+from ..installing import install_command as _install_command
 
 if _find_spec("gymnasium") is None:
     raise _MissingEngineError(

@@ -106,7 +106,7 @@ class RobotVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             mask = np.asarray(options["reset_mask"])
             if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
                 raise BadInputError(
-                    f"reset_mask wants {self.num_envs} bools, one of them True; got {shown(mask)}"
+                    f"reset_mask takes {self.num_envs} bools, one of them True; got {shown(mask)}"
                 )
         seeds = self._seeds(seed)
         for i in _numbers(mask):
@@ -250,7 +250,7 @@ class RobotVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         listed = isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str)
         if not listed or len(seed) != self.num_envs:
             got = len(seed) if listed else shown(seed)
-            raise BadInputError(f"seed wants {self.num_envs} seeds, or one; got {got}")
+            raise BadInputError(f"seed takes {self.num_envs} seeds, or one; got {got}")
         return [int(own) if isinstance(own, np.integer) else own for own in seed]
 
 

@@ -36,7 +36,10 @@ def as_count(value: Any, name: str) -> int:
     """
     number = whole_number(value)
     if number is None or number < 1:
-        raise BadInputError(f"{name} must be a whole number of at least 1; got {shown(value)}")
+        rounding = f": round({value})" if isinstance(value, float) and value >= 1 else ""
+        raise BadInputError(
+            f"{name} must be a whole number of at least 1; got {shown(value)}{rounding}"
+        )
     if number >= 2**31:  # engines count in a C int
         raise BadInputError(f"{name} must be below {2**31}; got {shown(value)}")
     return number
@@ -92,7 +95,7 @@ def as_vector(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     array = as_numbers(value, name)
     if array.shape != shape:
         wanted = f"{math.prod(shape)} numbers, shape {shape}" if shape else "one number"
-        raise BadInputError(f"{name} wants {wanted}; got shape {array.shape}")
+        raise BadInputError(f"{name} takes {wanted}; got shape {array.shape}")
     array = array.astype(np.float64)
     check_entries(array, name)
     return array
@@ -159,7 +162,7 @@ def check_state(state: Any, model: Any, fingerprint: str, layout: Sizes) -> None
         BadInputError: It holds a number that is not finite.
     """
     if not isinstance(state, State):
-        raise TypeError(f"set_state wants a State, from get_state; got {kind_of(state)}")
+        raise TypeError(f"set_state takes a State, from get_state; got {kind_of(state)}")
     if state.backend != model.backend:
         raise ForeignStateError(
             f"this State was made by backend {state.backend!r}, the Data is {model.backend!r}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 from numpy.typing import ArrayLike
 
-from ..errors import ClosedDataError, DivergedError, ReadOnlyError, no_attribute
+from ..errors import ClosedDataError, DivergedError, ReadOnlyError, did_you_mean
 from .checks import as_scalar, as_vector, check_writable
 from .exclusive_access import Closable, Owner, refuse_other_thread, with_exclusive_access
 from .model import Model
@@ -205,13 +205,18 @@ class Data(Closable, ABC):
             )
         else:
             raise ReadOnlyError(
-                f"a Data has no attribute {name!r}; its inputs are {', '.join(_WRITABLE)}"
+                f"a Data has no attribute {name!r}; its inputs are {', '.join(_WRITABLE)} and time"
+                f"{did_you_mean(name, (*_WRITABLE, 'time'))}"
             )
 
     if not TYPE_CHECKING:  # a type checker reports what is not there itself
 
         def __getattr__(self, name: str) -> NoReturn:
-            raise no_attribute(self, name, None if name == "_raw" else getattr(self, "_raw", None))
+            if name.startswith("_"):  # a slot that is empty yet, or what Python asks for
+                raise AttributeError(f"a Data has no attribute {name!r}", name=name, obj=self)
+            from .unknown_attributes import no_attribute
+
+            raise no_attribute(self, "Data", name, getattr(self, "_raw", None))
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Data is a live simulation: copy or pickle get_state(model, data)")

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadInputError, ReadOnlyError, no_attribute, unknown_name
+from ..errors import BadInputError, ReadOnlyError, unknown_name
 from ..release_names import engine_of
 from .checks import TINY, index_of, unsupported, whole_number
 from .records import (
     AS_WRITTEN,
+    OPTIONS,
     READ_OPTIONS,
     Array,
     Capabilities,
@@ -140,15 +141,23 @@ class Model(ABC):
         vars(self)["_quaternions"] = _quaternions(self.jnt_type, self.jnt_qposadr)
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
+        if name in OPTIONS:
+            raise ReadOnlyError(
+                f"a Model never changes: model.replace({name}=…) gives another Model"
+            )
         raise ReadOnlyError(
-            f"a Model never changes: use model.replace({name}=…) where that is an option, "
-            "or the engine's own model.raw"
+            f"a Model never changes, and {name!r} is no option of model.replace; what the engine "
+            "itself lets you change is in model.raw"
         )
 
     if not TYPE_CHECKING:  # a type checker reports what is not there itself
 
         def __getattr__(self, name: str) -> NoReturn:
-            raise no_attribute(self, name, vars(self).get("raw"))
+            if name.startswith("_"):  # Python asks for many, to copy or to show something
+                raise AttributeError(f"a Model has no attribute {name!r}", name=name, obj=self)
+            from .unknown_attributes import no_attribute
+
+            raise no_attribute(self, "Model", name, vars(self).get("raw"))
 
     def __setstate__(self, facts: dict[str, Any]) -> None:
         Model.__init__(self, **facts)  # a pickle forgets which arrays are read-only
@@ -280,7 +289,7 @@ class Model(ABC):
         """Return the error for a quaternion of a joint that is not a rotation."""
         return BadInputError(
             f"qpos[{start}:{start + 4}], the quaternion of joint {self.joint_names[joint]!r}, "
-            "is zero: it names no rotation; the identity is 1 0 0 0"
+            "is zero, which is no rotation; the identity is 1 0 0 0"
         )
 
     def _coordinate_name(self, array: str, index: int) -> str:

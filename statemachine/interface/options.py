@@ -119,7 +119,7 @@ def _gain(of: OptionFacts, name: str, value: Any) -> Array:
     for k in np.flatnonzero(~servo & ~np.isnan(given))[:1].tolist():
         raise BadInputError(
             f"{name}[{k}] is given for {of.actuator_names[k] or f'actuator {k}'}, which is not a "
-            f"position servo: it wants NaN there, as actuator_{name} has"
+            f"position servo: write NaN there, as actuator_{name} has"
         )
     as_vector(given[servo], (int(servo.sum()),), name)  # finite
     least = given[servo].min()

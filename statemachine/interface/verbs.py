@@ -28,7 +28,7 @@ def make_data(model: Model) -> Data:
         TypeError: `model` is not a Model.
     """
     if not isinstance(model, Model):
-        raise TypeError(f"make_data wants a Model, from statemachine.load; got {kind_of(model)}")
+        raise TypeError(f"make_data takes a Model, from statemachine.load; got {kind_of(model)}")
     return model._make_data()
 
 
@@ -205,6 +205,6 @@ def _admit(model: Model, data: Data) -> None:
 
         maker, other = told_apart(data._model, model)
         raise ForeignDataError(
-            f"this Data was made by {maker}, and is used with {other}: a Data belongs to the Model "
-            "that made it; a State moves between them"
+            f"this Data was made by {maker}, and is used with {other}: make one of this Model, "
+            "sm.make_data(model); a State moves between the two"
         )

@@ -16,6 +16,7 @@ from ..errors import (
     EngineError,
     ReadOnlyError,
     StateMachineError,
+    did_you_mean,
     shown,
 )
 from ..processes import free_memory
@@ -267,8 +268,9 @@ class Worlds(Closable, ABC):
                 f"these Worlds do not keep {name!r}: name it in make_worlds(…, derived=…)"
             )
         if name == "_advance":  # what `statemachine.step` asks of a Data
-            raise TypeError("a Data is wanted; got Worlds, which statemachine.worlds.step takes")
-        raise AttributeError(f"Worlds have no attribute {name!r}")
+            raise TypeError("step takes a Data; got Worlds, which statemachine.worlds.step takes")
+        hint = "" if name.startswith("_") else did_you_mean(name, (*WRITABLE, *BATCHED))
+        raise AttributeError(f"Worlds have no attribute {name!r}{hint}")
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in WRITABLE:

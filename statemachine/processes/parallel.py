@@ -270,7 +270,7 @@ def _shared(
     """Yield the error or the result of each run of the forks, by number; until none comes for
     `limit` [s].
     """
-    pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), settle)
+    pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), silence_child)
     futures: dict[Future[Any], int] = {}
     try:
         with sigint_blocked(), warnings.catch_warnings():
@@ -303,7 +303,7 @@ def _shared(
     return outcomes
 
 
-def settle() -> None:
+def silence_child() -> None:
     """Silence a child process of ours, and let it end with its parent."""
     faulthandler.disable()
     nothing = open(os.devnull, "r+", encoding="utf-8")  # noqa: SIM115  (until it ends)

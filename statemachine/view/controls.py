@@ -18,7 +18,7 @@ class Control:
         name: Of the actuator.
         low: Least value, in `unit`.
         high: Greatest value, in `unit`.
-        unit: ° for the aim of a hinge's servo, mm for a slide's, else nothing.
+        unit: ° for the target of a hinge's servo, mm for a slide's, else nothing.
         scale: What one `unit` is in the actuator's own unit [rad, m, N·m …].
     """
 

@@ -154,7 +154,7 @@ def _recording(request: RecordingRequest, reporter: Reporter) -> BrowserView:
         name = str(request.model)
         model = load(request.model, menagerie=request.menagerie)
     if model.body_names != header.bodies:
-        raise TraceError(f"the trace is of another model than {name}: name it behind the trace")
+        raise TraceError(f"the trace is of another model than {name}: name its own after the trace")
     run = f"{header.experiment or 'a run'} of {name}"
     what = f"{run}, recorded on {' and '.join(session.labels)}"
     return BrowserView(session, drawing_of(model), None, what)

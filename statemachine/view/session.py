@@ -160,7 +160,7 @@ class Session(ABC):
         Raises:
             BadInputError: There is no such slider, or the value is not a number.
         """
-        raise BadInputError("a recording has no sliders: nothing runs here")
+        raise BadInputError("a recording has no sliders, because nothing is simulated")
 
     def seek(self, time: float) -> None:
         """Go to a time [s].

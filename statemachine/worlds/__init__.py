@@ -74,7 +74,7 @@ class Uniform:
     def __post_init__(self) -> None:
         low, high = as_scalar(self.low, "low"), as_scalar(self.high, "high")
         if not 0 <= low <= high:
-            raise BadInputError(f"a range wants 0 ≤ low ≤ high; got {low:g} and {high:g}")
+            raise BadInputError(f"a range takes 0 ≤ low ≤ high; got {low:g} and {high:g}")
 
     def at(self, parts: Array) -> Array:
         """Return the numbers at these fractions (n, k) of the range, drawn from 0 to 1."""
@@ -88,7 +88,7 @@ class LogUniform(Uniform):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.low > 0:
-            raise BadInputError(f"LogUniform wants low > 0; got {self.low:g}")
+            raise BadInputError(f"LogUniform takes low > 0; got {self.low:g}")
 
     def at(self, parts: Array) -> Array:
         """See the base. Python's exp: the last bits of NumPy's are those of the processor."""
@@ -124,7 +124,7 @@ def draw(
         BadInputError: `n`, `seed` or a range is invalid.
     """
     if not isinstance(model, Model):
-        raise TypeError(f"draw wants a Model, from statemachine.load; got {kind_of(model)}")
+        raise TypeError(f"draw takes a Model, from statemachine.load; got {kind_of(model)}")
     n = as_count(n, "n")
     number = whole_number(seed)
     if number is None or number < 0:
@@ -149,7 +149,7 @@ def _range(name: str, given: Uniform | tuple[float, float]) -> Uniform:
         low, high = given
     except (TypeError, ValueError):
         raise BadInputError(
-            f"{name} wants a range: (low, high), Uniform or LogUniform; got {shown(given)}"
+            f"{name} takes a range: (low, high), Uniform or LogUniform; got {shown(given)}"
         ) from None
     return Uniform(low, high)
 

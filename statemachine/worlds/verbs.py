@@ -58,7 +58,7 @@ def make_worlds(
         UnsupportedError: The backend has no such option.
     """
     if not isinstance(model, Model):
-        raise TypeError(f"make_worlds wants a Model, from statemachine.load; got {kind_of(model)}")
+        raise TypeError(f"make_worlds takes a Model, from statemachine.load; got {kind_of(model)}")
     n = as_count(n, "n")
     threads = checked_jobs(None) if workers is None else as_count(workers, "workers")
     names = _names(derived, "derived array", BATCHED)
@@ -318,7 +318,7 @@ def _numbers(worlds: Worlds, ids: ArrayLike | None) -> Ints:
     """Return the worlds that are meant, each once and in order."""
     if ids is None:
         return worlds._numbers
-    wanted = f"ids wants numbers of worlds, each once, or a mask ({worlds.n},) of bools"
+    wanted = f"ids must be numbers of worlds, each once, or a mask ({worlds.n},) of bools"
     try:
         array = np.asarray(ids)
     except (TypeError, ValueError, OverflowError) as error:  # a ragged list
@@ -357,7 +357,7 @@ def _options(model: Model, n: int, options: Mapping[str, Any]) -> dict[str, list
         listed |= isinstance(values, np.ndarray) and values.ndim > 0
         if not listed or len(values) != n:
             got = f"{len(values)}" if listed else shown(values)
-            raise BadInputError(f"{name} wants {n} values, one for each world; got {got}")
+            raise BadInputError(f"{name} takes {n} values, one for each world; got {got}")
         checked[name] = []
         for world, value in enumerate(values):
             try:

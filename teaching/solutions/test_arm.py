@@ -48,7 +48,7 @@ def test_pan_turns_the_fingertip_about_the_axis_of_the_base(model, data):
 
 
 def test_a_link_begins_at_its_own_joint(model, data):
-    # So turning that joint leaves the origin of the link where it is, though not its weight.
+    # So turning that joint leaves the origin of the link where it is; its centre of mass moves.
     sm.forward(model, data)
     before = data.xpos[model.body_id("upper_arm")].copy()
     data.qpos[place_of(model, "shoulder_lift")[0]] = 1.0
@@ -127,7 +127,7 @@ def test_an_arm_without_servos_falls(model):
 
 
 def test_a_servo_is_a_spring_that_carries_the_arm(model, data):
-    # Nothing moves after two seconds: kp times the sag is the weight, but for dry friction.
+    # Nothing moves after two seconds: kp times the sag carries the weight, but for dry friction.
     sm.step(model, data, 400)
     sm.forward(model, data)
     spring = model.actuator_kp * (data.ctrl - data.qpos[:6])

@@ -5,6 +5,7 @@ Of each wrong one it is written what must be said of it, which is said of no oth
 
 from __future__ import annotations
 
+import linecache
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -63,6 +64,49 @@ def _outside(*moved: str) -> Changes:
 
 WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
     "gravity": {
+        "address_by_name": (
+            "model.jnt_qposadr takes a number in brackets, not a name: write model.jnt_qposadr[mod",
+            {LIFT: 'model.jnt_qposadr["shoulder_lift"]'},
+        ),
+        "servos_follow_the_arm": (
+            "you wrote ctrl[0] (shoulder_pan), which was -",
+            {STEP: f"data.ctrl[:] = data.qpos[:6] - 0.1\n            {STEP}"},
+        ),
+        "a_pair_for_each_second": (
+            "a list of 5, with a pair for each second: return two lists",
+            {BOTH: BOTH.replace("return ", "return list(zip(") + "))"},
+        ),
+        "views_kept": (
+            "all of them are the number at the end: you kept a view",
+            {
+                ANGLE: "data.qpos[place:place + 1]",
+                "return angles": "return np.degrees(angles).ravel()",
+            },
+        ),
+        "radians_again": (
+            "np.radians was called on what is in radians already",
+            {ANGLE: "math.radians(data.qpos[place])"},
+        ),
+        "all_joints": (
+            "servos on: you return 6 numbers for each second; one is needed",
+            {ANGLE: "np.degrees(data.qpos)"},
+        ),
+        "options_of_mujoco": (
+            "a Model has no attribute 'opt': write model.replace(",
+            {BOTH: f"model.opt.disableflags |= 1\n    {BOTH}"},
+        ),
+        "option_assigned": (
+            "a Model never changes: model.replace(actuation=…) gives another Model",
+            {BOTH: f"model.actuation = False\n    {BOTH}"},
+        ),
+        "verb_of_the_data": (
+            "a Data has no attribute 'step': write sm.step(model, data)",
+            {STEP: "data.step()"},
+        ),
+        "steps_in_a_range": (
+            "a whole number is needed where there is a float: round(…) makes one",
+            {STEP: "for _ in range(1 / model.timestep):\n                sm.step(model, data)"},
+        ),
         "replace_thrown_away": (
             "the servos were still on in this run",
             {BOTH: "model.replace(actuation=False)\n    return fall(model), fall(model)"},
@@ -102,15 +146,15 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             },
         ),
         "nothing_read_from_the_runs": (
-            "are they its speed, qvel, or another joint? shoulder_lift is at qpos[",
+            "Are they its speed, qvel, or another joint? shoulder_lift is at qpos[",
             {"return angles": "return [0.0] * (seconds + 1)"},
         ),
         "printed_constants": (
-            "that belongs to the course's own scene",
+            "that belongs to the course's own scene: ",
             {BOTH: OWN_SCENE + BOTH},
         ),
         "loads_its_own": (
-            "to the model that you got (it steps a model of its own)",
+            "your function steps a model of its own",
             {BOTH: OWN_SCENE + BOTH},
         ),
         "read_after_a_step_too_many": (
@@ -118,14 +162,14 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {"for _ in": "sm.step(model, data)\n        for _ in"},
         ),
         "stepped_by_the_clock": (
-            "you took 201 steps from 1 s to 2 s, where a second has 200: after 400 data.time",
+            "you took 201 steps from 1 s to 2 s, where a second has 200. After 400 steps data.time",
             {
                 "for _ in range(seconds)": "for second in range(1, seconds + 1)",
                 STEP: "while data.time < second:\n                sm.step(model, data)",
             },
         ),
         "every_step": (
-            "servos on, one number at each of 0 … 4 s: an array of shape (5,) is asked for",
+            "servos on, one number at each of 0 … 4 s, must be an array of shape (5,)",
             {
                 STEP: "sm.step(model, data)",
                 "range(seconds)": "range(seconds * round(1 / model.timestep))",
@@ -136,11 +180,11 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {BOTH: "return ([0.0] + [math.nan] * seconds,) * 2"},
         ),
         "speed_for_position": (
-            "that is its speed, qvel",
+            "that is the speed of the joint, from qvel",
             {"jnt_qposadr": "jnt_dofadr", "data.qpos": "data.qvel"},
         ),
-        "radians": ("that is radians", {ANGLE: "float(data.qpos[place])"}),
-        "degrees_twice": ("degrees were made of it twice", {ANGLE: f"math.degrees({ANGLE})"}),
+        "radians": ("these are radians; np.degrees", {ANGLE: "float(data.qpos[place])"}),
+        "degrees_twice": ("np.degrees was called twice", {ANGLE: f"math.degrees({ANGLE})"}),
         "weightless": (
             "nothing moves in this run, as where there is no gravity",
             {"actuation=False": "gravity=(0, 0, 0)"},
@@ -155,7 +199,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {LIFT: "1", f"[{ANGLE}]": "[0.0]"},
         ),
         "servos_on_and_radians": (
-            "the servos were still on in this run, and that is radians",
+            "servos are off. These are radians, too",
             {ANGLE: "float(data.qpos[place])", "model.replace(actuation=False)": "model"},
         ),
         "timestep_taken_for_granted": (
@@ -171,7 +215,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {BOTH: "return [0.0] * (seconds + 1), [0.0] * (seconds + 1)"},
         ),
         "holds_with_ctrl": (
-            "ctrl was written",
+            "you wrote ctrl[1] (shoulder_lift), which was 0.5 then",
             {
                 OWN_DATA: f"{OWN_DATA}        data.ctrl[1] = ctrl\n",
                 "def fall(model)": "def fall(model, ctrl=0.0)",
@@ -185,6 +229,48 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
         ),
     },
     "state": {
+        "mujocos_name_for_ours": (
+            "a Model has no attribute 'jnt_names': write model.joint_names",
+            {"model.joint_names": "model.jnt_names"},
+        ),
+        "misspelled": (
+            "a Model has no attribute 'jnt_qposaddr'. Did you mean model.jnt_qposadr?",
+            {"jnt_qposadr": "jnt_qposaddr"},
+        ),
+        "where_they_begin": (
+            "shoulder_pan: the pair holds numbers; write slice(begin, end)",
+            {"slice(place, place + kind.nq), slice(dof, dof + kind.nv)": "(place, dof)"},
+        ),
+        "what_stands_there": (
+            "shoulder_pan: the pair holds arrays",
+            {"slice(place, place + kind.nq), slice(dof, dof + kind.nv)": "np.ones(1), np.ones(1)"},
+        ),
+        "one_slice": (
+            "shoulder_pan: you return one slice; a pair is needed",
+            {", slice(dof, dof + kind.nv)": ""},
+        ),
+        "each_pair_swapped": (
+            "each pair is swapped",
+            {
+                "slice(place, place + kind.nq), slice(dof, dof + kind.nv)": (
+                    "slice(dof, dof + kind.nv), slice(place, place + kind.nq)"
+                )
+            },
+        ),
+        "time_first": ("the two are swapped", {SLOTS: "return data.time, slots"}),
+        "time_zeroed": (
+            "data.time was set to zero; return it as the reset leaves it",
+            {"keyframe=0)": "keyframe=0)\n    data.time = 0.0"},
+        ),
+        "keys_are_numbers": (
+            "an int: 0 is the name of no joint: the keys must be model.joint_names",
+            {"slots[name]": "slots[joint]"},
+        ),
+        "type_without_its_name": (
+            "model.jnt_type has plain numbers: JointType(model.jnt_type[k]) has .nq",
+            {"JointType(model.jnt_type[joint])": "model.jnt_type[joint]"},
+        ),
+        "ranges": ("the pair holds a range: range(0, 1)", {"slice(": "range("}),
         "time_after_a_step": (
             "read it right after the reset",
             {"keyframe=0)": "keyframe=0)\n    sm.step(model, data)"},
@@ -194,14 +280,17 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {"slots = {}": 'raise NotImplementedError("TODO(you): later")'},
         ),
         "not_even_a_pair": (
-            "it returns a str: 'nothing', where shoulder_pan: (slice",
+            "shoulder_pan: you return a str: 'nothing'; a pair is needed",
             {SLOTS: 'return slots | {model.joint_names[0]: "nothing"}, data.time'},
         ),
         "hinges_only": (
             "1 of 7 joints are missing: box",
             {SLOTS: 'return {k: v for k, v in slots.items() if k != "box"}, data.time'},
         ),
-        "pairs_of_numbers": ("a pair of slices is asked for; got a tuple", {"slice(": "("}),
+        "pairs_of_numbers": (
+            "shoulder_pan: the pair holds tuples; write slice(0, 1)",
+            {"slice(": "("},
+        ),
         "keyframe_forgotten": (
             "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data",
             {"    sm.reset(model, data, keyframe=0)\n": ""},
@@ -221,7 +310,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {"kind.nq": "1", "kind.nv": "1"},
         ),
         "slices_by_joint_number": (
-            "it begins at the joint's number, 1",
+            "it begins at the number of the joint, 1",
             {"model.jnt_qposadr[joint], model.jnt_dofadr[joint]": "joint, joint"},
         ),
         "qvel_begins_where_qpos_does": (
@@ -229,16 +318,19 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {"jnt_dofadr": "jnt_qposadr"},
         ),
         "last_number_included": (
-            "a slice ends one after the last number",
+            "the end of a slice is one after the last number",
             {"kind.nq": "kind.nq - 1", "kind.nv": "kind.nv - 1"},
         ),
         "a_joint_too_many": (
             "no joint is called 'table'",
             {SLOTS: 'return slots | {"table": (slice(0, 1), slice(0, 1))}, data.time'},
         ),
-        "a_list_of_slots": ("slots: a dict", {SLOTS: "return list(slots.values()), data.time"}),
+        "a_list_of_slots": (
+            "slots is a list of 7, and must be a dict",
+            {SLOTS: "return list(slots.values()), data.time"},
+        ),
         "time_as_text": (
-            "time: a number of seconds is asked for",
+            "time must be a number of seconds",
             {SLOTS: 'return slots, f"{data.time} s"'},
         ),
         "whole_seconds": ("should be 2.5 s, you return 2", {"data.time": "int(data.time)"}),
@@ -248,9 +340,41 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
         ),
     },
     "forward": {
+        "no_copies_and_step_for_forward, raw": (
+            "m: what you read is the simulator's own memory",
+            {".copy()": "", "sm.forward": "sm.step"},
+        ),
+        "forward_on_another_data": (
+            "forward was called on another Data than the one that you read",
+            {"sm.forward(model, data)": "sm.forward(model, sm.make_data(model))"},
+        ),
+        "a_new_data_for_each_reading": (
+            "it is of a new Data, on which forward was not called",
+            {ACTS["w"]: f"data = sm.make_data(model)\n    {ACTS['w']}"},
+        ),
+        "read_once": (
+            "was the place read once, before it? Read data.site_xpos",
+            {"return tips": "return [tips[0]] * 4"},
+        ),
+        "our_model_for_mujocos, raw": (
+            "MuJoCo's own functions take MuJoCo's own objects: give them model.raw and data.raw",
+            {"sm.forward(": "__import__('mujoco').mj_forward("},
+        ),
+        "site_by_name": (
+            "data.site_xpos takes a number in brackets, not a name: write data.site_xpos[model.sit",
+            {SITE: '"gripperframe"', "data.site_xpos[tip]": 'data.site_xpos["gripperframe"]'},
+        ),
+        "derived_written": (
+            "this array is read-only, because it is derived: write data.qpos",
+            {ACTS["w"]: "data.site_xpos[tip] = 0.8"},
+        ),
+        "mujocos_name_in_this_package": (
+            "has no attribute 'mj_forward'; write sm.forward(model, data)",
+            {"sm.forward": "sm.mj_forward"},
+        ),
         "no_copies, raw": ("what you read is the simulator's own memory", {".copy()": ""}),
         "one_joint_too_many": (
-            "you also wrote qpos[2], which is 'elbow_flex'",
+            "you also wrote qpos[2], which is 'elbow_flex'; leave that out",
             {ACTS["w"]: f"{ACTS['w']}\n    {ACTS['w'].replace('shoulder_lift', 'elbow_flex')}"},
         ),
         "nearly": (
@@ -269,7 +393,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             "reading 3, after the write: forward was called before it was read",
             _ordered("rfrwfrr"),
         ),
-        "forward_before_the_first": ("a new Data has nothing derived yet", _ordered("frrwrfr")),
+        "forward_before_the_first": ("in a new Data nothing is derived yet", _ordered("frrwrfr")),
         "step_for_forward": ("0.005 s passed: step was called", {"sm.forward": "sm.step"}),
         "degrees_for_radians": ("that is the arm at 0.8 degrees", {"0.8": "np.radians(0.8)"}),
         "radians_for_degrees": ("that is the arm at 45.8 rad", {"0.8": "np.degrees(0.8)"}),
@@ -291,16 +415,16 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {SITE: 'model.body_id("gripper")', "site_xpos": "xpos"},
         ),
         "the_first_body": (
-            "and body 'base'; site",
+            "and body 'base'; read the site",
             {SITE: 'model.body_id("base")', "site_xpos": "xpos"},
         ),
         "printed_constants": (
             "crate before the arm: reading 2, after forward: that belongs to the course's own",
             {"data = ": f"{OWN_SCENE}data = "},
         ),
-        "two_readings": ("a list of 2, where four positions", _ordered("rfr")),
+        "two_readings": ("a list of 2; it must return four positions", _ordered("rfr")),
         "heights_only": (
-            "reading 1: an array of shape (3,) is asked for",
+            "reading 1 must be an array of shape (3,)",
             {"return tips": "return [tip[2] for tip in tips]"},
         ),
         "counts_too_far": (
@@ -345,11 +469,47 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
         ),
     },
     "replay": {
+        "true_typed_in_after_an_assert": (
+            "this assert failed. Where the result may be either, return what you compared",
+            {EQUAL: "True, first, second", TWICE: f"{TWICE}\n    assert (first == second).all()"},
+        ),
+        "another_order": (
+            "the order is (same, first, second); you return same as number 3",
+            {EQUAL: "first, second, np.array_equal(first, second)"},
+        ),
+        "speeds_for_positions": (
+            "first has 12 numbers, as qvel has; return a copy of qpos, which has 13",
+            {"data.qpos.copy()": "data.qvel.copy()"},
+        ),
+        "the_data_itself": (
+            "first must be a copy of qpos; you return a Data",
+            {"data.qpos.copy()": "data", EQUAL: "True, first, second"},
+        ),
+        "forward_for_step": (
+            "no step was taken: forward takes no time",
+            {RUN: "sm.forward(model, data)"},
+        ),
+        "command_into_a_copy": (
+            "a copy of ctrl is no command. Write data.ctrl[:] = ctrl after the reset",
+            {COMMAND: "data.ctrl.copy()[:] = ctrl"},
+        ),
+        "one_number_of_ctrl_forgotten": (
+            "at its first step ctrl[5] (gripper) was 0; the command there is 0.28",
+            {COMMAND: f"{COMMAND}\n        data.ctrl[5] = 0.0"},
+        ),
+        "command_into_all_of_qpos": (
+            "6 numbers were written into 13. Here qpos has 13 (model.nq)",
+            {COMMAND: "data.qpos[:] = ctrl"},
+        ),
+        "steps_as_a_float": (
+            "nstep must be a whole number of at least 1; got 600.0: round(600.0)",
+            {RUN: "sm.step(model, data, nstep / 1)"},
+        ),
         "one_data_no_copy": (
             "both show the last run",
             _outside() | {"data.qpos.copy()": "data.qpos"},
         ),
-        "no_reset_between": ("one run of 1200 steps", _outside(RESET, ZERO)),
+        "no_reset_between": ("there was one run of 1200 steps", _outside(RESET, ZERO)),
         "second_only_zeroes_the_time": (
             "second run: it did not begin at keyframe 0",
             _outside(RESET),
@@ -363,7 +523,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {COMMAND: "data.qpos[model.jnt_qposadr[model.actuator_jntid]] = ctrl"},
         ),
         "command_added": (
-            ": += adds to the keyframe's own ctrl; data.ctrl[:] = ctrl sets it",
+            "+= adds to it; data.ctrl[:] = ctrl sets it",
             {COMMAND: "data.ctrl[:] += ctrl"},
         ),
         "ctrl_changes_on_the_way": (
@@ -390,10 +550,13 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {TWICE: f'model = sm.load("so101/scene_box", backend=model.backend)\n    {TWICE}'},
         ),
         "allclose": (
-            "apart and you call them equal: nearly is not equal",
+            "apart and you call them equal: nearly equal is not equal",
             {"array_equal": "allclose"},
         ),
-        "always_true": ("and you call them equal", {EQUAL: "True, first, second"}),
+        "always_true": (
+            "0.1 apart, and same is True: is True typed in",
+            {EQUAL: "True, first, second"},
+        ),
         "first_with_first": (
             "first and second are one array",
             {EQUAL: "np.array_equal(first, first), first, first"},
@@ -411,7 +574,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {EQUAL: "first is second, first, second"},
         ),
         "not_all_compared": (
-            "same: True or False is asked for",
+            "an array of shape (13,), one answer for each number",
             {EQUAL: "first == second, first, second"},
         ),
         "no_copy": ("first is data.qpos itself", {"data.qpos.copy()": "data.qpos"}),
@@ -433,7 +596,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {RUN: "sm.step(model, data, 600)"},
         ),
         "ctrl_one_step_late": (
-            "second run: at its first step ctrl was the keyframe's own, and was written only",
+            "second run: at its first step ctrl was the keyframe's own, and it was written only",
             {
                 "def once()": "def once(late=0)",
                 f"{COMMAND}\n": f"if late:\n            sm.step(model, data, late)\n"
@@ -453,11 +616,11 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {RUN: "sm.step(model, data)"},
         ),
         "single_precision": (
-            "first is float32, which forgets digits",
+            "first is float32, which has fewer digits",
             {"data.qpos.copy()": "np.float32(data.qpos)"},
         ),
         "command_in_degrees": (
-            "degrees were made of it; ctrl is in radians as it is",
+            "degrees were made of it, and the command is in radians",
             {COMMAND: "data.ctrl[:] = np.degrees(ctrl)"},
         ),
     },
@@ -556,9 +719,11 @@ class Attempt:
 
     @cached_property
     def function(self) -> Callable[..., Any]:
-        """Of the file with the text."""
+        """Of the file with the text, whose lines Python can show."""
+        file = f"<{self.name}>"
+        linecache.cache[file] = len(self.text), None, self.text.splitlines(keepends=True), file
         names: dict[str, Any] = {}
-        exec(self.text, names)
+        exec(compile(self.text, file, "exec"), names)
         return names[self.solves]
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-UNTOLD = ("qfrc_contact", "qfrc_friction", "qfrc_limit", "qfrc_equality", "contacts")
+UNAVAILABLE = ("qfrc_contact", "qfrc_friction", "qfrc_limit", "qfrc_equality", "contacts")
 TOLD = (
     *("xpos", "xquat", "site_xpos", "site_xmat", "qacc"),
     *("qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint"),
@@ -46,7 +46,7 @@ def place_of(model, name):
 class Simulation:
     """One simulation."""
 
-    untold = UNTOLD
+    unavailable = UNAVAILABLE
 
     def __init__(self, model):
         import mujoco

@@ -29,14 +29,15 @@ def _parts() -> Any:
     from statemachine.backends import hidden_world as _hidden_world
     from statemachine.backends import pybullet_backend
     from statemachine.backends.bullet import driven as bullet_driven
-    from statemachine.backends.bullet import joint_dynamics, tree_dynamics
+    from statemachine.backends.bullet import joint_dynamics as bullet_joint_dynamics
     from statemachine.backends.bullet import plan as bullet_plan
+    from statemachine.backends.bullet import tree_dynamics
     from statemachine.backends.bullet import world as bullet_world
 
     class Parts:
         data, hidden, driven = _hidden_data, _hidden_world, bullet_driven
         plan, ghost = bullet_plan, bullet_driven
-        law, world, dynamics = joint_dynamics, bullet_world, tree_dynamics
+        joint_dynamics, world, dynamics = bullet_joint_dynamics, bullet_world, tree_dynamics
         backend, pb = pybullet_backend, bullet_world.pb
 
     return Parts
@@ -63,7 +64,7 @@ def joints_counted_without_the_fixed(right: Any, self: Any, *arguments: Any) -> 
     self.joints = [index - 1 for index in self.joints]  # the first is fixed: the anchor
 
 
-@around("law.Law", "__init__")
+@around("joint_dynamics.JointDynamics", "__init__")
 def armature_dropped(right: Any, self: Any, raw: Any, *others: Any) -> None:
     raw = copy.copy(raw)
     raw.dof_armature[:] = 0
@@ -91,7 +92,7 @@ def forward_steps_the_world_itself(right: Any, self: Any, name: str) -> Any:
         return right(self, name)
     present = self.present()
     found = _parts().hidden.LookAhead(lambda: self.world).at(moment)
-    self.restart(self.time, present, self.given)
+    self.restart(self.time, present, self.past_commands)
     self.moment = moment
     return found
 
@@ -116,7 +117,9 @@ def spin_in_world_axes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def contacts_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_parts().law.Law, "contact", property(lambda self: self._nothing))
+    monkeypatch.setattr(
+        _parts().joint_dynamics.JointDynamics, "contact", property(lambda self: self._nothing)
+    )
 
 
 # The fault, the conformance checks that see it, and the tests of the backend that do.

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import statemachine as sm
-from statemachine.engines import room
+from statemachine.engines import raw_engine_of
 from statemachine.installed import DEFAULT
 from statemachine.show.drawing.scene import Camera
 
@@ -31,7 +31,7 @@ VIEWS = ((90, -5), (180, -10), (135, -30), (160, -80))
 
 def rendering_environment() -> dict[str, str]:
     """Return an environment in which MuJoCo renders; skip, or fail where CI wants one."""
-    works, how, _ = room(DEFAULT).drawing_diagnosis()
+    works, how, _ = raw_engine_of(DEFAULT).drawing_diagnosis()
     if not works:
         absent("render", how)
     chosen = {"MUJOCO_GL": how.rpartition("=")[2]} if "=" in how else {}

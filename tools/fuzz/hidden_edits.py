@@ -8,8 +8,6 @@ verdict is good where the runs differ.
 
 from __future__ import annotations
 
-import itertools
-import json
 import math
 import random
 import subprocess
@@ -23,16 +21,22 @@ import numpy as np
 
 from statemachine import releases
 
+from ._against_raw import (
+    PATIENCE,
+    SAME,
+    SECONDS,
+    SHARE,
+    TIMESTEP,
+    asked,
+    asked_why,
+    raw_joints,
+    raw_shares,
+)
 from ._tally import Tally, command, run_bounded
 
 TRIES = 100
 RELEASE = "mujoco==3.3.7"
-_PATIENCE = 300.0  # s, of one command on a busy machine
-_SHARE = 0.02  # how far a share may be from the raw one
-_SAME = 1e-6  # of a gap: two computations of one run
-_SECONDS = 0.4
 _FIXED = "fixed"  # what the written file is called
-_TIMESTEP = 0.002
 _HEIGHT = 0.42  # m, of the base: the feet are above the floor, and fall onto it
 
 Parameters = Mapping[str, float]
@@ -136,7 +140,7 @@ def mjcf_of(parameters: Parameters, floats: bool = True) -> str:
         ]
     free = "<freejoint/>" if floats else ""
     return f"""<mujoco>
-    <compiler angle="radian"/><option timestep="{_TIMESTEP}" integrator="implicitfast"/>
+    <compiler angle="radian"/><option timestep="{TIMESTEP}" integrator="implicitfast"/>
     <worldbody><geom name="floor" type="plane" size="5 5 1" friction="0.1 0.005 0.0001"/>
     <body name="base" pos="0 0 {_HEIGHT}">{free}
       <inertial pos="0 0 0" mass="{parameters["mass.base"]!r}" diaginertia="0.05 0.08 0.1"/>
@@ -182,76 +186,6 @@ def _joint(name: str, parent: str, child: str, place: str, parameters: Parameter
     )
 
 
-# Plain MuJoCo.
-
-
-def raw_joints(
-    text: str,
-    command_of: Callable[[float, int], float] | None,
-    timestep: float = _TIMESTEP,
-) -> np.ndarray:
-    """Return the angles of all hinges at each step, shape (nstep + 1, number of hinges) [rad].
-
-    Args:
-        text: MJCF or URDF.
-        command_of: The command of an actuator at a time [s]; None for actuators that are off.
-        timestep: Of each step [s].
-    """
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_string(text)
-    if command_of is None:
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
-    model.opt.timestep = timestep
-    data = mujoco.MjData(model)
-    hinges = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
-    rows = [data.qpos[hinges].copy()]
-    for _ in range(round(_SECONDS / timestep)):
-        if command_of is not None:
-            data.ctrl[:] = [command_of(data.time, index) for index in range(model.nu)]
-        mujoco.mj_step(model, data)
-        rows.append(data.qpos[hinges].copy())
-    return np.array(rows)
-
-
-def raw_shares(
-    left: Parameters,
-    right: Parameters,
-    joints_of: Callable[[Parameters], np.ndarray],
-) -> tuple[float, dict[str, float]]:
-    """Return the worst gap of any joint [rad], and the Shapley share of each edit in it.
-
-    All sets of edits are run. A share is the mean, over all orders of the edits, of the part of the
-    gap that goes when this one is taken back.
-    """
-    names = [name for name in left if left[name] != right[name]]
-    truth = joints_of(left)
-    gaps: dict[frozenset[str], float] = {}
-    for length in range(len(names) + 1):
-        for equalized in itertools.combinations(names, length):
-            parameters = dict(right) | {name: left[name] for name in equalized}
-            gaps[frozenset(equalized)] = float(np.abs(joints_of(parameters) - truth).max())
-    whole = gaps[frozenset()]
-    shares = dict.fromkeys(names, 0.0)
-    orders = list(itertools.permutations(names))
-    for order in orders:
-        for place, name in enumerate(order):
-            before = gaps[frozenset(order[:place])]
-            shares[name] += (before - gaps[frozenset(order[: place + 1])]) / whole / len(orders)
-    return whole, shares
-
-
-# What the command says.
-
-
-def _asked(folder: Path, *words: str) -> tuple[int | None, dict[str, Any], str]:
-    code, out, error = run_bounded(command(*words, "--json"), folder, _PATIENCE)
-    try:
-        return code, json.loads(out), error
-    except json.JSONDecodeError:
-        return code, {}, error
-
-
 def _wrong_causes(
     answer: Mapping[str, Any], causes: Mapping[str, str], shares: Mapping[str, float]
 ) -> list[str]:
@@ -263,7 +197,7 @@ def _wrong_causes(
     wrong += [f"{name!r} is no edit" for name in told if name not in causes.values()]
     for parameter, cause in causes.items():
         share = told.get(cause, {}).get("share")
-        if cause in told and (share is None or abs(share - shares[parameter]) > _SHARE):
+        if cause in told and (share is None or abs(share - shares[parameter]) > SHARE):
             wrong.append(f"{cause!r} has the share {share}, raw {shares[parameter]:.4f}")
     return wrong
 
@@ -279,7 +213,7 @@ def _wrong_answer(
     gap, shares = raw
     told = answer["gap"]
     assert isinstance(told, float)
-    if not math.isclose(told, gap, rel_tol=_SAME, abs_tol=1e-9):
+    if not math.isclose(told, gap, rel_tol=SAME, abs_tol=1e-9):
         return [f"the gap is told as {told}, raw {gap}"]
     return _wrong_causes(answer, causes, shares)
 
@@ -344,15 +278,15 @@ def _base(draw: random.Random, folder: Path) -> list[str]:
     right, causes = edited(draw, left, names, 2)
     _write(folder, urdf_of(left), urdf_of(right), ".urdf")
     sides = ("left.urdf", "base=free", "right.urdf")
-    code, _, error = _asked(
-        folder, "compare", "gravity", *sides, "base=fixed", "--seconds", str(_SECONDS)
+    code, _, error = asked(
+        folder, "compare", "gravity", *sides, "base=fixed", "--seconds", str(SECONDS)
     )
     problems = []
     if code != 1:
         problems.append(f"free against fixed: exit code {code}: {error.strip()[-300:]}")
     # Nothing holds the robot that floats, so its joints stay where they are on both sides.
-    code, answer, error = _asked_why(folder, "gravity", *sides)
-    if code != 0 or answer["gap"] > _SAME:
+    code, answer, error = asked_why(folder, "gravity", *sides)
+    if code != 0 or answer["gap"] > SAME:
         problems.append(f"free against open: exit code {code}: {error.strip()[-300:]}")
     # One that is fixed hangs and swings, and the side that does not say so is fixed, too.
     found = _why(folder, "gravity", "left.urdf", "base=fixed", "right.urdf")
@@ -378,13 +312,13 @@ def _pybullet(draw: random.Random, folder: Path) -> list[str]:
     left = drawn_parameters(draw, draw.choice([2, 4]))
     (folder / "left.urdf").write_text(urdf_of(left), encoding="utf-8")
     sides = ("left.urdf", f"timestep={1 / 240!r}", "left.urdf@pybullet:engine")
-    words = ("gravity", *sides, "--seconds", str(_SECONDS))
+    words = ("gravity", *sides, "--seconds", str(SECONDS))
     problems = []
     for more in ((), ("--why",)):
-        code, _, error = run_bounded(command("compare", *words, *more), folder, _PATIENCE)
+        code, _, error = run_bounded(command("compare", *words, *more), folder, PATIENCE)
         if code not in (0, 1) or "Traceback" in error:
             problems.append(f"{' '.join(more)} exit code {code}: {error.strip()[-300:]}")
-    code, answer, _ = _asked(folder, "compare", *words)
+    code, answer, _ = asked(folder, "compare", *words)
     gap = _gap_to_raw_bullet(folder, left)
     agrees = answer["comparison"]["agrees"]
     if agrees and gap > math.radians(0.1):
@@ -419,19 +353,12 @@ def _wrong_file(
         return ["no file was written"]
     left = (folder / f"left{ending}").read_text("utf-8")
     gap = float(np.abs(joints_of(target.read_text("utf-8")) - joints_of(left)).max())
-    return [f"the written file is {gap:.3g} rad from the left one"] if gap > _SAME else []
-
-
-def _asked_why(folder: Path, what: str, *words: str) -> tuple[int | None, dict[str, Any], str]:
-    return _asked(
-        folder, "compare", what, *words, "--why", "--quantity", "joints",
-        "--seconds", str(_SECONDS),
-    )  # fmt: skip
+    return [f"the written file is {gap:.3g} rad from the left one"] if gap > SAME else []
 
 
 def _why(folder: Path, what: str, *sides: str) -> tuple[int | None, dict[str, Any], str]:
     """Ask what explains the gap, and for the right's file with the left's values."""
-    return _asked_why(folder, what, *sides, "--write", f"{_FIXED}{Path(sides[-1]).suffix}")
+    return asked_why(folder, what, *sides, "--write", f"{_FIXED}{Path(sides[-1]).suffix}")
 
 
 _IN_RELEASE = """
@@ -465,7 +392,7 @@ numpy.save(sys.argv[3], rows)
 def _gap_to_raw_bullet(folder: Path, parameters: Parameters) -> float:
     """Return how far apart joints of plain MuJoCo and plain PyBullet get [rad], by name."""
     rows = folder / "rows.npy"
-    steps = round(_SECONDS * 240)
+    steps = round(SECONDS * 240)
     words = [sys.executable, "-c", _IN_BULLET, str(folder / "left.urdf"), str(steps), str(rows)]
     subprocess.run(words, check=True, capture_output=True)
     ours = raw_joints(floating(urdf_of(parameters)), None, 1 / 240)
@@ -479,5 +406,5 @@ def _raw_in_release(folder: Path, file: str) -> np.ndarray:
         python = str(releases.python_of(RELEASE))
     rows = folder / "rows.npy"
     words = [python, "-c", _IN_RELEASE, str(folder / file)]
-    subprocess.run([*words, str(round(_SECONDS / _TIMESTEP)), str(rows)], check=True)
+    subprocess.run([*words, str(round(SECONDS / TIMESTEP)), str(rows)], check=True)
     return np.load(rows)

@@ -49,7 +49,7 @@ class Tendons:
         lengths: (t,) at the positions of the last `take`.
         near: (n, n) the pairs of degrees of freedom of which one carries the other: MuJoCo's
             matrices have no room for others.
-        stiff, limited, rubs: Whether any has a spring, a limit, dry friction.
+        stiff, limited, has_friction: Whether any has a spring, a limit, dry friction.
     """
 
     def __init__(self, raw: MjModel, world: World, tree: Tree, off: Mapping[str, bool]) -> None:
@@ -81,8 +81,10 @@ class Tendons:
         shortest = shortest_time(raw, off)
         weight, on = raw.tendon_invweight0[ids], not off["constraint"]
         self._friction = raw.tendon_frictionloss[ids] * (on and not off["friction"])
-        self.rubs = bool(self._friction.any())
-        self._rub = soft(raw.tendon_solref_fri[ids], raw.tendon_solimp_fri[ids], weight, shortest)
+        self.has_friction = bool(self._friction.any())
+        self._friction_softness = soft(
+            raw.tendon_solref_fri[ids], raw.tendon_solimp_fri[ids], weight, shortest
+        )
         fenced = raw.tendon_limited[ids].astype(bool) & (on and not off["limit"])
         self.limited = bool(fenced.any())
         margin = raw.tendon_margin[ids][:, None] * [1.0, -1.0]
@@ -119,7 +121,7 @@ class Tendons:
         slack = np.minimum(np.maximum(self.lengths, self._slack[0]), self._slack[1])
         return dense.times(self._across, self._stiffness * (slack - self.lengths))
 
-    def stops(self, speed: Array) -> list[SoftRow]:
+    def limit_rows(self, speed: Array) -> list[SoftRow]:
         """Return the rows of the limits that tendons are beyond."""
         rows, rate, length = [], dense.times(self._moment, speed), self.lengths
         for k, (low, high) in enumerate(zip(*self._range, strict=True)):
@@ -130,13 +132,13 @@ class Tendons:
                     )
         return rows
 
-    def rubbing(self, speed: Array) -> list[SoftRow]:
+    def friction_rows(self, speed: Array) -> list[SoftRow]:
         """Return the rows of dry friction."""
-        if not self.rubs:
+        if not self.has_friction:
             return []
         rate = dense.times(self._moment, speed)
         return [
-            soft_row(self._rub[k], self._moment[k], 0.0, rate[k], (-most, most))
+            soft_row(self._friction_softness[k], self._moment[k], 0.0, rate[k], (-most, most))
             for k, most in enumerate(self._friction.tolist())
             if most
         ]

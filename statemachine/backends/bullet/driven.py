@@ -1,7 +1,7 @@
-"""A stepped world of PyBullet's with what drives its joints: what is PyBullet's own of a Data.
+"""A stepped world of PyBullet's with what drives its joints: PyBullet's part of a Data.
 
-`Law` drives them by the model's own law, `Motors` as PyBullet's users do. The Data of one Model
-share a `Ghost`, whose kinematics have no state.
+`JointDynamics` drives them by the model's own dynamics, `Motors` as PyBullet's users do. The Data
+of one Model share a `Ghost`, whose kinematics have no state.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..hidden_world import HiddenWorld, Memory, Moment, Read, bounded
 from .client import pb
 from .contacts import contacts_of
 from .drives import in_force
-from .joint_dynamics import Law
+from .joint_dynamics import JointDynamics
 from .plan import Plan
 from .world import Tree, World
 
@@ -61,9 +61,9 @@ class DrivenWorld(HiddenWorld):
         self._arms: list[Any]
         if kind == "engine":
             self._arms = [Motors(world, tree, raw) for tree in trees]
-            self.untold = frozenset(DERIVED) - {*POSES, *_TOLD}
+            self.unavailable = frozenset(DERIVED) - {*POSES, *_TOLD}
         else:
-            self._arms = [Law(raw, world, tree, ghost_of(plan)) for tree in trees]
+            self._arms = [JointDynamics(raw, world, tree, ghost_of(plan)) for tree in trees]
             self.memory_layout = (("contact", self._nv), ("friction", self._nv))
             if raw.na:
                 self.memory_layout += (("act", int(raw.na)),)

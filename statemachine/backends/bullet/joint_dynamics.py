@@ -59,8 +59,8 @@ _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whol
 _EXPLICIT = (IntegratorKind.EULER, IntegratorKind.RK4)
 
 
-class Law:
-    """One tree of joints in a stepped world, and the law that drives it.
+class JointDynamics:
+    """The joint dynamics of one tree in a stepped world: the torque for the model's motion.
 
     Attributes:
         tree: The tree.
@@ -83,54 +83,56 @@ class Law:
         # Linear in x, which is positions (of a free joint: zeros), velocities and 1.
         passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
         euler = raw.opt.integrator in _EXPLICIT
-        self._later = 0.0 if euler else h  # how much of a velocity's change forces feel at once
+        # How much of a step's change of velocity forces feel within it [s].
+        self._implicit_time = 0.0 if euler else h
         damped_later = 0.0 if euler and off["eulerdamp"] else h
-        # MuJoCo's implicitfast takes the gyroscopic force of what cannot bend at once.
-        self._whirls = tree.free and len(dofs) == 6 and not euler
+        # MuJoCo's implicitfast takes the gyroscopic force of a rigid tree implicitly.
+        self._gyroscopic = tree.free and len(dofs) == 6 and not euler
         self._tendons = tendons = Tendons(raw, world, tree, off)
         # The inertia that constraints feel, and the one that velocities are found with.
         self._inertia = np.array([np.diag(armature), np.diag(armature + damped_later * damping)])
         if len(tendons.ids):
             heavy, damp = (tendons.squared(w) for w in (tendons.armature, tendons.damping))
             self._inertia += heavy * tendons.near
-            self._inertia[1] += self._later * damp * tendons.near
+            self._inertia[1] += self._implicit_time * damp * tendons.near
             passive[:, len(dofs) : -1] -= damp
         self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
-        self.drives = Drives(raw, tree, tendons, off, self._later, self._inertia)
+        self.drives = Drives(raw, tree, tendons, off, self._implicit_time, self._inertia)
         self._medium = Medium(raw, world, tree, off)
         self._equalities = Equalities(raw, world, tree, tendons, off)
 
         self._take_constraints(raw, joints, off)
         damped = np.zeros(passive.shape)
-        damped[:, len(dofs) : -1] = np.diag(self._rub_b)
+        damped[:, len(dofs) : -1] = np.diag(self._friction_damping)
         self._linear = np.vstack([passive, damped, self.drives.feedback])
 
     def _take_constraints(self, raw: MjModel, joints: Any, off: Mapping[str, bool]) -> None:
         """Take the dry friction and the limits of joints."""
         dofs = self.tree.dofs
-        rub = not (off["friction"] or off["constraint"])
-        self._frictionloss = raw.dof_frictionloss[dofs] * rub
-        self._least_rub = -self._frictionloss
+        acts = not (off["friction"] or off["constraint"])
+        self._frictionloss = raw.dof_frictionloss[dofs] * acts
+        self._least_friction = -self._frictionloss
         self._steady = _STEADY**2 * dense.dot(self._frictionloss, self._frictionloss)
         weight = raw.dof_invweight0[dofs]
         shortest = shortest_time(raw, off)
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
-        self._rub_b, _ = springs(solref, solimp, shortest)
+        self._friction_damping, _ = springs(solref, solimp, shortest)
         still = [impedance(curve, 0.0) for curve in curves(solimp)]
-        self._rub_r = np.array([softness(*pair) for pair in zip(still, weight, strict=True)])
-        self._rub_weight = weight + self._rub_r
-        self._rubs = rubs = np.flatnonzero(self._frictionloss)
+        pairs = zip(still, weight, strict=True)
+        self._friction_softness = np.array([softness(*pair) for pair in pairs])
+        self._friction_weight = weight + self._friction_softness
+        self._dry_joints = dry_joints = np.flatnonzero(self._frictionloss)
         self._unit = unit = np.eye(len(dofs))
         # Of the joints with friction; their references are minus these times the velocities.
-        self._rub_damping = self._rub_b[rubs]
-        self._rub_rows = SoftRows(
-            jacobian=unit[rubs],
-            softness=self._rub_r[rubs],
-            reference=np.zeros(len(rubs)),
-            least=self._least_rub[rubs],
-            most=self._frictionloss[rubs],
+        self._dry_damping = self._friction_damping[dry_joints]
+        self._friction_rows = SoftRows(
+            jacobian=unit[dry_joints],
+            softness=self._friction_softness[dry_joints],
+            reference=np.zeros(len(dry_joints)),
+            least=self._least_friction[dry_joints],
+            most=self._frictionloss[dry_joints],
         )
-        self._coupled = bool(self._equalities) or self._tendons.rubs
+        self._coupled = bool(self._equalities) or self._tendons.has_friction
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
         # A limit acts from its margin on, and as if it were there.
@@ -138,7 +140,7 @@ class Law:
         low, high = bounds_of(raw.jnt_range[joints] + margin, limited)
         self._ranges: tuple[list[float], list[float]] = low.tolist(), high.tolist()
         solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
-        self._stops = soft(solref, solimp, weight, shortest)
+        self._limit_softness = soft(solref, solimp, weight, shortest)
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
         """Start from a state; contact and friction (n,) are those of the step before it."""
@@ -213,12 +215,12 @@ class Law:
         actuator, inertia = self.drives.forces(linear[2 * n :], x[:n], speed)
         if slope is not None:
             passive = passive - dense.times(slope, speed)
-            slope = self._later * slope * self._tendons.near
+            slope = self._implicit_time * slope * self._tendons.near
             inertia = np.array([inertia[0], inertia[1] + slope])
         if self._medium.bodies:
             drag, slope = self._medium.forces(self._q, speed)
             passive = passive + drag
-            inertia = np.array([inertia[0], inertia[1] + self._later * slope])
+            inertia = np.array([inertia[0], inertia[1] + self._implicit_time * slope])
         explicit, implicit = mass + inertia
         dense.factored(explicit)
         dense.factored(implicit)
@@ -226,22 +228,22 @@ class Law:
             passive = passive + self._tendons.spring_force()
         others = actuator + passive - bias + contact
         limit = equality = self._nothing
-        stops = self._stops_reached(q, x[:n], speed)
-        solve = afresh or bool(stops) or self._coupled
-        if not solve and len(self._rubs):
+        limits = self._limit_rows(q, x[:n], speed)
+        solve = afresh or bool(limits) or self._coupled
+        if not solve and len(self._dry_joints):
             # One sweep from the last step's friction, of all joints at once: enough where
             # it hardly changes, as in a joint that rests or slides.
-            rest = dense.solved(explicit, others + friction) + damped + self._rub_r * friction
-            moved = np.minimum(
-                np.maximum(friction - rest / self._rub_weight, self._least_rub), self._frictionloss
-            )
+            rest = dense.solved(explicit, others + friction) + damped
+            rest += self._friction_softness * friction
+            moved = np.maximum(friction - rest / self._friction_weight, self._least_friction)
+            moved = np.minimum(moved, self._frictionloss)
             change = moved - friction
             friction = moved
             solve = dense.dot(change, change) > self._steady
         if solve:
             kinds = (
-                self._tendons.rubbing(speed),
-                stops,
+                self._tendons.friction_rows(speed),
+                limits,
                 self._equalities.rows(self._q, x[:n], speed) if self._coupled else (),
             )
             known = speed, others, friction
@@ -250,9 +252,11 @@ class Law:
         self.friction = friction
         self._parts = bias, actuator, passive, friction, limit, equality
         acceleration = dense.solved(implicit, others + friction)
-        return self._whirled(implicit, acceleration) if self._whirls else acceleration
+        if self._gyroscopic:
+            return self._with_gyroscopic_force(implicit, acceleration)
+        return acceleration
 
-    def _whirled(self, factor: Array, acceleration: Array) -> Array:
+    def _with_gyroscopic_force(self, factor: Array, acceleration: Array) -> Array:
         """Return the acceleration (6,) of a single rigid body, its bias linearised in the velocity.
 
         With the bias linear in the change of its spin: ω × (J·ω) about the body's origin.
@@ -286,7 +290,7 @@ class Law:
         Each row has a force F between two bounds, and wants J·a + R·F = its reference; a row at a
         bound may miss it to one side. Those of the joints' friction come before the others.
         """
-        rows = self._rub_rows._replace(reference=-self._rub_damping * speed[self._rubs])
+        rows = self._friction_rows._replace(reference=-self._dry_damping * speed[self._dry_joints])
         if further := [row for kind in kinds for row in kind]:
             rows = rows.followed_by(SoftRows.of(further))
         jacobian, count = rows.jacobian, len(rows.softness)
@@ -297,25 +301,25 @@ class Law:
         matrix.flat[:: count + 1] += rows.softness
         right = rows.reference - dense.times(jacobian, dense.solved(factor, others.copy()))
         force = np.zeros(count)
-        force[: len(self._rubs)] = friction[self._rubs]
+        force[: len(self._dry_joints)] = friction[self._dry_joints]
         force = dense.pivoted(matrix, right, rows.least, rows.most, force)
-        ends = [0, *(np.cumsum([len(kind) for kind in kinds]) + len(self._rubs)).tolist()]
+        ends = [0, *(np.cumsum([len(kind) for kind in kinds]) + len(self._dry_joints)).tolist()]
         return [
             dense.times(jacobian[a:b].T.copy(), force[a:b]) if b > a else self._nothing
             for a, b in pairwise(ends)
         ]
 
-    def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
+    def _limit_rows(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
         """Return the rows of the limits that joints and tendons are beyond."""
         low, high = self._ranges
-        rows = self._tendons.stops(speed) if self._tendons.limited else []
+        rows = self._tendons.limit_rows(speed) if self._tendons.limited else []
         if all(map(le, low, q)) and all(map(ge, high, q)):
             return rows
         for i, (least, place, most) in enumerate(zip(low, q, high, strict=True)):
             if not least <= place <= most:
                 side, gap = min((place - least, 1.0), (most - place, -1.0))[::-1]
                 rate = side * float(speed[i])
-                rows.append(soft_row(self._stops[i], side * self._unit[i], gap, rate))
+                rows.append(soft_row(self._limit_softness[i], side * self._unit[i], gap, rate))
         return rows
 
 

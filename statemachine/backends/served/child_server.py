@@ -3,28 +3,28 @@
 It is run by the interpreter of the engine's environment, on Python 3.9 or later, needs NumPy
 only, and imports nothing of this package. Its argument is a file that knows the engine, and has
 
-- `load(file, text, names)`: a model of a file, or of its text where that is not empty; what is
-  said of it, "version" of the engine at least; and numeric fields of those names, if the engine has
-  such. A release of MuJoCo is told as `read`, too, how it reads the file;
+- `load(file, text, names)`: return the model of a file, or of its text where that is not empty; a
+  dictionary of facts, "version" of the engine at least; and the numeric fields of those names, if
+  the engine has such. A release of MuJoCo is also given, as `read`, how it reads the file;
 - `Simulation(model)`: a world; those of a model share it. `memory` is name and length of each
-  array that the engine remembers from step to step beside qpos and qvel, `kept_memory` names
-  of those that a write into qpos or qvel leaves as they are, `untold` names of derived arrays that
-  it does not tell.
-  `place(vector)` takes qpos, qvel and the memory in a row, so that nothing of before is left;
-  `state()` gives the same vector; `command(ctrl)` takes a command,
-  where the poses of mocap bodies follow ctrl. `advance(steps, fastest)` takes
-  engine steps, up to one after which a position is beyond 1e10 or a velocity beyond `fastest`, and
-  returns how many. `forward()` derives of the present. `derived(vector)` gives what is derived,
-  of the moment that the last step started from or of the present after `forward`, which it is told
-  again, by name, and of the contacts geom, dist, pos, frame, force and torque;
-- `edit(model, edits, flags)`, if it can change a model: other values in fields, and these flags;
-- `written(file, text)`, if its elements may be others than the installed MuJoCo reads: what it
-  reads in the file, as MJCF. Of an engine whose `load` says "names" of elements, by kind, it is
-  asked for where they differ.
+  array that the engine remembers from step to step beside qpos and qvel, `kept_memory` the names
+  of those that a write into qpos or qvel leaves as they are, `unavailable` the names of derived
+  arrays that the engine does not offer.
+  `place(vector)` takes qpos, qvel and the memory in a row, and overwrites the whole state;
+  `state()` returns the same vector; `command(ctrl)` takes a command, in which the poses of mocap
+  bodies follow ctrl. `advance(steps, fastest)` takes engine steps, up to one after which a position
+  is beyond 1e10 or a velocity beyond `fastest`, and returns how many. `forward()` derives of the
+  present. `derived(vector)` returns the derived arrays by name, and of the contacts geom, dist,
+  pos, frame, force and torque: of the state that the last step started from or, after `forward`,
+  of the present, which is passed to it again;
+- `edit(model, edits, flags)`, if it can change a model: set fields to other values, and the flags;
+- `written(file, text)`, if its elements may differ from those that the installed MuJoCo reads:
+  return what it reads in the file, as MJCF. It is called where "names" of elements, by kind, are
+  among the facts of `load`, and differ.
 
-A message and its answer are pickled: what is said, and arrays as shapes and bytes, since an older
-NumPy cannot read the arrays of a later one. The process ends with its input, in the midst of a
-step, too; on Windows after the step.
+A message and its answer are pickled: facts, and arrays as shapes and bytes, since an older NumPy
+cannot read the arrays of a later one. The process ends with its input, in the midst of a step,
+too; on Windows after the step.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class Answerer:
     def make(self, job, _):
         """Make a world of a model."""
         world = self.engine.Simulation(self.things[job["model"]])
-        said = {name: getattr(world, name) for name in ("memory", "kept_memory", "untold")}
+        said = {name: getattr(world, name) for name in ("memory", "kept_memory", "unavailable")}
         return {"world": self.keep(world), **said}, {}
 
     def run(self, job, arrays):

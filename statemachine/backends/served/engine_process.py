@@ -78,7 +78,7 @@ class MadeWorld:
         number: Of the world, in the process of the engine.
         memory: As `HiddenWorld.memory_layout`.
         kept_memory: As in a HiddenWorld.
-        unavailable: As `HiddenWorld.untold`.
+        unavailable: As `HiddenWorld.unavailable`.
     """
 
     number: int
@@ -222,7 +222,7 @@ class Server:
             number=answer["world"],
             memory=tuple((name, int(length)) for name, length in answer["memory"]),
             kept_memory=tuple(answer["kept_memory"]),
-            unavailable=frozenset(answer["untold"]),
+            unavailable=frozenset(answer["unavailable"]),
         )
 
     def run(self, world: int, arrays: Mapping[str, Array], steps: int, **job: Any) -> RunSteps:
@@ -298,7 +298,7 @@ class ServedWorld(HiddenWorld):
         # No call: it may be collected in the midst of another.
         self._end = weakref.finalize(self, server.forgotten.append, self._world)
         self.memory_layout, self.kept_memory = made.memory, made.kept_memory
-        self.untold = made.unavailable
+        self.unavailable = made.unavailable
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
@@ -354,8 +354,8 @@ class ServedWorld(HiddenWorld):
         arrays: dict[str, Any] = dict(self._derived)
         if self._frames:
             arrays |= self._with_frames(arrays)
-        values = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
-        if "contacts" not in self.untold:
+        values = {n: arrays.pop(n) for n in DERIVED if n not in self.unavailable}
+        if "contacts" not in self.unavailable:
             values["contacts"] = Contacts(**arrays)
         return values
 

@@ -40,7 +40,7 @@ ALARMS = [int(kind) for kind in (_ALL.mjWARN_BADQPOS, _ALL.mjWARN_BADQVEL, _ALL.
 class Simulation:
     """One MjData, and how its State is put and read."""
 
-    untold = ()
+    unavailable = ()
 
     def __init__(self, model) -> None:
         self.model, self.data = model, mujoco.MjData(model)
@@ -64,7 +64,7 @@ class Simulation:
     def command(self, ctrl) -> None:
         """Take a command: ctrl, then where mocap bodies are."""
         data, nu = self.data, self.model.nu
-        self.wires, data.ctrl[:] = ctrl, ctrl[:nu]
+        self.commands, data.ctrl[:] = ctrl, ctrl[:nu]
         data.mocap_pos.flat, data.mocap_quat.flat = np.split(ctrl[nu:], [3 * self.model.nmocap])
 
     def advance(self, steps: int, fastest: float) -> int:
@@ -80,7 +80,7 @@ class Simulation:
             if self._near(fastest) and not self.warned():
                 return steps
             self.place(start)
-            self.command(self.wires)
+            self.command(self.commands)
         for k in range(1, steps + 1):
             mujoco.mj_step(model, data)
             if self.warned():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...errors import EndedEarlyError
 from ..common import INTERRUPTED, TerminalReporter, complain, show
 from .options import check_options
-from .requests import explain_request_of, request_of, typed
+from .requests import explain_request_of, request_of
 
 if TYPE_CHECKING:
     from ...engines.pictures import Renderer
@@ -124,6 +124,7 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
 def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     """Compare both runs, write what is asked for, and show."""
     from ...lab.questions import compare_report, comparison
+    from ...lab.questions.page_command import page_command
     from ...lab.questions.requests.gap import answer
     from ...lab.questions.run_files import ShownModels, find_renderer, write_page, write_tests
     from ...lab.why import InterruptedExplanation
@@ -140,7 +141,8 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     page = comparison.page(result, options.details)
     if files.html is not None:
         try:
-            whole = compare_report.whole_page(result, asked, typed(options, request.run), reporter)
+            made_by = page_command(request, asked, files.html)
+            whole = compare_report.whole_page(result, asked, made_by, reporter)
         except InterruptedExplanation as stop:
             complain(f"stopped: {files.html} was not written", 0)
             show(why.page(stop.result, options.details), stop.result, options.json)

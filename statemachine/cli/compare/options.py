@@ -182,7 +182,8 @@ def _add_steps(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--converge",
         action="store_true",
-        help="run with steps as given, halved and quartered: what vanishes is discretisation",
+        help="run with timesteps h, h/2 and h/4, and h/8 and h/16 where that leaves it unclear: "
+        "what vanishes is discretisation",
     )
     group.add_argument(
         "--versions",

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import BadInputError
 from ...installed import PAIR
-from ..common import EXPERIMENTS, PROGRAM, flag_of, pairs_of
+from ..common import EXPERIMENTS, PROGRAM, pairs_of
 from .options import PARTS, refuse_options
 
 if TYPE_CHECKING:
@@ -236,53 +235,3 @@ def _check_words_of_models(options: argparse.Namespace) -> None:
                 f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
                 f"{others}; to run something, type {PROGRAM} compare {run}"
             )
-
-
-def typed(options: argparse.Namespace, run: Request) -> str:
-    """Return the command that makes a page again, without folders of this machine."""
-    from ...lab.compare.labels import typed_option
-    from ...measures.text import command
-
-    words = [PROGRAM, "compare", *run.words, *(side.label for side in run.sides)]
-    for name, value in run.options.items():
-        if name != "timestep":
-            words.append(typed_option(name, value))
-    if not run.sides and tuple(run.backends) != PAIR:
-        for backend in run.backends:
-            words += ["--backend", backend]
-    return command(words, *_typed_of_run(run), *_typed_of_page(options, run))
-
-
-# A flag, its value, and the value that needs no flag.
-Flag = tuple[str, object, object]
-
-
-def _typed_of_run(run: Request) -> list[Flag]:
-    """Return the options that say how something is run."""
-    menagerie = None if run.menagerie is None else "DIR"
-    return [
-        ("--menagerie", menagerie, None),
-        ("--seconds", run.seconds, None),
-        ("--timestep", run.options.get("timestep"), None),
-        ("--seed", run.seed, 0),
-        ("--every", run.every, 1),
-        ("--keyframe", run.keyframe, None),
-    ]
-
-
-def _typed_of_page(options: argparse.Namespace, run: Request) -> list[Flag]:
-    """Return the options that say how two runs are compared, and what is written."""
-    flags: list[Flag] = []
-    for left, right in run.names.items():
-        flags.append(("--map", f"{left}={right}", None))
-    for text in options.tolerance:
-        flags.append(("--tolerance", text, None))
-    for part in PARTS:
-        flags.append((flag_of(part), getattr(options, part), None))
-    for text in options.uncertainty:
-        flags.append(("--uncertainty", text, None))
-    flags.append(("--no-chaos", options.no_chaos, False))
-    flags.append(("--quantity", options.quantity or None, None))
-    flags.append(("--no-why", options.no_why, False))
-    flags.append(("--html", Path(options.html).name, None))
-    return flags

@@ -32,7 +32,7 @@ def answers_in(file: Path) -> dict[str, dict[str, Any]]:
             raise ValueError("an answer is neither right nor wrong")
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise BadInputError(
-            f"{file.name} is there and is not a record of predictions ({error}): name another file"
+            f"{file.name} exists, and is not a record of predictions ({error}): name another file"
         ) from None
     return answers
 

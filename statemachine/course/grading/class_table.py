@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-import textwrap
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +15,12 @@ from .exercise import LOOK
 from .judges import JUDGES, Judgement
 
 _HEAD = (
-    "file", "right", "of", *JUDGES, "remarks", "tests", "predictions", "student", "same_as",
-    "alike", "details", "sha256", "made_with",
+    "file", "right", "of", *JUDGES, "remarks", "tests", "predictions", "student", "alike",
+    "details", "sha256", "made_with",
 )  # fmt: skip
 NOTHING = "handed in nothing"
 # In `made_with`, where what a student's code reads is only watched.
 WATCHED = "reading only watched"
-_FEW = 120  # characters of a remark
 _WORDS = {"right", "wrong", "not written", "not judged"}
 
 
@@ -39,9 +38,8 @@ class ClassEntry:
         tests: How many faults the student's tests catch, and which they do not.
         predictions: How many were right.
         student: Who handed it in, by the roster.
-        same_as: The first submission whose code is the same, comments and layout aside.
-        alike: How much of the functions' syntax is that of another submission, names and
-            constants aside, and of which one the most.
+        nearest: The submission whose code is most like it; "" where none has any of it.
+        likeness: How much the two are alike, 0 to 1; see `likeness`.
     """
 
     name: str
@@ -49,16 +47,28 @@ class ClassEntry:
     functions: tuple[Judgement, ...]
     refusal: str
     made_with: str
-    same_as: str = ""
-    alike: str = ""
+    nearest: str = ""
+    likeness: float = 0.0
     tests: str = ""
     predictions: str = ""
     student: str = ""
 
     @property
+    @only_on_pages
+    def label(self) -> str:
+        """Who handed it in; without a roster, what it is called."""
+        return self.student if self.student else self.name
+
+    @property
     def right(self) -> int:
         """How many functions do what they should."""
         return sum(judgement.passed for judgement in self.functions)
+
+    @property
+    @only_on_pages
+    def alike(self) -> str:
+        """How much it is like another submission, and which; "" where it is like none."""
+        return f"{math.floor(100 * self.likeness)}% {self.nearest}" if self.nearest else ""
 
     @property
     def judged(self) -> bool:
@@ -68,13 +78,14 @@ class ClassEntry:
 
     @property
     @only_on_pages
-    def why_not_judged(self) -> str:
-        """Why there is no verdict on it, or on one of its functions; "" where there is."""
+    def reasons_not_judged(self) -> tuple[str, ...]:
+        """Why there is no verdict on it, or on some of its functions, each reason once."""
         if self.judged:
-            return ""
+            return ()
         if self.refusal:
-            return self.refusal
-        return next(each.remarks[0] for each in self.functions if not each.judged)
+            return (self.refusal,)
+        reasons = [self._text_of(each) for each in self.functions if not each.judged]
+        return tuple(dict.fromkeys(reasons))
 
     @property
     @only_on_pages
@@ -94,24 +105,44 @@ class ClassEntry:
         return tuple(dict.fromkeys(text for text in remarks if text.startswith(LOOK)))
 
     @property
-    def reasons(self) -> str:
-        """What is not right, in a line with a few words for each function; "" if all is."""
-        words: dict[str, str] = {}
+    @only_on_pages
+    def remarks(self) -> tuple[FunctionRemark, ...]:
+        """What is not right, a remark for each function; of the whole file, only one."""
+        if self.refusal:
+            return (FunctionRemark("", self.refusal),)
+        remarks: list[FunctionRemark] = []
         for judgement in self.functions:
             if not judgement.passed:
-                words[judgement.function] = few_words(judgement)
-        if len(words) == len(JUDGES) and len(set(words.values())) == 1:
-            return next(iter(words.values()))  # of the file, and not of a function
-        texts = [f"{name.removeprefix('demo_')}: {text}" for name, text in words.items()]
-        if self.refusal:
-            texts.insert(0, self.refusal)
-        return "; ".join(texts)
+                remarks.append(FunctionRemark(judgement.function, self._text_of(judgement)))
+        texts = {remark.text for remark in remarks}
+        if len(remarks) == len(JUDGES) and len(texts) == 1:
+            return (FunctionRemark("", remarks[0].text),)
+        return tuple(remarks)
+
+    def _text_of(self, judgement: Judgement) -> str:
+        """Return all that is said of a function that is not right."""
+        if not judgement.written:
+            return verdict_word(judgement)
+        return "; ".join(text for text in judgement.remarks if text not in self.looks)
 
 
-def few_words(judgement: Judgement) -> str:
-    """Return why a function is not right: its first remark, as far as there is room for it."""
-    text = judgement.remarks[0] if judgement.written else verdict_word(judgement)
-    return textwrap.shorten(text, _FEW, placeholder=" …")
+@dataclass(frozen=True)
+class FunctionRemark:
+    """What is not right in a submission.
+
+    Attributes:
+        function: The function that it is said of; "" for the whole file.
+        text: What is said, all of it.
+    """
+
+    function: str
+    text: str
+
+    @property
+    def line(self) -> str:
+        """The remark, after the short name of the function."""
+        name = self.function.removeprefix("demo_")
+        return f"{name}: {self.text}" if name else self.text
 
 
 def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
@@ -119,11 +150,10 @@ def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
     yield _HEAD
     for entry in entries:
         yield (
-            *_verdicts_of(entry),
+            *_first_cells(entry),
             entry.tests,
             entry.predictions,
             entry.student,
-            entry.same_as,
             entry.alike,
             _details_of(entry),
             entry.sha256,
@@ -131,21 +161,22 @@ def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
         )
 
 
-def _verdicts_of(entry: ClassEntry) -> list[object]:
-    """Return the cells up to the remarks; among them a word for each function of the exercise."""
-    right = entry.right if entry.judged else ""
+def verdicts_of(entry: ClassEntry) -> dict[str, str]:
+    """Return a word for each function of the exercise."""
     words = {judgement.function: verdict_word(judgement) for judgement in entry.functions}
     other = "not written" if entry.judged else "not judged"
-    verdicts = [words.get(name, other) for name in JUDGES]
-    return [entry.name, right, len(JUDGES), *verdicts, _remarks_of(entry)]
+    return {name: words.get(name, other) for name in JUDGES}
+
+
+def _first_cells(entry: ClassEntry) -> list[object]:
+    """Return the cells up to the remarks."""
+    right = entry.right if entry.judged else ""
+    return [entry.name, right, len(JUDGES), *verdicts_of(entry).values(), _remarks_of(entry)]
 
 
 def _remarks_of(entry: ClassEntry) -> str:
-    """Return what is not right, and what somebody should look at."""
-    remarks = list(entry.looks)
-    if entry.reasons:
-        remarks.insert(0, entry.reasons)
-    return "; ".join(remarks)
+    """Return what is not right, and what somebody should look at, a line each."""
+    return "\n".join([*(remark.line for remark in entry.remarks), *entry.looks])
 
 
 def _details_of(entry: ClassEntry) -> str:

@@ -1,4 +1,4 @@
-"""What is said of students: a file judged, the files of a class, and what their tests catch."""
+"""What is said of a student: a file judged, and what tests catch."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ...measures.text import count, versions_of
+from ...measures.text import versions_of
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
-from .class_table import ClassEntry, verdict_word
+from .class_table import verdict_word
 from .exercise import Grade
 from .faults.examination import Examination, FaultTrial
 from .judges import JUDGES, Judgement
@@ -61,100 +61,6 @@ def _remarks(grade: Grade) -> list[_Remark]:
         for text in judgement.remarks:
             remarks.append(_Remark(judgement.function, text, judgement.passed))
     return remarks
-
-
-@dataclass(frozen=True)
-class _Look:
-    """What somebody should look at in a file."""
-
-    name: str
-    text: str
-
-
-@dataclass(frozen=True)
-class ClassPage(PageContent):
-    """Content of the page of a class.
-
-    Attributes:
-        submissions: What became of each.
-        entries: Table with a row for each of them.
-        ignored: Names of files that were not looked at.
-    """
-
-    template = "classroom.md.j2"
-    submissions: Sequence[ClassEntry]
-    entries: Table
-    ignored: Sequence[str]
-    only_watched: str = ONLY_WATCHED
-
-    @property
-    def counted(self) -> list[ClassEntry]:
-        """Submissions that count: with a roster, files of nobody on it do not."""
-        of_students = [entry for entry in self.submissions if entry.student]
-        return of_students if of_students else list(self.submissions)
-
-    @property
-    def size(self) -> str:
-        """How many students or files count."""
-        return count(len(self.counted), "student" if self.counted[0].student else "file")
-
-    @property
-    def made_with(self) -> str:
-        """Versions and settings."""
-        return self.submissions[0].made_with
-
-    @property
-    def solved(self) -> int:
-        """How many have all functions right."""
-        return sum(entry.solved for entry in self.counted)
-
-    @property
-    def is_watched(self) -> bool:
-        """Whether what some code reads is only watched, not prevented."""
-        return any(entry.watched for entry in self.submissions)
-
-    @property
-    def copies(self) -> list[ClassEntry]:
-        """Submissions with the same code as another."""
-        return [entry for entry in self.submissions if entry.same_as]
-
-    @property
-    def looks(self) -> list[_Look]:
-        """What somebody should look at."""
-        return [_Look(entry.name, text) for entry in self.submissions for text in entry.looks]
-
-    @property
-    def unjudged(self) -> list[ClassEntry]:
-        """Submissions that were not judged."""
-        return [entry for entry in self.submissions if not entry.judged]
-
-
-def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
-    """Make the page with a row a file, and what a teacher should look at.
-
-    Args:
-        entries: What became of each submission.
-        ignored: Names of files that were not looked at.
-    """
-    return render(ClassPage(entries, class_table(entries), ignored))
-
-
-def class_table(entries: Sequence[ClassEntry]) -> Table:
-    """Make the table of a class, without columns in which nothing stands."""
-    columns: dict[str, Callable[[ClassEntry], str]] = {}
-    columns["file"] = lambda entry: entry.student if entry.student else entry.name
-    columns["right"] = _right_of
-    columns["what is not right"] = lambda entry: entry.reasons
-    columns["tests"] = lambda entry: entry.tests.partition(";")[0]
-    columns["predictions"] = lambda entry: entry.predictions
-    columns["alike"] = lambda entry: entry.alike
-    filled = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
-    return Table.of(entries, filled, words=filled, wide={"predictions", "alike"})
-
-
-def _right_of(entry: ClassEntry) -> str:
-    """Return how many functions are right; "?" where the file was not judged."""
-    return f"{entry.right} of {len(JUDGES)}" if entry.judged else "?"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import json
 import os
@@ -11,7 +10,6 @@ import secrets
 import stat
 import sys
 import threading
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -199,14 +197,13 @@ def content(file: Path, most: int) -> bytes:
         return b""
 
 
-# The files of a student's submission: which are its own, which hold functions, which are alike.
+# The files of a student's submission: which are its own, and which hold functions.
 
 LARGEST = 1_000_000  # bytes of a student's file
 _MOST = 1000  # files of a student's folder
 _NAMES = "|".join(JUDGES).encode()
 _DEFINES = re.compile(rb"\bdef\s+(?:%s)\s*\(" % _NAMES)
 _COMPILED = re.compile(rb"\b(?:%s)\b" % _NAMES)
-_RUN = 4  # kinds of syntax in a row that are compared
 
 
 def has_functions(file: Path) -> bool:
@@ -322,51 +319,3 @@ def digest(files: Mapping[str, Path]) -> str:
             return ""
         sha.update(b"%d %d " % (len(text), len(start)) + text + start)
     return sha.hexdigest() if files else ""
-
-
-def code_of(path: Path | None) -> str:
-    """Return a digest of a file's code, without comments, docstrings and layout; or ""."""
-    tree = _tree(path)
-    return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest() if tree.body else ""
-
-
-def shape_of(path: Path | None) -> Counter[tuple[str, ...]]:
-    """Return the kinds of syntax in a file's functions, in short runs, whatever is named how.
-
-    Of those that are judged and are written, and of what they call in the file.
-    """
-    defined = {
-        node.name: node
-        for node in _tree(path).body
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef))
-        and "'NotImplementedError'" not in ast.dump(node)
-    }
-    names = [name for name in JUDGES if name in defined]
-    for name in names:  # which grows meanwhile
-        for inner in ast.walk(defined[name]):
-            if isinstance(inner, ast.Name) and inner.id in defined and inner.id not in names:
-                names.append(inner.id)
-    text = "".join(ast.dump(defined[name]) for name in names)
-    kinds = re.findall(r"\b[A-Z]\w+(?=\()", text)
-    return Counter(zip(*(kinds[k:] for k in range(_RUN)), strict=False))
-
-
-def likeness(left: Counter[tuple[str, ...]], right: Counter[tuple[str, ...]]) -> float:
-    """Return the part of both that both have: 1 for the same, 0 where there is nothing."""
-    total = (left | right).total()
-    return (left & right).total() / total if total else 0.0
-
-
-def _tree(path: Path | None) -> ast.Module:
-    """Return a file's syntax without docstrings; empty for none, or where it is too large."""
-    text = start_of(path) if path is not None else b""
-    try:
-        tree = ast.parse(text if len(text) <= LARGEST else b"")
-        for node in ast.walk(tree):
-            if not isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)):
-                continue
-            if ast.get_docstring(node, clean=False) is not None:
-                node.body = node.body[1:] or [ast.Pass()]
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return ast.Module([], [])
-    return tree

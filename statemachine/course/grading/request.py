@@ -14,11 +14,12 @@ from ...lab.runs.reporter import QUIET, Reporter
 from ...models import AnyPath
 from ...processes import checked_jobs
 from . import exercise
-from .class_table import ClassEntry
+from .alike import compare_submissions
 from .classroom import judge_all
 from .faults import FAULTS
 from .faults.examination import Examination
 from .faults.run import examine
+from .overview import ClassResult, class_result
 from .roster import enrolled
 from .submissions import Submission, not_looked_at, submission_in, submissions
 
@@ -51,7 +52,7 @@ class ClassRequest:
         paths: Files, or folders of files; at least one.
         backend: As of `CheckRequest`.
         time_limit: As of `CheckRequest` [s].
-        jobs: Number of files that are judged at once; None for one for two processors.
+        jobs: Number of files that are judged at once; None for one a processor.
         table: A CSV file that is written anew after each file, and from which what is judged
             already is taken over; None for none.
         roster: A CSV file with a row for each student; None for none.
@@ -74,24 +75,6 @@ class ClassRequest:
         _check_backend(self.backend)
         checked_jobs(self.jobs)
         exercise.check_settings(self.backend, self.time_limit)
-
-
-@dataclass(frozen=True)
-class ClassResult:
-    """What came of the files of a class.
-
-    Attributes:
-        entries: One for each submission.
-        ignored: Names of files in the folders that nobody hands in.
-    """
-
-    entries: tuple[ClassEntry, ...]
-    ignored: tuple[str, ...]
-
-    @property
-    def complete(self) -> bool:
-        """Whether every submission could be judged."""
-        return all(entry.judged for entry in self.entries)
 
 
 @dataclass(frozen=True)
@@ -140,17 +123,20 @@ def answer_class(request: ClassRequest, reporter: Reporter = QUIET) -> ClassResu
     submitted: Sequence[Submission] = submissions(request.paths)
     if request.roster is not None:
         submitted = enrolled(submitted, request.roster)
-    with reporter.stage(f"{len(submitted)} files") as progress:
+    jobs = checked_jobs(request.jobs)
+    comparison = compare_submissions(submitted)
+    with reporter.stage(f"{len(submitted)} files", jobs) as progress:
         entries = judge_all(
             submitted,
             request.backend,
             time_limit=request.time_limit,
-            jobs=request.jobs,
+            jobs=jobs,
             table=request.table,
             tests=request.tests,
             progress=progress,
+            comparison=comparison,
         )
-    return ClassResult(tuple(entries), tuple(not_looked_at(request.paths)))
+    return class_result(entries, comparison.groups, not_looked_at(request.paths))
 
 
 def answer_faults(request: FaultsRequest, reporter: Reporter = QUIET) -> Examination:

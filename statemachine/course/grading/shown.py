@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 from ...backends import backend_module
-from ...engines import room
+from ...engines import raw_engine_of
 from ...installed import DEFAULT, ENGINES
 from ...models import models_dir
 from ...processes.places import View, python_view
@@ -44,7 +44,7 @@ def modules_of(backend: str) -> tuple[str, ...]:
     names = ["numpy", ENGINES[DEFAULT].module]
     if backend in ENGINES:
         names.append(ENGINES[backend].module)
-    for module in (backend_module(backend), type(room(backend)).__module__):
+    for module in (backend_module(backend), type(raw_engine_of(backend)).__module__):
         package = module.partition(".")[0]
         if package != _PACKAGE.name:  # of which `_of_machine` says what is shown
             names.append(package)

@@ -35,6 +35,11 @@ class Submission:
     student: str = ""
 
     @property
+    def label(self) -> str:
+        """Who handed it in; without a roster, what it is called."""
+        return self.student if self.student else self.name
+
+    @property
     def own(self) -> dict[str, Path]:
         """Files that belong to it, by their names in its folder; alone in that of a class."""
         if self.folder:

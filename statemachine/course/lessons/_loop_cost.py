@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...backends import load as load_model
-from ...engines import room
+from ...engines import raw_engine_of
 from ...interface import Data, Model, make_data, reset, step
 from ...lab.runs.drive import Progress
 from ...lab.runs.in_turns import Ratio, in_turns
@@ -58,7 +58,7 @@ def measured(model: Model, steps: int, progress: Progress) -> LoopCost:
     """
     rounds = rounds_of(steps)
     models = {_BULK: model, _AGAIN: model, _LOOP: model}
-    if room(model.backend).emulated:
+    if raw_engine_of(model.backend).emulated:
         as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
         models[_OWN] = as_it_comes.replace(gravity=model.gravity, timestep=model.timestep)
     ways: dict[str, Callable[[], None]] = {}

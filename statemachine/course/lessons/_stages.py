@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ...lab.probes import conventions
 from ...lab.runs.drive import Progress
@@ -40,7 +40,7 @@ class OwnAnswer:
 
 def own_answers(model: Model, question: str) -> list[OwnAnswer]:
     """Ask the engine behind a Model, alone, if its backend emulates some of the contract."""
-    if not room(model.backend).emulated:  # the interface is the engine's own
+    if not raw_engine_of(model.backend).emulated:  # the interface is the engine's own
         return []
     findings = conventions.ask(question, model.backend)
     if findings is None:

@@ -100,7 +100,7 @@ def growth(differences: Mapping[str, Array], bodies: Mapping[str, Array | None])
     ]
 
 
-def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...]:
+def restore_methods(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...]:
     """Go back in each way that the interface has, and compare the futures.
 
     Args:

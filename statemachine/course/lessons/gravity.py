@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...errors import DivergedError, UnsupportedError
 from ...interface import Model, make_data, reset
 from ...lab.runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
@@ -150,7 +150,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> GravityResult:
         servos_on=servos_on,
         servos_off=servos_off,
         longer=longer,
-        alone=room(model.backend).left_alone(model, seconds, model.joint_id(joint)),
+        alone=raw_engine_of(model.backend).uncommanded_joint(model, seconds, model.joint_id(joint)),
         provenance=provenance(model),
     )
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.records import WayBack
 from ...errors import BadInputError, UnsupportedError, check_name
 from ...interface import Array, Ints, JointType, Model, get_state
@@ -29,8 +29,8 @@ from ._two_runs import (
     broken_table,
     growth,
     of_its_own,
+    restore_methods,
     through_us,
-    ways_back,
 )
 from .session import CodeRun, Options
 
@@ -214,7 +214,7 @@ def _compared(play: CodeRun, options: Options, progress: Progress) -> ReplayResu
     ctrl = data.ctrl.copy()
     state = [name for name, size in get_state(model, data).layout if size]
     keyframe = model.keyframes[0].name if model.keyframes else None
-    own_ways = room(model.backend).ways_back(model)
+    own_ways = raw_engine_of(model.backend).restore_methods(model)
     return ReplayResult(
         ctrl=ctrl,
         broken_by=way,
@@ -226,7 +226,7 @@ def _compared(play: CodeRun, options: Options, progress: Progress) -> ReplayResu
         pairs=steps_of_pair,
         keyframe=keyframe,
         state=tuple(state),
-        ways=ways_back(model, ctrl),
+        ways=restore_methods(model, ctrl),
         own_ways=own_ways,
         provenance=provenance(model),
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...interface import JointType, Model, make_data, reset
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
@@ -125,7 +125,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> StateResult:
 
 def _terms_of(model: Model) -> tuple[Term, ...]:
     """Return what the engine itself calls what the interface has a name for."""
-    terms = room(model.backend).terms(model)
+    terms = raw_engine_of(model.backend).terms(model)
     return tuple(Term(term.thing, term.ours, term.engine) for term in terms)
 
 

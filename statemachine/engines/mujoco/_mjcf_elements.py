@@ -58,6 +58,8 @@ class MjcfElements:
         Raises:
             NotWrittenError: The file has no such element that one could name.
         """
+        if kind == "wrap":
+            return self._in_tendon(number)
         if kind not in _COUNTS:
             raise NotWrittenError(f"what it has of {kind} is no attribute of one element")
         name = getattr(self._raw, _ACCESS.get(kind, kind))(number).name
@@ -75,6 +77,28 @@ class MjcfElements:
             by = f", which <{maker}> may have made" if maker else ""
             raise NotWrittenError(f"the file has no element of its own for {label}{by}")
         return elements[number]
+
+    def _in_tendon(self, wrap: int) -> XmlElement:
+        """Return what a tendon passes: a joint with its coefficient, or a pulley.
+
+        Args:
+            wrap: Its id.
+
+        Raises:
+            NotWrittenError: The file does not have the path of the tendon one by one.
+        """
+        raw = self._raw
+        tendon = int(np.flatnonzero(raw.tendon_adr <= wrap)[-1])
+        path = [*self._source.children(self.find("tendon", tendon), ())]
+        place = wrap - int(raw.tendon_adr[tendon])
+        if len(path) != raw.tendon_num[tendon]:
+            label = raw.tendon(tendon).name or f"tendon {tendon}"
+            raise NotWrittenError(
+                f"the file has no element of its own for entry {place} of {label}"
+            )
+        joint = raw.joint(int(raw.wrap_objid[wrap])).name if path[place].tag == "joint" else ""
+        of_joint = [each for each in path if joint and each.attributes.get("joint") == joint]
+        return of_joint[0] if len(of_joint) == 1 else path[place]
 
     def _on_body(self, kind: str, number: int) -> XmlElement | None:
         """Return an element by its place on its body; None where the file does not tell it.

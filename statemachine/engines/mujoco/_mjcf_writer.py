@@ -47,6 +47,7 @@ _POLYNOMIALS = {
 # How many numbers of its size a geom has, by its type in words.
 _SIZES = {"plane": 3, "sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 2, "box": 3}
 _HINGE, _SLIDE = 3, 2
+_POLYNOMIAL = 5  # numbers of the polynomial by which one coordinate follows another
 
 
 class ElementWriter:
@@ -82,6 +83,8 @@ class ElementWriter:
             "actuator_dynprm": self._dynamics,
             "actuator_dyntype": self._dynamics,
             "actuator_target": self._drives,
+            "wrap_prm": self._entry_of_tendon,
+            "eq_data": self._parameters_of_equality,
         }
         if array in special:
             special[array](raw)
@@ -94,6 +97,24 @@ class ElementWriter:
             self._set(array.partition("_")[2], numbers_text(self._value(array)))
         else:
             self._plain(array)
+
+    def _entry_of_tendon(self, _raw: Any) -> None:
+        """Write the coefficient of a joint in a tendon, or the divisor of a pulley."""
+        attribute = "divisor" if self._element.tag == "pulley" else "coef"
+        self._set(attribute, numbers_text(self._value("wrap_prm")))
+
+    def _parameters_of_equality(self, _raw: Any) -> None:
+        """Write the polynomial of a coupling, or the place of a connection in its first body.
+
+        Where the second body of a connection has it follows from that.
+        """
+        match self._element.tag:
+            case "joint" | "tendon":
+                self._set("polycoef", numbers_text(self._value("eq_data")[:_POLYNOMIAL]))
+            case "connect" if "anchor" in self._element.attributes:
+                self._set("anchor", numbers_text(self._value("eq_data")[:3]))
+            case tag:
+                raise NotWrittenError(f"no attribute of a <{tag}> is what differs of it")
 
     def _set(self, attribute: str, text: str | None) -> None:
         """Write an attribute, if it is not so already."""
@@ -112,7 +133,7 @@ class ElementWriter:
         _, _, word = array.partition("_")
         attribute = _NAMES.get(array, word)
         value, before = self._value(array), np.atleast_1d(self._target.before(array, self._number))
-        if not attribute or array.startswith(("eq_data", "actuator_trn")):
+        if not attribute or array.startswith("actuator_trn"):
             raise NotWrittenError(f"no attribute of the file is {array} of a compiled model")
         if array in fields.FLAGS_OF_ELEMENTS:
             self._set(attribute, "true" if value[0] else "false")

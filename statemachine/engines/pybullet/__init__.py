@@ -30,8 +30,8 @@ class PybulletEngine(RawEngine):
         "contact impulses, which cannot be set"
     )
     terms = function_of(".pybullet.as_it_comes:terms")
-    left_alone = function_of(".pybullet.as_it_comes:left_alone")
-    ways_back = function_of(".pybullet.as_it_comes:ways_back")
+    uncommanded_joint = function_of(".pybullet.as_it_comes:uncommanded_joint")
+    restore_methods = function_of(".pybullet.as_it_comes:restore_methods")
     phrases = function_of(".pybullet.conventions:phrases")
     stepper = function_of(".pybullet.driven:stepper")
     call_watch = function_of(".pybullet.calls:PybulletWatch")

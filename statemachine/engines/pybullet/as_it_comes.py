@@ -139,7 +139,7 @@ _STARTS = (
 )
 
 
-def left_alone(model: Model, seconds: float, joint: int) -> tuple[UncommandedJoint, ...]:
+def uncommanded_joint(model: Model, seconds: float, joint: int) -> tuple[UncommandedJoint, ...]:
     """Run a freshly loaded robot that nobody commands, and read what a joint's motor exerts.
 
     Args:
@@ -216,7 +216,7 @@ def _as_loaded(model: Model, qpos: Array, ctrl: Array, steps: int) -> Iterator[D
         yield machine
 
 
-def ways_back(model: Model) -> tuple[WayBack, ...]:
+def restore_methods(model: Model) -> tuple[WayBack, ...]:
     """Try which of the engine's own ways to go back is exact, in the middle of contact.
 
     Each run starts in a new client from keyframe 0 (or the default pose), squeezes by

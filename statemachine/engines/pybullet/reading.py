@@ -17,7 +17,7 @@ from ...backends.bullet.urdf import UNLIMITED
 from ...installed import DEFAULT, engine_version
 from ...interface import Array, make_data
 from ...rotations import HERE, Placement, matrix_from_quat, wxyz_from_xyzw
-from .. import room
+from .. import raw_engine_of
 from ..description import urdf
 from ..description.reading import ModelReading
 from ..description.records import CollisionShape, Inertial, Link, Robot, RobotJoint, Setting
@@ -34,7 +34,7 @@ def read(path: Path) -> ModelReading:
         MissingEngineError: It is not installed here.
         ModelError: It cannot read the file.
     """
-    return room(DEFAULT).read_robot(_robot(path), path)
+    return raw_engine_of(DEFAULT).read_robot(_robot(path), path)
 
 
 def _robot(path: Path) -> Robot:

@@ -7,9 +7,9 @@ from pathlib import Path
 from ...errors import BadInputError
 from ...models import AnyPath
 from ...show.charts import write_pictures
-from ..compare.typed_command import typed_command
 from ..questions import plot
 from ..questions.compare_report import whole_page
+from ..questions.page_command import page_command
 from ..questions.requests.causes import ExplainRequest
 from ..questions.requests.gap import CompareResult
 from ..questions.requests.versions import VersionsResult
@@ -87,7 +87,7 @@ def _write_page(result: CompareResult, target: Path, why: bool, reporter: Report
     RunFiles(html=target).check(reporter)
     run = result.request.run
     asked = ExplainRequest(run, uncertainty=result.request.uncertainty) if why else None
-    made_by = typed_command(run).lines()
+    made_by = page_command(result.request, asked, target)
     page = whole_page(result, asked, made_by, reporter)
     write_page(target, result.run.traces, ShownModels.of(run), page)
 

@@ -102,7 +102,7 @@ def converge(
     keyframe: str | None = None,
     reporter: Reporter = QUIET,
 ) -> ConvergeResult:
-    """Return what of a gap vanishes where the steps are halved and quartered.
+    """Return what of a gap vanishes with the timestep h: runs at h, h/2, h/4, and at most h/16.
 
         lab.converge("a.xml@mujoco", "a.xml@pybullet", what="fall").vanishes
 

@@ -26,6 +26,8 @@ from .outcomes import RunOutcome, outcomes_of
 from .quantity_agreement import Agreement, Verdict, first_touch, missed_touch, of_outcome
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
+_BETWEEN = 1.5  # of the longer timestep: farther apart, and both sides have moments between
+
 ComparisonOutcome = Literal["agrees", "differs", "ended", "nothing moved"]
 
 
@@ -122,6 +124,16 @@ class Comparison:
     outcomes: tuple[RunOutcome, ...]
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
+
+    @property
+    def gap_of_moments(self) -> float | None:
+        """How far apart the moments are [s], where both sides have others between them; else None.
+
+        Sides whose timesteps meet now and then alone are compared there alone.
+        """
+        steps = self.left.trace.timestep, self.right.trace.timestep
+        spacing = self.until / max(1, self.moments - 1)
+        return spacing if spacing > _BETWEEN * max(steps) else None
 
     @property
     def outcome(self) -> ComparisonOutcome:

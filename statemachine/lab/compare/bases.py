@@ -14,18 +14,19 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...interface import Array, Model, make_data, reset
 from ...interface.free_base import FreeBase
 from ...interface.options import OptionValue
 from ...release_names import engine_of
 from ...rotations import HERE, Placement, matrix_from_quat
-from ..runs.floating import Bases, base_of, free_joint_of_base
+from ..runs.floating import BaseFrame, Bases, base_of, free_joint_of_base, free_joint_of_robot
 from .matching import match_trees
 from .sides import Side
 
 _SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 _SAME = 1e-12  # [m] and of a quaternion; what is nearer is one place
+_ONE_FRAME = 1e-6  # [m] and [rad]: to so much files write where a frame is
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,7 @@ def load_sides(
         right=base_of(right),
         taken_by=taken_by,
         floating_loader=_floating_loader((left, right), is_open),
+        frame=_base_frame(left, right, names),
     )
     return LoadedSides((left, right), bases)
 
@@ -83,7 +85,7 @@ def _floating_loader(
 ) -> Literal["left", "right", ""]:
     """Return the side whose engine's own loader would let its base float; "" for none."""
     for name, model, leaves_open in zip(_SIDES, models, is_open, strict=True):
-        if leaves_open and room(engine_of(model.backend)).would_float(model):
+        if leaves_open and raw_engine_of(engine_of(model.backend)).would_float(model):
             return name
     return ""
 
@@ -154,6 +156,24 @@ def _start_of(
     x, y, z = place.pos.tolist()
     qw, qx, qy, qz = quat_of_matrix(place.mat.ravel()).tolist()
     return FreeBase((x, y, z), (qw, qx, qy, qz))
+
+
+def _base_frame(left: Model, right: Model, names: Mapping[str, str]) -> BaseFrame | None:
+    """Return the frame of the right's floating base in that of the left's.
+
+    None where they are one, where a base does not float, and where both are of one file.
+    """
+    joints = free_joint_of_robot(left), free_joint_of_robot(right)
+    if joints[0] is None or joints[1] is None or left.path == right.path:
+        return None
+    bodies = int(left.jnt_bodyid[joints[0]]), int(right.jnt_bodyid[joints[1]])
+    frame = _frame_on_right(left, right, bodies[0], names)
+    angle = frame.angle(HERE)
+    if frame.distance(HERE) <= _ONE_FRAME and angle <= _ONE_FRAME:
+        return None
+    x, y, z = frame.pos.tolist()
+    links = left.body_names[bodies[0]], right.body_names[bodies[1]]
+    return BaseFrame((x, y, z), 0.0 if angle <= _ONE_FRAME else angle, *links)
 
 
 def _frame_on_right(left: Model, right: Model, body: int, names: Mapping[str, str]) -> Placement:

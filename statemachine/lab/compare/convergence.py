@@ -46,8 +46,8 @@ class GapLimit:
         name: What is compared, as in an Agreement.
         kind: Which sort of quantity it is.
         unit: Its SI unit.
-        gaps: The largest gap between the sides [unit], with the steps as given, halved,
-            quartered, ….
+        gaps: The largest gap between the sides [unit] at timesteps h, h/2, h/4, and at h/8 and h/16
+            where these were run.
         moved: How far the left and the right are, at most, from their own run with the finest
             steps [unit]; NaN where a side has no quantity of that name.
         limit: What the gap tends to for steps of no length [unit]; None where that is not known.
@@ -188,7 +188,7 @@ class Convergence:
 
 
 def convergence(run: Callable[[int], tuple[Trace, Trace]]) -> Convergence:
-    """Run two sides with their steps as given, halved and quartered; then finer, while unclear.
+    """Run two sides with timesteps h, h/2 and h/4; then with h/8 and h/16, while it is unclear.
 
     Args:
         run: Gives the traces of both sides, with rows as far apart as ever and so many times as

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.records import KnownChange, RunArrays
 from ...interface import Model
 from ...release_names import engine_of
@@ -48,7 +48,7 @@ def changes_between(
     if engines[0] != engines[1]:
         return ()
     runs = _arrays(traces[0]), _arrays(traces[1])
-    return tuple(room(engines[0]).known_changes(left, right, runs))
+    return tuple(raw_engine_of(engines[0]).known_changes(left, right, runs))
 
 
 def _arrays(trace: Trace) -> RunArrays:

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.description.match import SCALAR, Matching, Pair, match, renamed
 from ...engines.description.records import Robot
 from ...engines.description.shapes import one_to_one
@@ -196,7 +196,7 @@ def _description(model: Model) -> Robot:
             f"{model.backend} does not tell what the bodies of its models are: they cannot be "
             "matched with those of another file"
         )
-    return room(DEFAULT).describe(model.compiled, model.path.name)
+    return raw_engine_of(DEFAULT).describe(model.compiled, model.path.name)
 
 
 def _solids(trees: MatchedTrees) -> Iterator[BodyPair]:
@@ -331,7 +331,9 @@ def missing_parts(left: Model, right: Model) -> tuple[tuple[str, str], ...]:
     """
     if left.compiled is None or right.compiled is None:
         return ()
-    left_counts, right_counts = (room(DEFAULT).counts(model.compiled) for model in (left, right))
+    left_counts, right_counts = (
+        raw_engine_of(DEFAULT).counts(model.compiled) for model in (left, right)
+    )
     return tuple(
         ("right" if left_counts[part] else "left", part)
         for part in left_counts

@@ -8,7 +8,7 @@ from itertools import chain
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...errors import TraceError
 from ...interface import Model
 from ...measures import common_moments
@@ -40,7 +40,7 @@ from .sides import Request
 def read_otherwise(left: Model, right: Model) -> list[str]:
     """Say what only one of two releases of an engine reads in the file of both sides."""
     engines = {engine_of(model.backend) for model in (left, right)}
-    return room(engines.pop()).read_otherwise(left, right) if len(engines) == 1 else []
+    return raw_engine_of(engines.pop()).read_otherwise(left, right) if len(engines) == 1 else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,9 @@ def prepare_sides(request: Request) -> PreparedSides:
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
-    notes_on_engines = [room(engine_of(model.backend)).unlike_its_users(model) for model in models]
+    notes_on_engines = [
+        raw_engine_of(engine_of(model.backend)).unlike_its_users(model) for model in models
+    ]
     left_start, notes = None, list(loaded.bases.notes())
     if trace is not None:
         refuse_of_run(request)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from ...backends import BackendChoice, load_to_run, parse_backend
-from ...engines import room
+from ...engines import raw_engine_of
 from ...errors import BadInputError, TraceError, shown
 from ...installed import DEFAULT, PAIR
 from ...interface import Model
@@ -84,7 +84,7 @@ class Side:
     def label(self) -> str:
         """As one types it, without folders: "so101@mujoco timestep=0.002"."""
         options = (typed_option(name, value) for name, value in self.options.items())
-        return " ".join([f"{_typed(self.model)}@{self.chosen_backend()}", *options])
+        return " ".join([f"{without_folders(self.model)}@{self.chosen_backend()}", *options])
 
     def load(self, base: OptionValue | FreeBase | None = None, **options: OptionValue) -> Model:
         """Return the Model; `options` are those of an experiment, over which its own win.
@@ -154,7 +154,9 @@ class TakenParts:
             "site": _renamed(giver.site_names, model.site_names, matched.sites),
         }
         return model.with_compiled(
-            room(DEFAULT).with_parts(model.path, giver.path, self.parts, names, model.read_options)
+            raw_engine_of(DEFAULT).with_parts(
+                model.path, giver.path, self.parts, names, model.read_options
+            )
         )
 
 
@@ -252,7 +254,7 @@ class Request:
         """What is run, and the model if one is said, as one types them, without folders."""
         words = [word_of(what) for what in self.what]
         if self.model:
-            words.append(_typed(self.model))
+            words.append(without_folders(self.model))
         return words
 
     @property
@@ -318,8 +320,8 @@ class Request:
         return replace(known, keyframe=self.keyframe or known.keyframe)
 
 
-def _typed(model: str) -> str:
-    """A model as one types it, without folders."""
+def without_folders(model: str) -> str:
+    """Return a model as one types it, without folders."""
     return Path(model).name if Path(model).is_file() else model
 
 

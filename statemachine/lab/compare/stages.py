@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...interface import Array, Data, Ints, JointType, Model, forward, step
 from ...measures import ContactNames
 from ...rotations import matrix_from_quat
@@ -87,7 +87,7 @@ class StageReader:
         `before` are arrays of the other side.
         """
         model = self._models[side]
-        engine = room(model.backend)
+        engine = raw_engine_of(model.backend)
         if engine.primes:
             given = {name: np.zeros(model.nv) for name in before}
             for name, values in before.items():
@@ -116,7 +116,7 @@ class StageReader:
     def _read(self, side: int, data: Data, qpos: Array) -> list[Array]:
         """All columns but the velocity update."""
         model, dofs = self._models[side], self._dofs[side]
-        mass = room(model.backend).mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
+        mass = raw_engine_of(model.backend).mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
         forces = []
         for arrays in ARRAYS.values():
             parts = [array_or_nan(data, name)[dofs] for name in arrays]

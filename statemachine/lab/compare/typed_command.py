@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from ...installed import DEFAULT, PAIR
 from .labels import typed_option
 from .python_call import python_call
-from .sides import Request, Side
+from .sides import Request, Side, without_folders
 
 _WIDTH = 74  # of a line of a command, which is set in
+_SOME_FOLDER = "DIR"
 
 
 @dataclass(frozen=True)
@@ -51,20 +52,26 @@ class TypedCommand:
         return "\n".join([*lines, line])
 
 
-def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand:
+def typed_command(
+    run: Request, question: Sequence[str] = (), *, folders: bool = True
+) -> TypedCommand:
     """Return the command that runs something on two sides, or opens two traces.
 
     Args:
         run: What is run.
         question: The words that ask what was asked.
+        folders: Whether paths have their folders; on a page that is handed on they have none.
     """
     if not run.is_typed:
         return TypedCommand((), tuple(question), run)
-    words = ["statemachine", "compare", *map(str, run.what)]
-    if run.model:
-        words.append(run.model)
+    words = ["statemachine", "compare"]
+    if folders:
+        words += map(str, run.what)
+        words += [run.model] if run.model else []
+    else:
+        words += run.words
     for side in run.sides:
-        words += _words_of_side(side)
+        words += _words_of_side(side, folders)
     for name, value in run.options.items():
         if name == "timestep":
             words += ["--timestep", f"{value}"]
@@ -73,22 +80,24 @@ def typed_command(run: Request, question: Sequence[str] = ()) -> TypedCommand:
     if not run.sides and tuple(run.backends) != PAIR:
         for backend in run.backends:
             words += ["--backend", backend]
-    words += _words_of_run(run)
+    words += _words_of_run(run, folders)
     return TypedCommand(tuple(words), tuple(question))
 
 
-def _words_of_side(side: Side) -> list[str]:
+def _words_of_side(side: Side, folders: bool) -> list[str]:
     """Return a side as one types it; what runs on the usual engine does not name it."""
     backend = str(side.chosen_backend())
-    model = side.model if backend == DEFAULT else f"{side.model}@{backend}"
+    model = side.model if folders else without_folders(side.model)
+    if backend != DEFAULT:
+        model = f"{model}@{backend}"
     return [model, *(typed_option(name, value) for name, value in side.options.items())]
 
 
-def _words_of_run(run: Request) -> list[str]:
+def _words_of_run(run: Request, folders: bool) -> list[str]:
     """Return the options that say how something is run."""
     words: list[str] = []
     if run.menagerie is not None:
-        words += ["--menagerie", str(run.menagerie)]
+        words += ["--menagerie", str(run.menagerie) if folders else _SOME_FOLDER]
     if run.seconds is not None:
         words += ["--seconds", f"{run.seconds:g}"]
     if run.seed:

@@ -8,9 +8,9 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...installed import DEFAULT, ENGINES, engine_version, wheel_here
-from ...program import install_command, pip
+from ...installing import install_command, pip
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
 
@@ -111,7 +111,7 @@ _PACKAGES = (
 def examine() -> Diagnosis:
     """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
     python = HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
-    drawing = HealthCheck("rendering", *room(DEFAULT).drawing_diagnosis(), optional=True)
+    drawing = HealthCheck("rendering", *raw_engine_of(DEFAULT).drawing_diagnosis(), optional=True)
     findings = [python, *map(_engine, ENGINES), drawing, _viewer(), _clash()]
     packages = [
         OptionalPackage(name, role, extras, _version(name)) for name, role, extras in _PACKAGES

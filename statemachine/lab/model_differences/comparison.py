@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import __version__
 from ...backends import load
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.description.match import Matching, Pair, alike_names
 from ...engines.description.reading import ModelReading
 from ...engines.description.tree import GroupTree
@@ -178,7 +178,7 @@ def _side(reading: ModelReading, tree: GroupTree, asked: FileAsked) -> FileSide:
     """Return a side as it was read."""
     raw = reading.model.compiled
     engine, emulated = asked.engine, ""
-    if engine is not None and room(engine_of(engine)).emulated:
+    if engine is not None and raw_engine_of(engine_of(engine)).emulated:
         emulated = engine_of(engine)
     links, joints = int(raw.nbody) - 1, int(raw.njnt) - reading.floats
     shapes = sum(len(group.shapes) for group in tree.groups)
@@ -202,14 +202,14 @@ def _side(reading: ModelReading, tree: GroupTree, asked: FileAsked) -> FileSide:
 
 def _unlike_its_users(reading: ModelReading, engine: str | None) -> str:
     """Say what a run behind the contract has that its engine's users do not have, if anything."""
-    if not engine or not room(engine_of(engine)).emulated:
+    if not engine or not raw_engine_of(engine_of(engine)).emulated:
         return ""
     try:
         with warnings.catch_warnings(action="ignore", category=EngineWarning):
             model = load(reading.model.path, backend=engine)
     except StateMachineError:  # it has no such run
         return ""
-    return "; ".join(room(engine_of(engine)).unlike_its_users(model))
+    return "; ".join(raw_engine_of(engine_of(engine)).unlike_its_users(model))
 
 
 def _versions(readings: Sequence[ModelReading]) -> dict[str, str]:

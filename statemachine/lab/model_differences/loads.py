@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.description.records import OF_A_SLIDE, Actuator, RobotJoint
 from ...engines.description.tree import GroupTree
 from ...installed import DEFAULT
@@ -108,7 +108,7 @@ class SideLoads:
     @cached_property
     def arms(self) -> dict[str, dict[str, float]]:
         """By the name of an actuator its moment arms, by joint of this model."""
-        arms = room(DEFAULT).moment_arms(self.model.compiled)
+        arms = raw_engine_of(DEFAULT).moment_arms(self.model.compiled)
         return dict(zip(self.actuators, arms, strict=True))
 
     def servo(self, name: str, names: Mapping[str, str]) -> ServoOnJoint | None:

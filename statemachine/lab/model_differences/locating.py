@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.description.lines import SourceLine
 from ...engines.description.reading import ModelReading
 from ...installed import DEFAULT
@@ -41,7 +41,8 @@ class Locator:
     def __init__(self, readings: Sequence[ModelReading], matched: Matched) -> None:
         self._readings, self._matched = readings, matched
         self._names = [
-            room(DEFAULT).element_names(model.compiled) for model in (matched.left, matched.right)
+            raw_engine_of(DEFAULT).element_names(model.compiled)
+            for model in (matched.left, matched.right)
         ]
 
     @cached_property
@@ -54,7 +55,7 @@ class Locator:
             "body": dict(matched.bodies),
             "site": dict(matched.sites),
         }
-        for kind, pairs in room(DEFAULT).shown_elements(left, right, matched).items():
+        for kind, pairs in raw_engine_of(DEFAULT).shown_elements(left, right, matched).items():
             counterparts.setdefault(kind, dict(pairs))
         for kind, names in self._names[0].items():
             if kind not in counterparts:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...backends import check_backend, load
-from ...engines import room, rooms_with
+from ...engines import raw_engine_of, raw_engines_with
 from ...engines.description.reading import Comparable, ModelReading
 from ...errors import UnsupportedError
 from ...installed import DEFAULT
@@ -78,14 +78,14 @@ def read(
     """
     path = checked_path(model, menagerie)
     if engine is None:
-        return room(DEFAULT).read_file(path, comparable)
+        return raw_engine_of(DEFAULT).read_file(path, comparable)
     if is_release(engine):
         loaded = load(path, backend=engine, defaults="engine")
         return ModelReading(loaded, "engine", f"{engine_of(engine)} {loaded.engine_version}")
     check_backend("engine", engine)
-    asked = room(engine)
+    asked = raw_engine_of(engine)
     if not asked.can("read"):
-        known = ", ".join(rooms_with("read"))
+        known = ", ".join(raw_engines_with("read"))
         raise UnsupportedError(
             f"what {engine} makes of a file cannot be read here; known: {known}",
             backend=engine,

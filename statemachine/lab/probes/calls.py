@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager, redirect_stdout
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ...engines import room, rooms_with
+from ...engines import raw_engine_of, raw_engines_with
 from ...engines.call_watch import NEW, CallWatch, WatchedObject
 from ...errors import BadInputError, StateMachineError, check_name, one_line
 from ...installed import engine_version, require
@@ -251,7 +251,7 @@ class CallRecorder:
 
 def recorded_engines() -> list[str]:
     """Return the engines whose calls can be recorded; none of them is imported."""
-    return rooms_with("call_watch")
+    return raw_engines_with("call_watch")
 
 
 def record(code: str, engine: str) -> Recording:
@@ -274,8 +274,8 @@ def record(code: str, engine: str) -> Recording:
     """
     check_name("engine whose calls can be recorded", engine, recorded_engines())
     require(engine)
-    watch = room(engine).call_watch()
-    helpers = {helper: room(helper).call_watch() for helper in watch.words.helpers}
+    watch = raw_engine_of(engine).call_watch()
+    helpers = {helper: raw_engine_of(helper).call_watch() for helper in watch.words.helpers}
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[RecordedStatement] = []
     error: str | None = None

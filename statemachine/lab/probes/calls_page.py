@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from typing import Literal
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.call_watch import CallWords
 from ...interface import DERIVED
 from ...measures.text import NONE, few, grouped
@@ -178,7 +178,7 @@ def _names(changed: Sequence[str]) -> str:
 
 
 def _words(engine: str) -> CallWords:
-    return room(engine).call_watch().words
+    return raw_engine_of(engine).call_watch().words
 
 
 def _legend(recording: Recording) -> list[str]:

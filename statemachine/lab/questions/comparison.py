@@ -11,6 +11,7 @@ from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits
 from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison
+from ..compare.base_frame_page import base_frame_blocks
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.matched import Matched
 from ..runs.floating import Bases
@@ -89,6 +90,22 @@ class ComparePage(PageContent):
         return _in_title(left), _in_title(right)
 
     @property
+    def moments(self) -> int:
+        """How many moments are compared."""
+        return self.result.comparison.moments
+
+    @property
+    def gap_of_moments(self) -> float | None:
+        """How far apart these are [s], where both sides have others between them; else None."""
+        return self.result.comparison.gap_of_moments
+
+    @property
+    def steps(self) -> tuple[str, str]:
+        """The timestep of each side."""
+        left, right = traces_of(self.result.comparison)
+        return milliseconds(left.timestep), milliseconds(right.timestep)
+
+    @property
     def bases(self) -> Bases:
         """Whether the base of each side floats, and what of that was taken over."""
         run = self.result.run
@@ -161,7 +178,8 @@ def _with_rows(
         details=details,
     )
     headline = headline_of(finding, comparison, result.instead)
-    blocks = [*_known_changes(result), *render_blocks(content)]
+    frame = base_frame_blocks(content.bases.frame)
+    blocks = [*frame, *_known_changes(result), *render_blocks(content)]
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
 
 

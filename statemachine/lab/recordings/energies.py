@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...backends import on_default
-from ...engines import room
+from ...engines import raw_engine_of
 from ...errors import StateMachineError
 from ...installed import DEFAULT
 from ...interface import Array, Data, Model, make_data
@@ -57,7 +57,7 @@ def energies(
                 )
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-        joules = room(DEFAULT).energies(yardstick, qpos, qvel, made)
+        joules = raw_engine_of(DEFAULT).energies(yardstick, qpos, qvel, made)
     except StateMachineError:
         return unknown
     return joules, f"{DEFAULT} {yardstick.engine_version}"

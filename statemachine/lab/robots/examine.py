@@ -16,7 +16,7 @@ from pathlib import Path
 from ...atomic_files import replace_bytes
 from ...backends import backend_names, load_to_run
 from ...backends.starts import overlaps_in
-from ...engines import room
+from ...engines import raw_engine_of
 from ...errors import (
     BadInputError,
     DivergedError,
@@ -209,7 +209,7 @@ class _Examination:
         )
 
     def _equals_engine(self, model: Model) -> bool | None:
-        own = room(model.backend)
+        own = raw_engine_of(model.backend)
         if not own.can("plain_run"):
             return None
         orders = gaps.commands(model, _SAME, self.seed)
@@ -266,7 +266,7 @@ class _Examination:
 
     def _cost(self, model: Model) -> float | None:
         """Time of a step over that of the engine, driven by its own functions, in turns."""
-        engine = room(model.backend)
+        engine = raw_engine_of(model.backend)
         if not model.nv or not engine.can("stepper"):
             return None
         with (

@@ -34,6 +34,32 @@ class RobotFacts(Protocol):
 
 
 @dataclass(frozen=True)
+class BaseFrame:
+    """The frame of the right's base in that of the left's, where both are on one solid.
+
+    Attributes:
+        pos: (3,) its origin [m].
+        angle: By which it is turned [rad].
+        link_left, link_right: The links whose frames they are.
+    """
+
+    pos: tuple[float, float, float]
+    angle: float
+    link_left: str
+    link_right: str
+
+    @property
+    def distance(self) -> float:
+        """How far the origins are apart [m]."""
+        return float(np.linalg.norm(self.pos))
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the axes differ, and not the origins alone."""
+        return self.angle > 0.0
+
+
+@dataclass(frozen=True)
 class Bases:
     """Whether the base of the robot floats, on each of two sides.
 
@@ -45,12 +71,16 @@ class Bases:
             none.
         floating_loader: The side that nobody told its base, whose base is fixed, and whose engine's
             own loader would let it float; "" for none.
+        frame: The frame of the right's base in that of the left's, where both float and the files
+            put it elsewhere on one solid: then poses of two frames are compared. None where they
+            are one.
     """
 
     left: Base | None
     right: Base | None
     taken_by: Literal["left", "right", ""] = ""
     floating_loader: Literal["left", "right", ""] = ""
+    frame: BaseFrame | None = None
 
     @property
     def given_by(self) -> Literal["left", "right", ""]:

@@ -31,7 +31,7 @@ from ...interface.sites import usual_site
 from ...measures import ContactNames
 from ...measures.text import listed
 from ...models import resolve
-from ...processes.parallel import settle
+from ...processes.parallel import silence_child
 from ..recordings.energies import energies
 from ..runs.controllers import function_file
 from ..runs.drive import check_length, drive, steps_in
@@ -70,7 +70,7 @@ def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> li
 @functools.cache
 def _settle() -> None:
     """Prepare this process once: its output is discarded, and it ends when its driver does."""
-    settle()
+    silence_child()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
 
 

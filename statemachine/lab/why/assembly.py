@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.records import DifferingQuantity, ModelDifference
 from ...interface import JointType, Model
 from ...measures.text import milliseconds
@@ -234,7 +234,7 @@ def _notes(matched: Matched, left: Model, right: Model) -> tuple[str, ...]:
     """Return what a reader should know, in sentences."""
     notes = list(matched.other_notes)
     for model in (left, right):
-        for what in room(engine_of(model.backend)).ignored(model):
+        for what in raw_engine_of(engine_of(model.backend)).ignored(model):
             if "integrator" not in what:  # which is a cause
                 notes.append(f"{model.backend}: {what}")
     left_period, right_period = milliseconds(left.timestep, 3), milliseconds(right.timestep, 3)

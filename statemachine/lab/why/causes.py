@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.records import DifferingQuantity, Edit, ModelDifference, SpecEdit
 from ...installed import DEFAULT
 from ...interface import Model
@@ -90,7 +90,7 @@ def differences_of(
         finer: By single entries, where they can be brought over one by one.
         readable: Whether that counts on which nothing but a function of the user's depends.
     """
-    own = room(DEFAULT)
+    own = raw_engine_of(DEFAULT)
     rows = [
         _specified(row, left, right)
         for row in own.differences(left.compiled, right.compiled, matched, world=world)
@@ -116,7 +116,7 @@ def _specified(row: ModelDifference, left: Model, right: Model) -> ModelDifferen
     """
     if not (row.spec_edits or row.spec_edits_one):
         return row
-    own = room(DEFAULT)
+    own = raw_engine_of(DEFAULT)
     if row.spec_edits and own.can_be_respecified(right.path):
         return replace(row, spec_edits_one=())
     if row.spec_edits_one and own.can_be_respecified(left.path):
@@ -147,7 +147,7 @@ def _extra_joint(name: str, left: str | None, right: str | None) -> ModelDiffere
 
 def sensors_of(matched: Matched) -> list[ModelDifference]:
     """Return what the sensors of two Models differ in, which only a controller reads."""
-    return room(DEFAULT).sensors(matched.left.compiled, matched.right.compiled, matched)
+    return raw_engine_of(DEFAULT).sensors(matched.left.compiled, matched.right.compiled, matched)
 
 
 def data_of(matched: Matched) -> list[ModelDifference]:
@@ -155,7 +155,7 @@ def data_of(matched: Matched) -> list[ModelDifference]:
 
     This is user data of elements, numeric, text and tuple.
     """
-    return room(DEFAULT).readable(matched.left.compiled, matched.right.compiled, matched)
+    return raw_engine_of(DEFAULT).readable(matched.left.compiled, matched.right.compiled, matched)
 
 
 def readable_of(matched: Matched) -> list[ModelDifference]:
@@ -174,7 +174,7 @@ def built(model: Model, edits: tuple[Edit, ...], spec_edits: tuple[SpecEdit, ...
     Raises:
         UnsupportedError, ModelError: As `Model.with_compiled`, and as `respecified` of a room.
     """
-    own, compiled = room(DEFAULT), model.compiled
+    own, compiled = raw_engine_of(DEFAULT), model.compiled
     if spec_edits:
         compiled = own.respecified(model.path, compiled, spec_edits)
         edits = own.in_places_of(model.compiled, compiled, edits)

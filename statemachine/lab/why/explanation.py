@@ -15,6 +15,7 @@ from ..compare.matched import RenamedPair
 from ..compare.matching import Only
 from ..compare.motion import MotionExtent
 from ..compare.typed_command import TypedCommand
+from ..runs.floating import Bases
 from ..runs.provenance import Provenance
 from .gap import FirstTouch, Measure
 from .locate import Localisation
@@ -183,6 +184,8 @@ class Explanation:
         renamed: What was taken for one although the names differ, and nobody said so.
         changes: Known changes between two releases that concern the runs as they come; empty where
             there is no gap.
+        bases: Whether the base of each side floats, and whether their frames are one; None where
+            nobody looked.
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
     """
@@ -228,6 +231,7 @@ class Explanation:
     right_file: str = ""
     renamed: tuple[RenamedPair, ...] = ()
     changes: tuple[KnownChange, ...] = ()
+    bases: Bases | None = None
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...backends import on_default
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.records import BodyPair, Counterparts, Pairs
 from ...installed import DEFAULT
 from ...interface import Array, Data, Model
@@ -52,7 +52,7 @@ def in_order_of_left(left: Model, right: Model, matched: Matched) -> Model:
         right: The Model of the right, as it is run.
         matched: What of the left is what of the right.
     """
-    own = room(DEFAULT)
+    own = raw_engine_of(DEFAULT)
     solids = [
         BodyPair(pair.right, pair.left, _inverse(pair.align), pair.moved) for pair in matched.solids
     ]
@@ -102,7 +102,9 @@ def seen_in_order_of_left(
         mocap_in_order: Whether mocap bodies, too, are in the order of the left.
     """
     controller = controller_of(shown)
-    data = room(DEFAULT).data_in_other_order(shown, _elements(shown, matched, mocap_in_order))
+    data = raw_engine_of(DEFAULT).data_in_other_order(
+        shown, _elements(shown, matched, mocap_in_order)
+    )
     data.ctrl[:] = starts[0]
 
     def translate(_right: Model, source: Data) -> Array | None:
@@ -173,4 +175,4 @@ def _elements(
         for part, size in (("mocap_pos", 3), ("mocap_quat", 4)):
             count = size * min(shown.nmocap, right.nmocap)
             elements[part] = [(k, k) for k in range(count)]
-    return elements | room(DEFAULT).shown_elements(shown.compiled, right.compiled, matched)
+    return elements | raw_engine_of(DEFAULT).shown_elements(shown.compiled, right.compiled, matched)

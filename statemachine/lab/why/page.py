@@ -15,6 +15,7 @@ from ...installed import DEFAULT
 from ...show.blocks import Block, Headline, Page, Table, Text
 from ...show.first_screen import LINES, MOST_ROWS, first_screen, lines_of
 from ...show.templates import PageContent, render_blocks
+from ..compare.base_frame_page import base_frame_blocks
 from ..compare.chaos import CLEAR
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.labels import lacking
@@ -48,6 +49,12 @@ class WhyPage(PageContent):
     result: Explanation
     most_rows: int
     further: Sequence[Block]
+
+    @property
+    def base_frame(self) -> Sequence[Block]:
+        """That the base has another frame on either side."""
+        bases = self.result.bases
+        return [] if bases is None else base_frame_blocks(bases.frame)
 
     @property
     def known(self) -> Sequence[Block]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...atomic_files import beside, check_place
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.description.file_changes import AttributeChange, UnwrittenChange
 from ...engines.description.file_form import FileForm, NotWrittenError
 from ...engines.description.xml_source import AttributeText, XmlSource
@@ -298,7 +298,7 @@ def changes_of(texts: Sequence[AttributeText]) -> tuple[AttributeChange, ...]:
 def geoms_of_left(matched: Matched) -> dict[int, int]:
     """Return for each geom of the right its counterpart on the left."""
     left, right = matched.left.compiled, matched.right.compiled
-    pairs = room(DEFAULT).shown_elements(left, right, matched)["geom"]
+    pairs = raw_engine_of(DEFAULT).shown_elements(left, right, matched)["geom"]
     return {theirs: ours for ours, theirs in pairs}
 
 
@@ -315,4 +315,4 @@ def form_of_right(left: Model, right: Model, matched: Matched, source: XmlSource
         ModelError: The left's file is no XML.
     """
     geoms = geoms_of_left(matched)
-    return room(DEFAULT).file_form(source, right.compiled, left.path, left.compiled, geoms)
+    return raw_engine_of(DEFAULT).file_form(source, right.compiled, left.path, left.compiled, geoms)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...engines import room
+from ...engines import raw_engine_of
 from ...engines.records import Edit, ModelDifference, SpecEdit
 from ...installed import DEFAULT
 from ...interface import Model
@@ -172,7 +172,7 @@ class Setup:
         """Return what a side integrates with as it comes."""
         model = self.models[side]
         if side in self.selects and model.compiled is not None:
-            return room(DEFAULT).integrator(model.compiled)
+            return raw_engine_of(DEFAULT).integrator(model.compiled)
         return "its own"
 
     def can_be_without(self, feature: Feature) -> bool:
@@ -357,8 +357,8 @@ def _own_settings(
 ) -> tuple[OwnSettings | None, OwnSettings | None]:
     """Return the settings of each side that comes with its engine's, where the other does not."""
     left, right = models
-    left_dials = room(left.backend).dials(left, options)
-    right_dials = room(right.backend).dials(right, options)
+    left_dials = raw_engine_of(left.backend).dials(left, options)
+    right_dials = raw_engine_of(right.backend).dials(right, options)
     actuated = options.get("actuation", True)
     if left_dials and not right_dials:
         return OwnSettings(left_dials, right.replace(**options), actuated), None

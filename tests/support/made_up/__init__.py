@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from statemachine import Model
-from statemachine.engines import RawEngine, room
+from statemachine.engines import RawEngine, raw_engine_of
 from statemachine.engines.description.reading import ModelReading
 from statemachine.interface import Array
 
@@ -19,9 +19,9 @@ class MyEngine(RawEngine):
     def stepper(
         self, model: Model, qpos: Array, qvel: Array, ctrl: Array
     ) -> AbstractContextManager[Callable[[int], object]]:
-        return room("mujoco").stepper(model, qpos, qvel, ctrl)
+        return raw_engine_of("mujoco").stepper(model, qpos, qvel, ctrl)
 
     def read(self, path: Path) -> ModelReading:
         """Return what the engine makes of a file, under its own name."""
-        reading = room("mujoco").read(path)
+        reading = raw_engine_of("mujoco").read(path)
         return replace(reading, reader=reading.reader.replace("mujoco", self.name))

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault, as it is told.
+    """One fault, in words.
 
     Attributes:
-        name: What `--only` takes; its fault is patch is `patches.PATCHES[name]`.
+        name: What `--only` takes; the fault is made by `patches.PATCHES[name]`.
         wrong: What is wrong, in a few words.
         hint: What no test looked at, where none catches it.
     """
@@ -28,18 +28,18 @@ class Fault:
 _FAULTS = (
     Fault(
         "xyzw",
-        "quaternions read x y z w",
+        "quaternions are x y z w",
         "no test compares a quaternion with a turn that you know by hand",
     ),
     Fault(
         "com-for-frame",
-        "xpos is the centre of mass",
-        "no test compares xpos of a link with a place from the model's file, or asks whether "
-        "turning a joint leaves the origin of its own link where it is",
+        "xpos is a centre of mass",
+        "no test compares xpos of a link with a place from the model's file, or turns a joint and "
+        "asks whether the origin of its own link stays where it is",
     ),
     Fault(
         "joints-shifted",
-        "numbers go to the next joint",
+        "joints get each other's numbers",
         "no test turns one joint and asks whether the fingertip moves as that joint moves it",
     ),
     Fault(
@@ -50,7 +50,7 @@ _FAULTS = (
     Fault(
         "no-forward",
         "forward does nothing",
-        "no test writes qpos, calls forward, and asks whether the fingertip followed",
+        "no test writes qpos, calls forward, and asks whether the fingertip has moved",
     ),
     Fault(
         "forward-steps",
@@ -60,12 +60,13 @@ _FAULTS = (
     Fault(
         "step-and-forward",
         "step ends with a forward",
-        "no test asks to which moment the fingertip belongs that is read right after a step",
+        "no test reads the fingertip right after a step, and asks whether it still is where it was "
+        "before",
     ),
     Fault(
         "one-step-short",
         "step(…, n) takes n − 1 steps",
-        "no test compares one call of n steps with n calls of one step; `time` does not show it",
+        "no test compares one call of n steps with n calls of one step; data.time does not show it",
     ),
     Fault(
         "motor-left-on",
@@ -74,8 +75,8 @@ _FAULTS = (
     ),
     Fault(
         "gains-doubled",
-        "servos pull twice as hard",
-        "no test looks at how far the arm sags under its own weight, or how hard a servo pulls",
+        "servos push twice as hard",
+        "no test asks how far the arm sags under its own weight, or how hard a servo pushes",
     ),
     Fault(
         "gravity-up",
@@ -85,17 +86,17 @@ _FAULTS = (
     Fault(
         "spin-in-world",
         "a box spins about world axes",
-        "no test spins a box that is already turned, and asks about which axis it goes round",
+        "no test spins a box that is already turned, and asks about which axis it turns",
     ),
     Fault(
         "reset-keeps-ctrl",
         "reset keeps the old ctrl",
-        "no test writes ctrl, resets, and looks at ctrl",
+        "no test writes ctrl, resets, and asks whether ctrl is that of the reset",
     ),
     Fault(
         "no-replay",
-        "a hidden number moves ctrl",
-        "no test runs the same commands twice from the same start and asks for the same bits",
+        "hidden noise is added to ctrl",
+        "no test runs the same commands twice from the same start, and asks for the same bits",
     ),
 )
 FAULTS = {fault.name: fault for fault in _FAULTS}

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ....backends import HiddenData
-from ....engines import room, rooms_with
+from ....engines import raw_engine_of, raw_engines_with
 from ....errors import MissingEngineError
 from ....installed import require
 from ....interface import INPUTS, Array, Data, JointType, read_only
@@ -33,10 +33,10 @@ Instead = Callable[..., Any]
 def _adapters() -> list[ModuleType]:
     """The modules of the backends whose engine is here."""
     adapters = []
-    for name in rooms_with("backend"):
+    for name in raw_engines_with("backend"):
         with suppress(MissingEngineError):
             require(name)
-            adapters.append(room(name).backend())
+            adapters.append(raw_engine_of(name).backend())
     return adapters
 
 

@@ -21,7 +21,7 @@ import pytest
 
 import statemachine as sm
 
-from ....engines import rooms_with
+from ....engines import raw_engines_with
 from ....installed import DEFAULT
 from ..inside.guard import Guard
 from . import FAULT, IMPORT
@@ -36,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """The options with which `run` starts it."""
     group = parser.getgroup("statemachine")
     group.addoption(
-        "--engine", choices=rooms_with("backend"), default=DEFAULT, help="backend of `model`"
+        "--engine", choices=raw_engines_with("backend"), default=DEFAULT, help="backend of `model`"
     )
     group.addoption("--record", metavar="FILE", help="write down there what happens")
     group.addoption("--watched", action="store_true", help="with --record: refuse other files, too")

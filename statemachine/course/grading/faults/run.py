@@ -17,14 +17,14 @@ from functools import partial
 from pathlib import Path
 
 from ....backends import backend_names
-from ....engines import rooms_with
+from ....engines import raw_engines_with
 from ....errors import BadInputError, MissingEngineError, ModelFileError, check_name, unknown_name
 from ....installed import DEFAULT, engine_version, require
+from ....installing import install_command
 from ....lab.runs.drive import Progress, silent
 from ....models import AnyPath
 from ....processes import checked_jobs, sandbox
 from ....processes.parallel import in_parallel, unwinding
-from ....program import install_command
 from ..links import refusal_of
 from ..recording import copied_to, named_by, start_of
 from . import FAULTS, IMPORT, Fault
@@ -136,7 +136,7 @@ def _has_tests(file: Path) -> bool:
 
 def _ready(backend: str) -> str:
     """Return the version of the backend's engine; raise where the tests could not even begin."""
-    known = rooms_with("backend")
+    known = raw_engines_with("backend")
     if backend not in backend_names():
         raise unknown_name("backend", backend, known)
     if backend not in known:

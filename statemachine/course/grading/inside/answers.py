@@ -15,7 +15,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ....interface import DERIVED, INPUTS
+from ....interface import DERIVED, INPUTS, Data, Model
+from ....interface.checks import kind_of
 from .watch import EngineRun, Inputs, StudentWatch, inputs_of
 
 _MOST = 10_000  # values that a list or a generator may have
@@ -124,6 +125,10 @@ def kind(value: Any) -> str:
         return f"an array of shape {value.shape}"
     if isinstance(value, (tuple, list, dict, set)):
         return f"a {type(value).__name__} of {len(value)}"
+    if isinstance(value, (Data, Model)):
+        return kind_of(value)  # its class is named after the engine
+    if value is None:
+        return "None"
     text, name = repr(value), type(value).__name__
     name = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
     return f"{name}: {text}" if len(text) < _SHOWN else name

@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ....engines import room
+from ....engines import raw_engine_of
 from ....errors import UnsupportedError
+from ....interface import Model
 from ....lab.runs.controllers import line_of, load_module, misfit, said
+from ....measures.text import count
 from .answers import answer_of, encode
+from .error_hints import hint_of
 from .watch import engine_watched, watching
 from .worlds import AnyWorld
 
@@ -68,7 +71,8 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     takes, why = misfit(function, None, *arguments)
     if takes:
         raise FaultError(
-            f"it is called with a model and {len(arguments)} more, and takes {takes}: {why}"
+            f"it is called with a model and {count(len(arguments), 'argument')} more, and takes "
+            f"{takes}: {why}"
         )
     return function
 
@@ -109,7 +113,9 @@ def call(function: Function, world: AnyWorld) -> Any:
     arguments = [
         np.array(value) if isinstance(value, np.ndarray) else value for value in world.arguments
     ]
-    settings = room(world.model.backend).settings  # what of the engine's own model is reached
+    settings = raw_engine_of(
+        world.model.backend
+    ).settings  # what of the engine's own model is reached
     before = settings(world.model.raw)
     try:
         with watching(world.model, world.nudge) as watch:
@@ -120,16 +126,26 @@ def call(function: Function, world: AnyWorld) -> Any:
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
             raise FaultError(f"not written yet. {error}".strip(), written=False) from None
-        raise FaultError(_remark(error, file)) from error
+        raise FaultError(_remark(error, file, world.model)) from error
     if result is None:
         raise FaultError("it returns nothing: print shows a result, `return` hands it over")
     return answer
 
 
-def _remark(error: BaseException, file: Path) -> str:
-    """Return an error in one line, with the line of the file, or of one beside it, it came from."""
+def _remark(error: BaseException, file: Path, model: Model | None = None) -> str:
+    """Return an error in one line, with the line of the file, or of one beside it, it came from.
+
+    Args:
+        error: That the file or a function of it raised.
+        file: The student's.
+        model: What the function got; None where the file is only loaded.
+    """
     place, line, code = line_of(error, file)
-    text = said(error)
+    text = ""
+    if model is not None:
+        text = hint_of(error, code, model)
+    if not text:
+        text = said(error)
     if line:
         text = f"line {line}: {text}"
         if place != file:

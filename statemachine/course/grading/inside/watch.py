@@ -16,7 +16,7 @@ from unittest import mock
 
 import numpy as np
 
-from ....engines import room
+from ....engines import raw_engine_of
 from ....errors import ClosedDataError
 from ....installed import require
 from ....interface import INPUTS, Array, Data, Model
@@ -60,17 +60,23 @@ class EngineRun:
 
 @dataclass(frozen=True)
 class Nudge:
-    """Push to the state at the end of a run, by the smallest amount there is.
+    """Push to the state at the end of a run, by the smallest amount there is, or by more.
 
     Attributes:
         place: Entry of qpos that becomes the next double.
         towards: In which direction, infinite [rad or m].
         after: How many steps a run must have for it.
+        by: What is added to the entry before that [rad or m].
     """
 
     place: int
     towards: float
     after: int
+    by: float = 0.0
+
+    def pushed(self, value: float) -> float:
+        """Return what an entry of this value becomes [rad or m]."""
+        return float(np.nextafter(value + self.by, self.towards))
 
 
 def inputs_of(number: int, data: Any) -> Inputs:
@@ -110,7 +116,7 @@ class StudentWatch:
         self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
         self.datas: list[Any] = []
-        self._room = room(model.backend)
+        self._room = raw_engine_of(model.backend)
         self._origin = self._origin_of(model.raw if self._room.can("origin") else model)
         self._nudge = nudge
         self._current: dict[int, EngineRun] = {}
@@ -149,7 +155,7 @@ class StudentWatch:
         run.nstep += nstep
         if self._nudge and run is not self.runs[0] and run.nstep >= self._nudge.after:
             place = self._nudge.place
-            data.qpos[place] = np.nextafter(data.qpos[place], self._nudge.towards)
+            data.qpos[place] = self._nudge.pushed(data.qpos[place])
         run.end = inputs_of(now.data, data)
         return result
 
@@ -181,7 +187,7 @@ def engine_watched(backend: str) -> Iterator[None]:
     Before a student's file can import them.
     """
     with ExitStack() as stack:
-        own = room(backend)
+        own = raw_engine_of(backend)
         for name in own.steps:
             stack.enter_context(_replaced(require(backend), name, _seen_step))
         for name in own.forwards:

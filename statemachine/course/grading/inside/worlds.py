@@ -199,21 +199,25 @@ def _forward(scenes: Scenes) -> list[NoArgumentsWorld]:
 
 
 def _replay(scenes: Scenes) -> list[ReplayWorld]:
-    """Make the course's scene; fewer steps with a crate before the arm; runs that do end apart."""
+    """Make the course's scene; fewer steps with a crate before the arm; runs that end apart."""
     course = scenes.ordinary(_ARM_AND_BOX)
     crowded = scenes.crowded(_ARM_AND_BOX).replace(timestep=0.004)
     # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
-    # part, equal in sum and not smaller all pass for equal in one of the two.
+    # part, equal in sum and not smaller all pass for equal in one of the two. Before that far
+    # apart, where only who compares nothing says that they are equal.
+    elbow = address(course, "elbow_flex")
     nudges = {
-        "a joint": Nudge(address(course, "elbow_flex"), np.inf, _STEPS),
-        "the box": Nudge(course.nq - 1, -np.inf, _STEPS),
+        "where we end the second run 0.1 rad apart": Nudge(elbow, np.inf, _STEPS, by=0.1),
+        "where we end the second run one bit apart in a joint": Nudge(elbow, np.inf, _STEPS),
+        "where we end the second run one bit apart in the box": Nudge(
+            course.nq - 1, -np.inf, _STEPS
+        ),
     }
     worlds: list[ReplayWorld] = [
         ExerciseWorld("", course, (np.array(_CTRL), 600)),
         ExerciseWorld(ELSEWHERE, crowded, (np.array(_OTHER_CTRL), 150)),
     ]
-    for what, nudge in nudges.items():
-        where = f"with {what} of the second run one bit off"
+    for where, nudge in nudges.items():
         worlds.append(ExerciseWorld(where, course, (np.array(_CTRL), _STEPS), nudge))
     return worlds
 

@@ -22,6 +22,7 @@ from ....measures.text import count
 from ..inside.answers import Answer, kind
 from ..inside.calls import FaultError
 from ..inside.worlds import AnyWorld, ExerciseWorld
+from .remarks import OfResult
 
 # By the functions of the student's file, in the order in which they stand there.
 JUDGES = {
@@ -134,8 +135,8 @@ def judged(
     if len(passed) < len(worlds):
         return None
     (remark,) = passed[0].remarks
-    also = f"; right on {count(len(worlds) - 1, 'other model')}, too"
-    return Judgement(function, True, True, (remark + also,))
+    others = count(len(worlds) - 1, "further call")
+    return Judgement(function, True, True, (OfResult.PASSED.says(remark=remark, others=others),))
 
 
 T = TypeVar("T")
@@ -145,6 +146,11 @@ TIP = "gripperframe"
 def parts(value: Any, number: int, what: str) -> list[Any]:
     """Return a returned value as so many parts.
 
+    Args:
+        value: That the function returned.
+        number: Of parts that are needed.
+        what: They are, in words.
+
     Raises:
         FaultError: It has another number of them, or none.
     """
@@ -152,7 +158,7 @@ def parts(value: Any, number: int, what: str) -> list[Any]:
     if isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape):
         items = list(value)
     if items is None or len(items) != number:
-        raise FaultError(f"it returns {kind(value)}, where {what} should be")
+        raise FaultError(OfResult.WRONG_KIND.says(kind=kind(value), what=what))
     return items
 
 
@@ -165,11 +171,9 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise FaultError(f"{what}: numbers are asked for, and it returns {kind(value)}") from None
+        raise FaultError(OfResult.NO_NUMBERS.says(what=what, kind=kind(value))) from None
     if array.shape != shape:
-        raise FaultError(
-            f"{what}: an array of shape {shape} is asked for, and it returns one of {array.shape}"
-        )
+        raise FaultError(OfResult.WRONG_SHAPE.says(what=what, expected=shape, shape=array.shape))
     return array
 
 
@@ -215,7 +219,13 @@ def listed(values: Array, digits: int = 4) -> str:
     return "[" + " ".join(f"{v + 0.0:.{digits}g}" for v in values.tolist()) + "]"
 
 
-def told_apart(left: T, right: T, text: Callable[[T, int], str]) -> str:
-    """Return 'x where y' with as many digits as it takes to tell them apart, four at least."""
+def told_apart(left: T, right: T, text: Callable[[T, int], str]) -> tuple[str, str]:
+    """Return two values as text, with as many digits as it takes to tell them apart, four at least.
+
+    Args:
+        left: A value.
+        right: The other.
+        text: Makes a text of a value and a number of digits.
+    """
     digits = next((d for d in range(4, 17) if text(left, d) != text(right, d)), 17)
-    return f"{text(left, digits)} where {text(right, digits)}"
+    return text(left, digits), text(right, digits)

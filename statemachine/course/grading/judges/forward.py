@@ -28,6 +28,7 @@ from . import (
     verified,
     wrong,
 )
+from .remarks import OfForward
 
 ANGLE = 0.8  # [rad], what is written
 TOLERANCE = 1e-9  # [m]
@@ -84,25 +85,21 @@ def judge(
     remarks: list[str] = []
     if answer.runs:
         run = answer.runs[0]
-        remarks.append(
-            f"{run.end.time - run.start.time:g} s passed: step was called. forward recomputes "
-            "what is derived and takes no time"
-        )
-    elif mistake := _mistake_in_all(readings, answer, right, tolerance):
-        return wrong(mistake)
+        remarks.append(OfForward.STEPPED.says(time=run.end.time - run.start.time))
+    if mistake := _mistake_in_all(readings, answer, right, tolerance):
+        return wrong(*remarks, mistake)
     for k in range(4):
         if not near(readings[k], right.tip[k], tolerance):
-            remark = f"reading {_READINGS[k]}: {_why(k, readings[k], world, right, course, answer)}"
+            why = _why(k, readings[k], world, right, course, answer)
+            remark = OfForward.READING.says(reading=_READINGS[k], why=why)
             if short:
-                remark += f"; {short} keeps few digits, leave the conversion out"
+                remark = OfForward.FEW_DIGITS.says(remark=remark, dtype=short)
             remarks.append(remark)
             break  # a first fault explains what comes after it, more often than not
     if remarks:
         return wrong(*remarks)
     moved = float(np.linalg.norm(right.tip[3] - right.tip[2]))
-    return verified(
-        f"a write changed nothing derived; forward moved the tip by {rounded(moved, 'm')}"
-    )
+    return verified(OfForward.PASSED.says(moved=rounded(moved, "m")))
 
 
 def _returned(answer: Answer) -> Array:
@@ -124,22 +121,31 @@ def _mistake_in_all(readings: Array, answer: Answer, right: Readings, tolerance:
     """
     if near(readings, right.tip, tolerance):
         return ""
-    if near(readings, np.tile(readings[3], (4, 1)), 0):
-        last = f"all four readings are the last one, {vector(readings[3])} m: "
-        copies = "Keep copies: data.site_xpos[…].copy()"
-        if answer.memory[3] == 0 or all(answer.live):
-            return f"{last}what you read is the simulator's own memory, which changes. {copies}"
-        if near(readings[3], right.tip[3], tolerance):
-            return (
-                f"{last}read only at the end, or from the simulator's own memory, which changes. "
-                f"{copies}"
-            )
+    all_equal = near(readings, np.tile(readings[3], (4, 1)), 0)
+    if all_equal and (text := _why_all_equal(readings[3], answer, right)):
+        return text
     if near(readings / 1000, right.tip, TOLERANCE):
-        return "the readings are in millimetres: positions are in metres here"
+        return OfForward.MILLIMETRES.says()
     if answer.forwards:  # without any, all are at the origin
         names = [name for name, places in right.others.items() if near(readings, places, tolerance)]
         if names:
-            return f"that is the place of {' and '.join(names[:3])}; site {TIP!r} is asked for"
+            return OfForward.OTHER_PLACE.says(places=" and ".join(names[:3]), tip=TIP)
+    return ""
+
+
+def _why_all_equal(reading: Array, answer: Answer, right: Readings) -> str:
+    """Return why all four readings are this one, (3,) [m]; "" where nothing tells."""
+    place = vector(reading)
+    if not reading.any() and answer.forwards and not any(answer.live):
+        recomputed = {inputs.data for inputs in answer.forwards}
+        if len(answer.ends) > len(recomputed):
+            return OfForward.OTHER_DATA.says()
+        if answer.memory[3] == 0:
+            return OfForward.READ_ONCE.says()
+    if answer.memory[3] == 0 or all(answer.live):
+        return OfForward.OWN_MEMORY.says(place=place)
+    if near(reading, right.tip[3], TOLERANCE):
+        return OfForward.ONLY_THE_LAST.says(place=place)
     return ""
 
 
@@ -153,28 +159,39 @@ def _why(
 ) -> str:
     """Return what reading k (3,) [m] is, as far as the run shows it."""
     expected = right.tip[k]
-    away = f"{rounded(float(np.linalg.norm(reading - expected)), 'm')} away"
+    away = _away(reading, expected)
     rounding = grain(reading)
     slack = TOLERANCE + rounding
     if not np.isfinite(reading).all():
-        return f"you return {vector(reading)} m"
+        return OfForward.NO_NUMBER.says(place=vector(reading))
     if world.where and near(reading, course.tip[k], slack):
-        return "that belongs to the course's own scene, not to the model that you got"
+        return OfForward.COURSE.says()
     if rounding and near(reading, expected, slack):
-        return f"it was rounded, {away}: return what you read as it is"
+        return OfForward.ROUNDED.says(away=away)
     if k > 0:
         if near(reading, right.tip[0], TOLERANCE):
-            never = "" if answer.forwards else ", which was never called"
-            return (
-                f"derived values were read before any forward{never}: still at the origin, {away}"
-            )
+            return _why_at_origin(answer, away)
         for name, places in right.others.items():
             if near(reading, places[k], slack):
-                return f"that is the place of {name}, {away}; {TIP!r} is asked for"
+                return OfForward.OTHER_PLACE_AWAY.says(places=name, tip=TIP, away=away)
     if text := _other_pose(k, reading, world.model, right, answer, away):
         return text
-    apart = told_apart(reading, expected, lambda place, digits: f"{vector(place, digits)} m")
-    return f"you return {apart} is expected, {away}"
+    value, wanted = told_apart(reading, expected, vector)
+    return OfForward.FIGURES.says(value=value, expected=wanted, away=away)
+
+
+def _away(reading: Array, expected: Array) -> str:
+    """Return how far a reading (3,) is from where it should be (3,) [m]."""
+    return f"{rounded(float(np.linalg.norm(reading - expected)), 'm')} away"
+
+
+def _why_at_origin(answer: Answer, away: str) -> str:
+    """Return why a reading after the first is at the origin, so far away from what is right."""
+    if not answer.forwards:
+        return OfForward.NEVER_FORWARD.says(away=away)
+    if len(answer.ends) > 1:
+        return OfForward.SEVERAL_DATA.says(away=away, count=len(answer.ends))
+    return OfForward.BEFORE_FORWARD.says(away=away)
 
 
 def _other_pose(
@@ -183,10 +200,10 @@ def _other_pose(
     """Return that reading k (3,) [m] is of another pose of the arm; "" where it is of none."""
     if k < 3 and near(reading, right.tip[3], TOLERANCE):
         if _wrote_before_forward(answer, address(model)):
-            return f"qpos was written before the first forward: that is the new pose, {away}"
-        return f"forward was called before it was read: that is the new pose already, {away}"
+            return OfForward.WRITTEN_EARLY.says(away=away)
+        return OfForward.FORWARD_EARLY.says(away=away)
     if k == 0 and near(reading, right.tip[1], TOLERANCE):
-        return f"forward was called before it: a new Data has nothing derived yet; you are {away}"
+        return OfForward.NOT_FRESH.says(away=away)
     if k == 3:
         return _pose(reading, model, answer, away)
     return ""
@@ -223,14 +240,12 @@ def _what_was_written(start: Inputs, met: Inputs, model: Model, answer: Answer, 
         unit = f"{angle:.1f} rad"
         if math.isclose(angle, math.radians(ANGLE)):
             unit = f"{ANGLE} degrees"
-        return f"that is the arm at {unit}, {away}: qpos is in radians, write {ANGLE}"
+        return OfForward.OTHER_ANGLE.says(angle=unit, away=away, expected=ANGLE)
     others = [entry for entry in _entries_that_differ(met.qpos, start.qpos) if entry != place]
     if others:
-        also = "also " if angle == ANGLE else ""
-        return (
-            f"you {also}wrote qpos[{others[0]}], which is {owner(model, others[0])!r}; "
-            f"{LIFT} is at qpos[{place}]: model.jnt_qposadr[model.joint_id(…)]; the fingertip is "
-            f"{away}"
+        remark = OfForward.ONE_MORE_ENTRY if angle == ANGLE else OfForward.OTHER_ENTRY
+        return remark.says(
+            entry=others[0], owner=owner(model, others[0]), joint=LIFT, place=place, away=away
         )
     if angle == start.qpos[place]:
         return _why_unmoved(start, answer, model, away)
@@ -240,27 +255,24 @@ def _what_was_written(start: Inputs, met: Inputs, model: Model, answer: Answer, 
 def _why_unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
     """Return why the last reading is the old pose, by what was written and when."""
     place = address(model)
-    old = f"that is the old pose, {away}"
     states = [
         inputs for inputs in (*answer.forwards, *answer.ends) if inputs.qpos.shape == (model.nq,)
     ]
     if any(inputs.qpos[place] == ANGLE for inputs in answer.forwards):
-        return f"it was read before the second forward: {old}"
+        return OfForward.SECOND_FORWARD_LATE.says(away=away)
     if any(inputs.qpos[place] != start.qpos[place] for inputs in states):
-        return f"derived values were read before forward: {old}"
+        return OfForward.NO_SECOND_FORWARD.says(away=away)
     write = _first_write(start, states)
     if write is None:
-        return (
-            f"nothing was written into qpos of a Data (into a copy of it?): {old}; "
-            f"data.qpos[…] = {ANGLE} writes"
-        )
-    if write.array == "qpos":
-        what = f"which is {owner(model, write.entry)!r}"
-    elif write.array == "ctrl":
-        what = "a command, on which the arm would act with time"
-    else:
-        what = "a speed"
-    return f"you wrote {write.array}[{write.entry}], {what}: {old}; {LIFT} is at qpos[{place}]"
+        return OfForward.NOTHING_WRITTEN.says(away=away, angle=ANGLE)
+    if write.array == "ctrl":
+        return OfForward.WROTE_CTRL.says(entry=write.entry, away=away, joint=LIFT, place=place)
+    if write.array == "qvel":
+        return OfForward.WROTE_QVEL.says(entry=write.entry, away=away, joint=LIFT, place=place)
+    written = owner(model, write.entry)
+    return OfForward.WROTE_QPOS.says(
+        entry=write.entry, owner=written, away=away, joint=LIFT, place=place
+    )
 
 
 class _Write(NamedTuple):

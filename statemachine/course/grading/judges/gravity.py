@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....interface import Array, make_data, step
+from ....interface import Array, Model, make_data, step
 from ....interface.records import Ints
 from ....measures.text import count
-from ..inside.answers import Answer
+from ..inside.answers import Answer, kind
+from ..inside.calls import FaultError
 from ..inside.worlds import LIFT, FallWorld, address
 from . import (
     WorldJudgement,
     grain,
-    listed,
     near,
     numbers,
     owner,
@@ -25,14 +25,13 @@ from . import (
     verified,
     wrong,
 )
+from .remarks import OfGravity
 
 TOLERANCE = 0.006  # [degrees]: two decimals will do
 _SAME = 1e-6  # [degrees]: the same figure, come by another way
 _STILL = 1e-4  # [rad]
 _NAMES = ("servos on", "servos off")
 _UNITS: tuple[Callable[[Array], Array], ...] = (np.degrees, np.asarray)
-_SPEED = "that is its speed, qvel; its position is in qpos"
-_NO_STEP = "no step was taken with the model that you got"
 
 
 @dataclass(frozen=True)
@@ -83,37 +82,68 @@ def right(world: FallWorld) -> Falls:
 def judge(answer: Answer, world: FallWorld, right: Falls, course: Falls) -> WorldJudgement:
     """Judge both traces in degrees; ctrl as a new Data has it; the Model as it was."""
     remarks = _changes_of_model(answer)
-    pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
     size = len(right.marks)
-    traces = [
-        numbers(trace, (size,), f"{name}, one number at each of 0 … {size - 1} s")
-        for name, trace in zip(_NAMES, pair, strict=True)
-    ]
-    if command := _command(answer):
-        remarks.append(command)
+    traces = _traces(answer.result, size)
+    if command := _command(answer, world.model):
+        return wrong(*remarks, command)  # what the arm then does follows from it
     falls = right.degrees
     if near(traces[0], falls[1], TOLERANCE) and near(traces[1], falls[0], TOLERANCE):
-        return wrong(*remarks, "the two lists are swapped: (on, off) is the order")
+        return wrong(*remarks, OfGravity.SWAPPED.says())
     for limp, name in enumerate(_NAMES):
         if near(traces[limp], falls[limp], TOLERANCE):
             text = _by_the_clock(traces[limp], limp, world, right)
+            if text:
+                remarks.append(OfGravity.OF_TRACE.says(trace=name, mistake=text))
         else:
-            text = _why(traces, limp, world, right, course, answer)
-        if text:
-            remarks.append(f"{name}: {text}")
+            remarks.append(_why(traces, limp, world, right, course, answer))
     if not answer.runs:
-        remarks.append(_NO_STEP)
+        remarks.append(OfGravity.NO_STEP.says())
     elif not remarks and sum(run.nstep >= right.marks[-1] for run in answer.runs) < 2:
-        steps = ", ".join(count(run.nstep, "step") for run in answer.runs[:4])
-        remarks.append(
-            f"your runs took {steps}; {size - 1} s are {right.marks[-1]} steps of "
-            f"{world.model.timestep:g} s, with the servos on and again with them off"
-        )
+        remarks.append(_short_runs(answer, world, int(right.marks[-1])))
     if remarks:
         return wrong(*remarks)
-    return verified(
-        f"{LIFT} after {size - 1} s: {falls[0][-1]:.3f}° with servos, {falls[1][-1]:.2f}° without"
+    on, off = falls[0][-1], falls[1][-1]
+    return verified(OfGravity.PASSED.says(joint=LIFT, seconds=size - 1, on=on, off=off))
+
+
+def _short_runs(answer: Answer, world: FallWorld, needed: int) -> str:
+    """Return how many steps the runs took, where each needs so many."""
+    return OfGravity.SHORT_RUNS.says(
+        steps=", ".join(count(run.nstep, "step") for run in answer.runs[:4]),
+        seconds=world.arguments[0],
+        needed=needed,
+        timestep=world.model.timestep,
     )
+
+
+def _traces(result: Any, size: int) -> list[Array]:
+    """Return both traces that were returned, (size,) each [degrees].
+
+    Raises:
+        FaultError: They are not two lists of so many numbers.
+    """
+    is_list = isinstance(result, (list, tuple)) and len(result) == size != 2
+    if is_list and all(isinstance(pair, (list, tuple)) and len(pair) == 2 for pair in result):
+        raise FaultError(OfGravity.PAIRS.says(kind=kind(result)))
+    traces: list[Array] = []
+    pair = parts(result, 2, "(on, off), two lists of degrees")
+    for trace, name in zip(pair, _NAMES, strict=True):
+        shape = np.shape(trace) if _is_regular(trace) else ()
+        if len(shape) == 2 and shape[0] == size:
+            columns = shape[1]
+            raise FaultError(OfGravity.ONE_NUMBER.says(trace=name, columns=columns, joint=LIFT))
+        what = f"{name}, one number at each of 0 … {size - 1} s,"
+        traces.append(numbers(trace, (size,), what))
+    return traces
+
+
+def _is_regular(value: Any) -> bool:
+    """Return whether something has a shape: it is no list of lists of several lengths."""
+    try:
+        np.shape(value)
+    except ValueError:
+        return False
+    return True
 
 
 def _why(
@@ -137,11 +167,12 @@ def _why(
     trace, expected = traces[limp], falls.degrees[limp]
     # The farthest, but not the start, where all is zero in any unit.
     k = int(np.argmax(np.nan_to_num(abs(trace - expected), nan=np.inf)))
-    figures = told_apart(trace[k], expected[k], lambda value, digits: f"{value + 0.0:.{digits}g}")
-    figures = f"you return {figures.replace(' where', f' at {k} s where')} is expected"
-    if mistake := _mistake(traces, limp, world, falls, course, answer):
-        return f"{figures}: {mistake}"
-    return figures + _late(trace, limp, world, falls, answer)
+    value, right = told_apart(trace[k], expected[k], lambda v, digits: f"{v + 0.0:.{digits}g}")
+    figures = OfGravity.FIGURES.says(trace=_NAMES[limp], value=value, second=k, expected=right)
+    mistake = _mistake(traces, limp, world, falls, course, answer)
+    if not mistake:
+        mistake = _late(trace, limp, world, falls, answer)
+    return OfGravity.MISTAKE.says(figures=figures, mistake=mistake) if mistake else figures
 
 
 def _mistake(
@@ -156,24 +187,29 @@ def _mistake(
     trace, expected = traces[limp], falls.degrees[limp]
     if text := _goes_on(trace, traces[1 - limp], world, answer):
         return text
+    if _is_last_number(trace, expected):
+        return OfGravity.LAST_NUMBER.says()
     for mistake in _mistakes(limp, world, falls, course, answer):
         # The zero at the start may be typed in.
         if _gives(mistake.degrees[1:], trace[1:], expected[1:]):
             return mistake.remark
     runs = [run for run in answer.runs if run.own]
     if not runs:
-        return _NO_STEP
+        return OfGravity.NO_STEP.says()
     if float(abs(trace).max()) <= TOLERANCE < float(abs(expected).max()):
         if any(near(run.end.qpos, run.start.qpos, _STILL) for run in runs):
-            return "nothing moves in this run, as where there is no gravity"
+            return OfGravity.STILL.says()
         speed = falls.speed[limp, falls.marks]
         if trace.any() and any(near(trace, unit(speed), 1e-14) for unit in _UNITS):
-            return _SPEED
-        return (
-            "the arm moves in this run, and these are zeros, or nearly: are they its speed, qvel, "
-            f"or another joint? {LIFT} is at qpos[model.jnt_qposadr[model.joint_id(…)]]"
-        )
+            return OfGravity.SPEED.says()
+        return OfGravity.ZEROS.says(joint=LIFT)
     return ""
+
+
+def _is_last_number(trace: Array, expected: Array) -> bool:
+    """Return whether a trace is the right last number at every moment, the first included."""
+    repeated = np.full(len(trace), expected[-1])
+    return near(trace, repeated, TOLERANCE) and not near(expected, repeated, TOLERANCE)
 
 
 def _gives(mistaken: Array, trace: Array, expected: Array) -> bool:
@@ -199,37 +235,44 @@ def _mistakes(
     limp: int, world: FallWorld, falls: Falls, course: Falls, answer: Answer
 ) -> Iterator[_Mistake]:
     """Yield typical mistakes; arguments as of `_why`."""
-    model, place, marks = world.model, falls.place, falls.marks
-    angles, expected, other = falls.angles[limp], falls.degrees[limp], falls.degrees[1 - limp]
-    yield _Mistake(np.radians(expected), "that is radians; np.degrees(…) makes degrees of them")
-    yield _Mistake(np.degrees(expected), "degrees were made of it twice")
-    for entry in range(model.nq):
-        if entry != place:
-            yield _Mistake(
-                angles[marks, entry],
-                f"that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at qpos[{place}]: "
-                "model.jnt_qposadr[model.joint_id(…)]",
-            )
+    marks = falls.marks
+    expected, other = falls.degrees[limp], falls.degrees[1 - limp]
+    yield _Mistake(np.radians(expected), OfGravity.RADIANS.says())
+    yield _Mistake(np.radians(np.radians(expected)), OfGravity.RADIANS_AGAIN.says())
+    yield _Mistake(np.degrees(expected), OfGravity.DEGREES_TWICE.says())
+    yield from _other_entries(limp, world.model, falls)
     for unit in _UNITS:
-        yield _Mistake(unit(falls.speed[limp, marks]), _SPEED)
+        yield _Mistake(unit(falls.speed[limp, marks]), OfGravity.SPEED.says())
     if world.where:
-        loaded = "" if all(run.own for run in answer.runs) else " (it steps a model of its own)"
-        yield _Mistake(
-            course.degrees[limp][: len(marks)],
-            f"that belongs to the course's own scene, not to the model that you got{loaded}",
-        )
-    servos = f"the servos were {'still on' if limp else 'off already'} in this run"
+        is_loaded = not all(run.own for run in answer.runs)
+        remark = OfGravity.COURSE_LOADED if is_loaded else OfGravity.COURSE
+        yield _Mistake(course.degrees[limp][: len(marks)], remark.says())
+    servos = OfGravity.SERVOS_ON.says() if limp else OfGravity.SERVOS_OFF.says()
     yield _Mistake(other, servos)
-    yield _Mistake(np.radians(other), f"{servos}, and that is radians")
+    yield _Mistake(np.radians(other), OfGravity.AND_RADIANS.says(servos=servos))
+    yield from _other_rates(limp, world.model, falls, answer)
+
+
+def _other_entries(limp: int, model: Model, falls: Falls) -> Iterator[_Mistake]:
+    """Yield what other entries of qpos give; arguments as of `_why`."""
+    for entry in range(model.nq):
+        if entry != falls.place:
+            remark = OfGravity.OTHER_JOINT.says(
+                entry=entry, owner=owner(model, entry), joint=LIFT, place=falls.place
+            )
+            yield _Mistake(falls.angles[limp, falls.marks, entry], remark)
+
+
+def _other_rates(limp: int, model: Model, falls: Falls, answer: Answer) -> Iterator[_Mistake]:
+    """Yield what other numbers of steps a second give; arguments as of `_why`."""
+    marks, angles = falls.marks, falls.angles[limp]
     for nstep in dict.fromkeys(run.nstep for run in answer.runs):
         rate = nstep // (len(marks) - 1)
         if rate != marks[1] and (len(marks) - 1) * rate < len(angles):
-            yield _Mistake(
-                angles[np.arange(len(marks)) * rate, place],
-                f"you took {count(rate, 'step')} for a second, and at "
-                f"{model.timestep * 1e3:g} ms a step a second has {marks[1]}: "
-                "round(1 / model.timestep)",
+            remark = OfGravity.STEPS_A_SECOND.says(
+                steps=count(rate, "step"), timestep=model.timestep * 1e3, needed=marks[1]
             )
+            yield _Mistake(angles[np.arange(len(marks)) * rate, falls.place], remark)
 
 
 def _goes_on(trace: Array, other: Array, world: FallWorld, answer: Answer) -> str:
@@ -239,10 +282,7 @@ def _goes_on(trace: Array, other: Array, world: FallWorld, answer: Answer) -> st
     fresh = sum(abs(start) <= TOLERANCE for start in starts)
     if fresh >= 2 or abs(trace[0]) <= TOLERANCE or abs(trace[0] - other[-1]) > TOLERANCE:
         return ""
-    return (
-        f"this run goes on where the other one ended, at {trace[0]:.3f}°; "
-        "a new Data begins at the default state"
-    )
+    return OfGravity.GOES_ON.says(start=trace[0])
 
 
 def _late(trace: Array, limp: int, world: FallWorld, falls: Falls, answer: Answer) -> str:
@@ -261,8 +301,8 @@ def _late(trace: Array, limp: int, world: FallWorld, falls: Falls, answer: Answe
         offsets = [late for late in offsets if late in taken]
     if len(offsets) != 1 or max(taken) < offsets[0]:
         return ""
-    word = "later" if offsets[0] > 0 else "earlier"
-    return f": that is the arm {abs(offsets[0]) * timestep:g} s {word} (the first is at 0 s)"
+    remark = OfGravity.LATE if offsets[0] > 0 else OfGravity.EARLY
+    return remark.says(shift=abs(offsets[0]) * timestep)
 
 
 def _by_the_clock(trace: Array, limp: int, world: FallWorld, falls: Falls) -> str:
@@ -273,21 +313,32 @@ def _by_the_clock(trace: Array, limp: int, world: FallWorld, falls: Falls) -> st
         return ""
     k = int(np.argmax(np.diff(marks) != falls.marks[1])) + 1
     before = int(marks[k]) - 1
-    time = float(falls.time[before])
-    return (
-        f"you took {marks[k] - marks[k - 1]} steps from {k - 1} s to {k} s, where a second has "
-        f"{falls.marks[1]}: after {before} data.time is {time!r}, since "
-        f"adding up {world.model.timestep:g} rounds each time. A sum of time is not a counter of "
-        "steps: count them, round(1 / model.timestep)"
+    taken, time = marks[k] - marks[k - 1], float(falls.time[before])
+    return OfGravity.BY_THE_CLOCK.says(
+        steps=taken,
+        second=k - 1,
+        next=k,
+        needed=falls.marks[1],
+        before=before,
+        time=time,
+        timestep=world.model.timestep,
     )
 
 
-def _command(answer: Answer) -> str:
+def _command(answer: Answer, model: Model) -> str:
     """Return that ctrl was written, to anything but what a new Data has; "" where it was not."""
     for run in answer.runs:
-        if run.start.ctrl.any() or run.ctrl_changed is not None:
-            end = listed(answer.ends[run.start.data].ctrl)
-            return f"ctrl was written ({end}): here it must stay as a new Data has it"
+        written = np.flatnonzero(run.start.ctrl)
+        values = run.start.ctrl
+        if not written.size and run.ctrl_changed is not None:
+            values = answer.ends[run.start.data].ctrl
+            written = np.flatnonzero(values)
+        if written.size:
+            entry = int(written[0])
+            name = model.actuator_names[entry]
+            return OfGravity.COMMAND.says(entry=entry, actuator=name, value=values[entry])
+        if run.ctrl_changed is not None:  # and written back
+            return OfGravity.COMMAND_BETWEEN.says()
     return ""
 
 
@@ -295,12 +346,5 @@ def _changes_of_model(answer: Answer) -> list[str]:
     """Return what of the Model was not given back as it was."""
     flags = [int(values[0]) for values in answer.changed.get("opt.disableflags", ())]
     if flags:
-        return [
-            "the model was given back with its servos off (model.raw.opt.disableflags is "
-            f"{flags[1]}, it was {flags[0]}): switch the bit back, or use "
-            "model.replace(actuation=False)"
-        ]
-    return [
-        f"the model was given back with another model.raw.{name}: a Model never changes"
-        for name in answer.changed
-    ]
+        return [OfGravity.FLAG_LEFT.says(before=flags[0], now=flags[1])]
+    return [OfGravity.MODEL_CHANGED.says(name=name) for name in answer.changed]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ....interface import Array, make_data, reset, step
+from ....interface import Array, Model, make_data, reset, step
 from ....measures.text import count
-from ..inside.answers import Answer, kind
+from ..inside.answers import Answer, OtherValue, kind
+from ..inside.calls import FaultError
 from ..inside.watch import EngineRun, Inputs, inputs_of
 from ..inside.worlds import ReplayWorld
 from . import (
@@ -24,11 +26,13 @@ from . import (
     verified,
     wrong,
 )
+from .remarks import OfReplay
 
 _COUNT = ("first", "second")
 _START = 1e-9  # a keyframe's quaternion may be normalised
 # Steps taken one by one, or by the engine's own functions, may round otherwise.
 _END = 1e-6  # [rad, m]
+_FAR = 1e-3  # [rad or m]: what no comparison calls nearly equal
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ def right(world: ReplayWorld) -> TwoRuns:
     second = first.copy()
     if world.nudge is not None:
         place = world.nudge.place
-        second[place] = np.nextafter(second[place], world.nudge.towards)
+        second[place] = world.nudge.pushed(second[place])
     return TwoRuns(start, (first, second))
 
 
@@ -66,48 +70,65 @@ def judge(answer: Answer, world: ReplayWorld, right: TwoRuns, _course: TwoRuns) 
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
     if not isinstance(same, bool):
-        return wrong(f"same: True or False is asked for; got {kind(same)}")
+        return wrong(_fault_of_kind(same, copies))
     remarks: list[str] = []
     for fault in (_fault_of_memory(answer), _fault_of_type(copies)):
         if fault:
             remarks.append(fault)
-    ends = [
-        numbers(end_copy, (world.model.nq,), f"{name}, qpos at the end")
-        for name, end_copy in zip(_COUNT, copies, strict=True)
-    ]
-    remarks += _faults_of_runs(answer.runs, world, right.start)
+    ends = [_end(end, name, world.model) for name, end in zip(_COUNT, copies, strict=True)]
+    remarks += _faults_of_runs(answer, world, right.start)
     if remarks:
         return wrong(*remarks)
     first, second = answer.runs
     apart = float(abs(first.end.qpos - second.end.qpos).max())
     if apart and world.nudge is None:
-        return wrong(
-            f"the two runs ended {apart:.1e} apart though both began at keyframe 0: something "
-            "of the first was left over. sm.reset clears all, or use a new Data"
-        )
+        return wrong(OfReplay.LEFT_OVER.says(apart=apart))
     if fault := _fault_of_goal(answer.runs, right, nstep):
         return wrong(fault)
-    if bool(same) != same_bits(first.end.qpos, second.end.qpos):
-        if same:
-            return wrong(
-                f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
-                "equal. np.array_equal compares every bit; np.allclose, round, or a comparison "
-                "of a run with itself do not"
-            )
-        return wrong("both runs ended in the same bits and you call them different")
+    if same != same_bits(first.end.qpos, second.end.qpos):
+        return wrong(_fault_of_comparison(same, apart))
     if fault := _fault_of_ends(ends, (first, second)):
         return wrong(fault)
-    return verified(f"two runs of {nstep} steps end in the same bits")
+    return verified(OfReplay.PASSED.says(nstep=nstep))
+
+
+def _fault_of_kind(same: Any, copies: Sequence[Any]) -> str:
+    """Return what is wrong with a first value that is neither True nor False."""
+    for place, value in enumerate(copies, start=2):
+        if isinstance(value, bool):
+            return OfReplay.ORDER.says(place=place)
+    if isinstance(same, np.ndarray) and same.dtype == np.bool_:
+        return OfReplay.SAME_ELEMENTS.says(kind=kind(same))
+    return OfReplay.SAME_KIND.says(kind=kind(same))
+
+
+def _end(end: Any, which: str, model: Model) -> Array:
+    """Return qpos (nq,) as it was returned at the end of a run.
+
+    Raises:
+        FaultError: It is no array of so many numbers.
+    """
+    if isinstance(end, OtherValue):
+        raise FaultError(OfReplay.WHOLE_DATA.says(which=which, kind=kind(end)))
+    if np.shape(end) == (model.nv,) != (model.nq,):
+        raise FaultError(OfReplay.QVEL.says(which=which, nv=model.nv, nq=model.nq))
+    return numbers(end, (model.nq,), f"{which}, qpos at the end,")
+
+
+def _fault_of_comparison(same: bool, apart: float) -> str:
+    """Return why what is said of two runs that ended so far apart [rad or m] is not so."""
+    if not same:
+        return OfReplay.DIFFERENT.says()
+    remark = OfReplay.ALWAYS_TRUE if apart > _FAR else OfReplay.NEARLY
+    return remark.says(apart=apart)
 
 
 def _fault_of_goal(runs: Sequence[EngineRun], right: TwoRuns, nstep: int) -> str:
     """Return which run ended where such a run does not end; a record may have been made up."""
     for name, run, end in zip(_COUNT, runs, right.ends, strict=True):
         if run.end.qpos.shape != end.shape or not near(run.end.qpos, end, _END):
-            return (
-                f"{name} run: it did not end where {count(nstep, 'step')} of this command take "
-                "this arm: nothing but ctrl may act on it"
-            )
+            fault = OfReplay.OTHER_END.says(steps=count(nstep, "step"))
+            return OfReplay.RUN.says(which=name, fault=fault)
     return ""
 
 
@@ -120,65 +141,50 @@ def _fault_of_memory(answer: Answer) -> str:
         name, live = "second", second
     if answer.memory[2] == 1:
         if live:
-            return (
-                "first and second are one array: both show the last run. Keep a copy of each, "
-                "data.qpos.copy()"
-            )
+            return OfReplay.ONE_ARRAY_LIVE.says()
         if len(answer.runs) > 1:
-            return "first and second are one array: return the end of each run"
-    if live:
-        return (
-            f"{name} is data.{live} itself, which changes with the next step or reset: "
-            f"return a copy, data.{live}.copy()"
-        )
-    return ""
+            return OfReplay.ONE_ARRAY.says()
+    return OfReplay.LIVE.says(which=name, live=live) if live else ""
 
 
 def _fault_of_type(copies: Sequence[object]) -> str:
     """Return which of the returned ends has a type that forgets digits; "" for none."""
     for name, end_copy in zip(_COUNT, copies, strict=True):
         if short := short_float(end_copy):
-            return (
-                f"{name} is {short}, which forgets digits: qpos is float64, and every bit counts "
-                "here. Leave the conversion out"
-            )
+            return OfReplay.FEW_DIGITS.says(which=name, dtype=short)
     return ""
 
 
-def _faults_of_runs(runs: tuple[EngineRun, ...], world: ReplayWorld, start: Inputs) -> list[str]:
+def _faults_of_runs(answer: Answer, world: ReplayWorld, start: Inputs) -> list[str]:
     """Return what is wrong with the runs: their number, or the first fault of each kind."""
     _, nstep = world.arguments
-    if fault := _fault_of_number(runs, nstep):
+    if fault := _fault_of_number(answer, nstep):
         return [fault]
-    first, second = (_faults(run, world, start) for run in runs)
-    remarks = [f"first run: {text}" for text in first.values()]
+    first, second = (_faults(run, world, start) for run in answer.runs)
+    remarks = [OfReplay.RUN.says(which="first", fault=text) for text in first.values()]
     for concern, text in second.items():
         if concern not in first:
-            remarks.append(f"second run: {text}")
+            remarks.append(OfReplay.RUN.says(which="second", fault=text))
     return remarks
 
 
-def _fault_of_number(runs: tuple[EngineRun, ...], nstep: int) -> str:
+def _fault_of_number(answer: Answer, nstep: int) -> str:
     """Return why there were not two runs of the model; "" where there were."""
+    runs = answer.runs
     if not runs:
-        return f"no step was taken: two runs of {nstep} steps are asked for"
+        remark = OfReplay.FORWARD_FOR_STEP if answer.forwards else OfReplay.NO_STEP
+        return remark.says(nstep=nstep)
     if not any(run.own for run in runs):
-        return "no step was taken with the model that you got, but with another"
+        return OfReplay.OTHER_MODEL.says()
     if len(runs) == 1 and runs[0].nstep >= 2 * nstep:
-        return (
-            f"one run of {runs[0].nstep} steps: the second did not begin at "
-            "keyframe 0 but went on where the first had ended. Reset before each"
-        )
+        return OfReplay.NO_RESET_BETWEEN.says(steps=runs[0].nstep)
     if len(runs) == 1:
-        return "there was only one run: one run compared with itself is always equal. Run twice"
+        return OfReplay.ONE_RUN.says()
     if len(runs) > 2:
         steps = ", ".join(str(run.nstep) for run in runs[:6])
         if len(runs) > 6:
             steps += ", …"
-        return (
-            f"there were {len(runs)} runs, of {steps} steps: two are asked for, and nothing may be "
-            "written into qpos, qvel or time between their steps"
-        )
+        return OfReplay.MANY_RUNS.says(runs=len(runs), steps=steps)
     return ""
 
 
@@ -188,18 +194,15 @@ def _faults(run: EngineRun, world: ReplayWorld, start: Inputs) -> dict[str, str]
     faults: dict[str, str] = {}
     is_misplaced = _is_command_in_qpos(run, ctrl, start)
     if is_misplaced:
-        faults["start"] = (
-            "the command was written into qpos, and the arm was there at once: write it into "
-            "ctrl, and the servos take it there"
-        )
+        faults["start"] = OfReplay.COMMAND_IN_QPOS.says()
     elif fault := _fault_of_start(run, start):
         faults["start"] = fault
     if not (is_misplaced or same_bits(run.start.ctrl, ctrl)):
-        faults["ctrl"] = _fault_of_command(run, ctrl, start)
+        faults["ctrl"] = _fault_of_command(run, ctrl, start, world.model)
     elif run.ctrl_changed is not None:
-        faults["ctrl"] = f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed"
+        faults["ctrl"] = OfReplay.CTRL_CHANGED.says(step=run.ctrl_changed)
     if run.nstep != nstep:
-        faults["steps"] = f"it took {count(run.nstep, 'step')} where {nstep} are asked for"
+        faults["steps"] = OfReplay.STEPS.says(steps=count(run.nstep, "step"), nstep=nstep)
     return faults
 
 
@@ -227,38 +230,46 @@ def _fault_of_start(run: EngineRun, start: Inputs) -> str:
         gap_of_speed = _gap(run.start.qvel, start.qvel)
         if gap_of_speed > gap:
             name, gap = "qvel", gap_of_speed
-        return (
-            f"it did not begin at keyframe 0: {name} was up to {gap:.2g} away. "
-            "sm.reset(model, data, keyframe=0)"
-        )
+        return OfReplay.ELSEWHERE.says(array=name, gap=gap)
     if run.start.time:
-        of = ", the keyframe's time" if run.start.time == start.time else ""
-        return f"it began at {run.start.time:g} s{of}: set data.time to zero"
+        is_keyframes = run.start.time == start.time
+        remark = OfReplay.KEYFRAMES_TIME if is_keyframes else OfReplay.TIME
+        return remark.says(time=run.start.time)
     return ""
 
 
-def _fault_of_command(run: EngineRun, ctrl: Array, start: Inputs) -> str:
-    """Return what ctrl was in a run where it was not what is asked for, and why it may have been.
+def _fault_of_command(run: EngineRun, ctrl: Array, start: Inputs, model: Model) -> str:
+    """Return what ctrl was in a run where it was not the command, and why it may have been.
 
     Args:
         run: With another ctrl at its first step.
-        ctrl: (nu,) that is asked for [rad].
+        ctrl: (nu,) the command [rad].
         start: Keyframe 0.
+        model: What the function got.
     """
-    is_keyframes, late = same_bits(run.start.ctrl, start.ctrl), run.ctrl_changed is not None
-    had = "the keyframe's own" if is_keyframes else listed(run.start.ctrl)
-    after = f", and was written only after {count(run.ctrl_changed or 0, 'step')}" if late else ""
-    if is_keyframes and not late:
-        why = " (a reset overwrites ctrl: write it after)"
-    elif near(run.start.ctrl, start.ctrl + ctrl, 1e-9):
-        why = ": += adds to the keyframe's own ctrl; data.ctrl[:] = ctrl sets it"
-    elif near(run.start.ctrl, np.degrees(ctrl), 1e-9):
-        why = ": degrees were made of it; ctrl is in radians as it is"
-    elif near(run.start.ctrl, np.radians(ctrl), 1e-9):
-        why = ": radians were made of it; ctrl is in radians as it is"
-    else:
-        why = ""
-    return f"at its first step ctrl was {had}{after}; {listed(ctrl)} is asked for{why}"
+    was = run.start.ctrl
+    is_keyframes = same_bits(was, start.ctrl)
+    if run.ctrl_changed is not None:
+        remark = OfReplay.CTRL_LATE_KEYFRAMES if is_keyframes else OfReplay.CTRL_LATE
+        return remark.says(ctrl=listed(was), steps=count(run.ctrl_changed, "step"))
+    if is_keyframes:
+        return OfReplay.CTRL_NOT_WRITTEN.says()
+    if near(was, start.ctrl + ctrl, 1e-9):
+        return OfReplay.CTRL_ADDED.says()
+    if near(was, np.degrees(ctrl), 1e-9):
+        return OfReplay.CTRL_DEGREES.says(ctrl=listed(was))
+    if near(was, np.radians(ctrl), 1e-9):
+        return OfReplay.CTRL_RADIANS.says(ctrl=listed(was))
+    others = np.flatnonzero(was != ctrl)
+    if len(others) == 1:
+        entry = int(others[0])
+        return OfReplay.CTRL_ENTRY.says(
+            entry=entry,
+            actuator=model.actuator_names[entry],
+            value=was[entry],
+            expected=ctrl[entry],
+        )
+    return OfReplay.CTRL_OTHER.says(ctrl=listed(was), expected=listed(ctrl))
 
 
 def _fault_of_ends(ends: Sequence[Array], runs: Sequence[EngineRun]) -> str:
@@ -267,21 +278,21 @@ def _fault_of_ends(ends: Sequence[Array], runs: Sequence[EngineRun]) -> str:
         if not same_bits(end, run.end.qpos):
             away = float(abs(end - run.end.qpos).max())
             why = _why(end, away, run, runs)
-            return f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}"
+            return OfReplay.END.says(which=name, away=away, why=why)
     return ""
 
 
 def _why(end: Array, away: float, run: EngineRun, runs: Sequence[EngineRun]) -> str:
     """Return what a wrong end (nq,), so far away from the right one, may be."""
     if same_bits(end, run.start.qpos):
-        return "that is qpos at the start"
+        return OfReplay.AT_START.says()
     if same_bits(end, runs[0].end.qpos):
-        return "the first run was returned twice"
+        return OfReplay.FIRST_TWICE.says()
     if same_bits(end, runs[1].end.qpos):
-        return "that is the end of the second run"
+        return OfReplay.SECOND_END.says()
     rounding = grain(end)
     if rounding and away <= rounding * 1.001:
-        return "was it rounded? Every bit counts here"
+        return OfReplay.ROUNDED.says()
     if away < 1e-3:
-        return "was it rounded, or read before the last step?"
-    return "return data.qpos.copy() after the last step"
+        return OfReplay.ROUNDED_OR_EARLY.says()
+    return OfReplay.READ_AT_END.says()

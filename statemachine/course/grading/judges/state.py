@@ -8,13 +8,16 @@ from itertools import pairwise
 from numbers import Real
 from typing import Any, NamedTuple
 
-from ....interface import JointType, Model, make_data, reset
+import numpy as np
+
+from ....interface import Array, JointType, Model, make_data, reset
 from ....interface.records import Ints
 from ....measures.text import count
 from ..inside.answers import Answer, kind
 from ..inside.calls import FaultError
 from ..inside.worlds import NoArgumentsWorld
 from . import WorldJudgement, parts, verified, wrong
+from .remarks import OfState
 
 _ARRAYS = ("qpos", "qvel")
 
@@ -46,10 +49,12 @@ class Layout:
     Attributes:
         slots: Those of each joint, by its name.
         time: At keyframe 0 [s].
+        qpos: (nq,) at keyframe 0 [rad or m].
     """
 
     slots: dict[str, Slots]
     time: float
+    qpos: Array
 
 
 def right(world: NoArgumentsWorld) -> Layout:
@@ -60,7 +65,7 @@ def right(world: NoArgumentsWorld) -> Layout:
     slots = dict(zip(model.joint_names, zip(positions, velocities, strict=True), strict=True))
     with make_data(model) as data:
         reset(model, data, keyframe=0)
-        return Layout(slots, data.time)
+        return Layout(slots, data.time, data.qpos.copy())
 
 
 def _owned(starts: Ints, total: int) -> list[Slot]:
@@ -74,16 +79,18 @@ def _owned(starts: Ints, total: int) -> list[Slot]:
 def judge(answer: Answer, world: NoArgumentsWorld, right: Layout, course: Layout) -> WorldJudgement:
     """Judge the pair of slices of every joint, and the time."""
     slots, time = parts(answer.result, 2, "(slots, time)")
+    if isinstance(time, dict) and isinstance(slots, Real):
+        return wrong(OfState.SWAPPED.says())
     faults = (
         _fault_of_names(slots, right),
         _first_wrong(slots, right, world.model),
-        _fault_of_time(time, right.time, course.time, world.model, answer),
+        _fault_of_time(time, right, course.time, world.model, answer),
     )
     remarks = [fault for fault in faults if fault]
     if remarks:
         return wrong(*remarks)
     free = [name for name, (qpos, qvel) in right.slots.items() if qpos.size != qvel.size]
-    return verified(f"all {len(right.slots)} joints, {', '.join(free)} with 7 and 6 numbers")
+    return verified(OfState.PASSED.says(joints=len(right.slots), free=", ".join(free)))
 
 
 def _fault_of_names(slots: Any, layout: Layout) -> str:
@@ -92,50 +99,92 @@ def _fault_of_names(slots: Any, layout: Layout) -> str:
     Raises:
         FaultError: It is no dict.
     """
+    if isinstance(slots, (list, tuple)):
+        raise FaultError(OfState.LIST.says(kind=kind(slots)))
     if not isinstance(slots, dict):
-        raise FaultError(
-            "slots: a dict {joint: (slice of qpos, slice of qvel)} is asked for; "
-            f"got {kind(slots)}"
-        )
+        raise FaultError(OfState.NO_DICT.says(kind=kind(slots)))
     missing = [name for name in layout.slots if name not in slots]
-    if missing:
-        return (
-            f"slots: {len(missing)} of {len(layout.slots)} joints are missing: "
-            f"{', '.join(missing)}; the keys are model.joint_names"
+    unknown = [name for name in slots if name not in layout.slots]
+    if missing and unknown:
+        return OfState.OTHER_KEYS.says(
+            missing=len(missing), joints=len(layout.slots), key=unknown[0]
         )
-    for name in slots:
-        if name not in layout.slots:
-            return f"slots: no joint is called {name!r}; see model.joint_names"
+    if missing:
+        return OfState.MISSING.says(
+            missing=len(missing), joints=len(layout.slots), names=", ".join(missing)
+        )
+    if unknown:
+        return OfState.UNKNOWN.says(name=unknown[0])
     return ""
 
 
 def _first_wrong(slots: dict[str, Any], layout: Layout, model: Model) -> str:
     """Return the first joint with a wrong slot, and why it may be; "" where there is none."""
-    for name, expected in layout.slots.items():
-        if name not in slots:
-            continue
-        pair = parts(slots[name], 2, f"{name}: (slice of qpos, slice of qvel)")
-        returned = (_slot(pair[0], name, model.nq), _slot(pair[1], name, model.nv))
-        for which, array in enumerate(_ARRAYS):
-            if returned[which] != expected[which]:
-                start, stop = returned[which]
-                return (
-                    f"{name}: you return {array}[{start}:{stop}] where "
-                    f"{array}[{expected[which].start}:{expected[which].stop}] is expected: "
-                    f"{_why(name, returned[which], which, expected, model)}"
-                )
+    returned = {name: _pair(slots[name], name, model) for name in layout.slots if name in slots}
+    if returned and all(pair == layout.slots[name][::-1] for name, pair in returned.items()):
+        return OfState.PAIRS_SWAPPED.says()
+    for name, pair in returned.items():
+        for which in range(len(_ARRAYS)):
+            if pair[which] != layout.slots[name][which]:
+                return _figures(name, pair[which], which, layout.slots[name], model)
     return ""
 
 
-def _slot(value: Any, name: str, total: int) -> Slot:
-    """Return where a slice of an array of so many numbers begins and ends."""
-    if not isinstance(value, slice) or value.step not in (None, 1):
-        raise FaultError(f"{name}: a pair of slices is asked for; got {kind(value)}")
+def _figures(name: str, returned: Slot, which: int, expected: Slots, model: Model) -> str:
+    """Return what is said of a wrong slot; arguments as of `_why`."""
+    return OfState.FIGURES.says(
+        joint=name,
+        array=_ARRAYS[which],
+        start=returned.start,
+        stop=returned.stop,
+        begin=expected[which].start,
+        end=expected[which].stop,
+        why=_why(name, returned, which, expected, model),
+    )
+
+
+def _pair(value: Any, joint: str, model: Model) -> Slots:
+    """Return the slots of a joint that were returned.
+
+    Raises:
+        FaultError: They are no pair of slices.
+    """
+    if isinstance(value, slice):
+        raise FaultError(OfState.ONE_SLICE.says(joint=joint))
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise FaultError(OfState.NO_PAIR.says(joint=joint, kind=kind(value)))
+    for part in value:
+        if not isinstance(part, slice):
+            raise FaultError(_no_slice(part, joint))
+    return _slot(value[0], joint, model.nq), _slot(value[1], joint, model.nv)
+
+
+def _no_slice(value: Any, joint: str) -> str:
+    """Return what a part of a pair is that is no slice, and what to write."""
+    if isinstance(value, (list, tuple)) and len(value) == 2:
+        start, stop = value
+        kinds = f"{type(value).__name__}s"
+        return OfState.PAIR_OF_PAIRS.says(joint=joint, kinds=kinds, start=start, stop=stop)
+    if isinstance(value, Real):
+        return OfState.PAIR_OF_NUMBERS.says(joint=joint)
+    if isinstance(value, np.ndarray):
+        return OfState.PAIR_OF_ARRAYS.says(joint=joint)
+    return OfState.PAIR_OF_OTHERS.says(joint=joint, kind=kind(value))
+
+
+def _slot(value: slice, joint: str, total: int) -> Slot:
+    """Return where a slice of an array of so many numbers begins and ends.
+
+    Raises:
+        FaultError: It has a step, or an end that is no whole number.
+    """
+    if value.step not in (None, 1):
+        raise FaultError(OfState.STEPS.says(joint=joint, slice=value))
     try:
         start = 0 if value.start is None else operator.index(value.start)
         stop = total if value.stop is None else operator.index(value.stop)
     except TypeError:
-        raise FaultError(f"{name}: a slice wants two whole numbers; got {value}") from None
+        raise FaultError(OfState.NOT_WHOLE.says(joint=joint, slice=value)) from None
     return Slot(start + total if start < 0 else start, stop + total if stop < 0 else stop)
 
 
@@ -154,52 +203,56 @@ def _why(name: str, returned: Slot, which: int, expected: Slots, model: Model) -
     if returned.start == expected[which].start:
         return _why_of_size(returned, which, expected[which], int(model.jnt_type[number]))
     if returned.start == expected[1 - which].start:
-        return f"that is where it begins in {_ARRAYS[1 - which]}; see {table}"
+        return OfState.OTHER_ARRAY.says(array=_ARRAYS[1 - which], table=table)
     if returned.start == number:
-        return (
-            f"it begins at the joint's number, {number}; a joint before it owns several numbers: "
-            f"see {table}"
-        )
-    return f"it begins elsewhere: see {table}, no arithmetic"
+        return OfState.JOINT_NUMBER.says(number=number, table=table)
+    return OfState.ELSEWHERE.says(table=table)
 
 
 def _why_of_size(returned: Slot, which: int, expected: Slot, jnt_type: int) -> str:
     """Return why a slot that begins at the right place may end at a wrong one."""
     if jnt_type == int(JointType.FREE):
         if returned.size == 1:
-            return "a free joint owns more than one number: three and a quaternion, in qvel six"
+            return OfState.FREE_HAS_MORE.says()
         if which == 1 and returned.size == 7:
-            return "a quaternion has four numbers, a turning speed three: six in qvel, not seven"
+            return OfState.SIX_IN_QVEL.says()
         if which == 0 and returned.size == 6:
-            return "a place has three numbers and a quaternion four: seven in qpos, not six"
+            return OfState.SEVEN_IN_QPOS.says()
     if returned.stop == expected.stop - 1:
-        return "a slice ends one after the last number"
-    size = count(returned.size, "number")
-    return f"it begins at the right place and has {size}, not {expected.size}"
+        return OfState.END.says()
+    return OfState.SIZE.says(size=count(returned.size, "number"), needed=expected.size)
 
 
-def _fault_of_time(time: Any, right: float, course: float, model: Model, answer: Answer) -> str:
+def _fault_of_time(time: Any, right: Layout, course: float, model: Model, answer: Answer) -> str:
     """Return what is wrong with the time at keyframe 0; "" for nothing.
 
     Args:
         time: That was returned.
-        right: What is right [s].
+        right: What is right.
         course: What is right on the course's own world [s].
         model: What the function got.
         answer: The time is of it.
     """
     if not isinstance(time, Real) or isinstance(time, bool):
-        return f"time: a number of seconds is asked for; got {kind(time)}"
-    if float(time) == right:
+        return OfState.TIME_KIND.says(kind=kind(time))
+    if float(time) == right.time:
         return ""
-    text = f"time after the reset to keyframe 0 should be {right:g} s, you return {float(time):g}"
+    text = OfState.TIME.says(expected=right.time, time=float(time))
+    why = _why_of_time(float(time), right, course, model, answer)
+    return OfState.TIME_WHY.says(text=text, why=why) if why else text
+
+
+def _why_of_time(time: float, right: Layout, course: float, model: Model, answer: Answer) -> str:
+    """Return why a time [s] may be wrong; "" where nothing tells. Arguments as above."""
     if time == 0:
-        return f"{text}: that is a new Data, or a reset without keyframe=0"
+        at_keyframe = [end for end in answer.ends if np.array_equal(end.qpos, right.qpos)]
+        is_zeroed = any(end.time == 0 for end in at_keyframe)
+        return OfState.TIME_ZEROED.says() if is_zeroed else OfState.TIME_NEW.says()
     for k, keyframe in enumerate(model.keyframes):
         if k and keyframe.time == time:
-            return f"{text}: that is keyframe {k}"
+            return OfState.TIME_OTHER.says(number=k)
     if time == course:
-        return f"{text}: that is the course's own scene; ask the model that you got"
+        return OfState.TIME_COURSE.says()
     if answer.runs:
-        return f"{text}: read it right after the reset, before any step"
-    return text
+        return OfState.TIME_STEPPED.says()
+    return ""

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ....engines import room, room_names
+from ....engines import raw_engine_names, raw_engine_of
 from ....engines.measured import Absent, Measurement, Phrases
 from ....errors import check_name
 from ....installed import ENGINES, engine_version, require, silence
@@ -83,7 +83,7 @@ def ask(question: str, engine: str) -> Answers | None:
     """
     check_questions((question,))
     check_engine(engine)
-    measure = room(engine).measurement(question)
+    measure = raw_engine_of(engine).measurement(question)
     if measure is None:
         return None
     asked = QUESTIONS[question]
@@ -140,9 +140,9 @@ def check_engine(name: str) -> None:
 
     An engine of another package that has a room, and is none of ours, is taken as it is.
     """
-    if name in ENGINES or name not in room_names():
+    if name in ENGINES or name not in raw_engine_names():
         require(name)
-    room(name)
+    raw_engine_of(name)
 
 
 def versions(engines: Sequence[str]) -> dict[str, str]:
@@ -214,7 +214,7 @@ def run_phrases(engines: Sequence[str], progress: Progress = silent) -> Phrasebo
     phrases: dict[str, tuple[Phrase, ...]] = {}
     for done, engine in enumerate(engines):
         check_engine(engine)
-        cells = room(engine).phrases()
+        cells = raw_engine_of(engine).phrases()
         concepts = [concept for concept in CONCEPTS if concept in cells.cells]
         tried: list[Phrase] = []
         for count in range(1, len(concepts) + 1):

@@ -221,7 +221,7 @@ def cheat_sheet(table: Phrasebook) -> str:
     return (
         "# Cheat sheet\n\n"
         f"*Every cell was run on {versions}.*\n\n"
-        '<table class="cheat-sheet">\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n\n"
+        '<div class="cheat-sheet">\n<table>\n'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n</div>\n\n"
         f"## What to remember\n\n{lines}\n"
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ....backends.chosen import ALL
-from ....engines import room_names
+from ....engines import raw_engine_names
 from ....errors import BadInputError, MissingEngineError
 from ....installed import ENGINES, available
 from ...runs.each_backend import note_missing
@@ -82,7 +82,7 @@ def _engines(names: Sequence[str], reporter: Reporter) -> list[str]:
             check_engine(name)
         return list(dict.fromkeys(names))
     engines, missing = available()
-    for name in room_names():
+    for name in raw_engine_names():
         if name in ENGINES:
             continue
         try:

@@ -22,6 +22,7 @@ from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
 from ...compare.sides import Request, Side, with_options
 from ...compare.typed_command import typed_command
+from ...runs.floating import Bases
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 from ...why.explain import explain
@@ -133,7 +134,7 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
             file was written.
     """
     began = time.monotonic()  # loading counts
-    question, sides = _question(request, reporter)
+    question, sides, bases = _question(request, reporter)
 
     def so_far(explanation: Explanation) -> None:
         reporter.so_far(ranking_page(explanation))
@@ -142,15 +143,17 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
         explanation = explain(question, reporter, so_far, began)
     except InterruptedExplanation as stop:
         explanation = _with_changes(stop.result, question, request)
-        raise InterruptedExplanation(_result(explanation, request)) from None
+        raise InterruptedExplanation(_result(explanation, request, bases)) from None
     explanation = _with_changes(explanation, question, request)
     if request.write is not None:
         explanation = _with_file(explanation, question, sides, Path(request.write))
-    return _result(explanation, request)
+    return _result(explanation, request, bases)
 
 
-def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, Sequence[Side]]:
-    """Load both sides, and return the question about them, and the sides as they are loaded."""
+def _question(
+    request: ExplainRequest, reporter: Reporter
+) -> tuple[WhyRequest, Sequence[Side], Bases]:
+    """Load both sides, and return the question about them, the sides as loaded, and their bases."""
     run = request.run
     with reporter.stage("why: loading"):
         if run.is_traces:
@@ -163,7 +166,8 @@ def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, 
         if request.write is not None:
             inputs = [Path(word.partition(":")[0]) for word in run.what if isinstance(word, str)]
             check_target(Path(request.write), sides[0].path, sides[1].path, inputs)
-        models = load_sides(sides, {}, run.names).models
+        loaded = load_sides(sides, {}, run.names)
+        models = loaded.models
         recordings = [
             for_left(trace, model, run) for trace, model in zip(traces, models, strict=False)
         ]
@@ -183,7 +187,7 @@ def _question(request: ExplainRequest, reporter: Reporter) -> tuple[WhyRequest, 
             uncertain=request.uncertainty,
             jobs=request.jobs,
         )
-        return question, sides
+        return question, sides, loaded.bases
 
 
 def _with_changes(
@@ -194,7 +198,7 @@ def _with_changes(
     return with_changes(explanation, question.left, question.right, names, request.finer)
 
 
-def _result(explanation: Explanation, request: ExplainRequest) -> ExplainResult:
+def _result(explanation: Explanation, request: ExplainRequest, bases: Bases) -> ExplainResult:
     """Return an explanation with what was typed, and what was asked."""
     run = request.run
     notes = [*run.taken]
@@ -204,6 +208,7 @@ def _result(explanation: Explanation, request: ExplainRequest) -> ExplainResult:
         explanation,
         notes=(*notes, *explanation.notes),
         command=typed_command(run, _words_of(request)),
+        bases=bases,
     )
     facts = vars(explanation)
     return ExplainResult(**facts, request=request)

@@ -20,7 +20,7 @@ from .one_step import check_runs
 
 @dataclass(frozen=True)
 class ConvergeRequest:
-    """Question what of a gap vanishes where the steps are halved and quartered.
+    """Question what of a gap vanishes with the timestep h: runs at h, h/2, h/4, and at most h/16.
 
     Attributes:
         run: What is run on two sides; not recorded traces alone.

@@ -31,7 +31,6 @@ _FAR = 8.0  # extents of the model beyond which nothing is drawn
 _NEAR = 2.0  # extents beyond which nothing counts for where the camera stands
 _WAY = 2000  # points of the way of a site
 _DASH = 0.0015  # m between these
-_CLOSE = 0.05  # of the scene: a gap below it is looked at from near
 _TRIANGLES = 24_000  # of all shapes
 _CONTACTS = 9_000  # of one side, at all moments together
 _ASPECT = 1.45  # width of the picture through its height; the script has it too
@@ -136,7 +135,7 @@ def scene_of(
         "moving": _moving(*traces),
         **box.as_data(),
         "extent": extent,
-        **_nearness(tips, start, extent),
+        "near": _near(tips, start, extent),
         "floor": _floor_height(drawings[0]),
         **_camera_data(camera),
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
@@ -206,15 +205,12 @@ def _camera_data(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:
-    """Whether to begin close to the site, and how close: so that a small gap is seen."""
+def _near(tips: tuple[Array, Array] | None, start: int, extent: float) -> float:
+    """Return from how far the site is looked at when the reader asks for it [m]."""
     if tips is None:
-        return {"begin_near": False, "near": 0.55 * extent}
-    gaps = np.linalg.norm(tips[0] - tips[1], axis=1)
-    return {
-        "begin_near": bool(0 < gaps.max() < _CLOSE * extent),
-        "near": float(np.clip(25 * gaps[start], 0.4 * extent, 0.55 * extent)),
-    }
+        return 0.55 * extent
+    gap = np.linalg.norm(tips[0][start] - tips[1][start])
+    return float(np.clip(25 * gap, 0.4 * extent, 0.55 * extent))
 
 
 def _drawings(

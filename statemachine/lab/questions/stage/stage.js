@@ -274,7 +274,6 @@ const begin_scene = () => {
   }
   $('still').hidden = true;
   reveal('views', 'checks', 'arrows');
-  if (facts.scene.begin_near && scene.sides[0].tip) scene.approach();
   view(canvas);
 };
 

@@ -1,0 +1,219 @@
+"""What is said of a class: a row a student, what is common, and what a teacher should look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from ...measures.text import count
+from ...show.blocks import Page, Table
+from ...show.templates import PageContent, render, with_answer
+from .alike import ALIKE, AlikeGroup
+from .class_table import ClassEntry, verdicts_of
+from .judges import JUDGES
+from .overview import COMMON, ClassResult, FunctionCount, Mistake
+from .page import ONLY_WATCHED
+
+_COMMONEST = 5  # mistakes that are shown
+# A verdict as a mark, for a table with a column a function.
+_MARKS = {"right": "✓", "wrong": "✗", "not written": "–", "not judged": "?"}
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What somebody should look at in a file."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class _Remark:
+    """What is not right in one function of one student."""
+
+    student: str
+    function: str
+    text: str
+
+
+@dataclass(frozen=True)
+class ClassPage(PageContent):
+    """Content of the page of a class.
+
+    Attributes:
+        result: What came of the class.
+        entries: Table with a row for each submission.
+        functions: Table with a row for each function.
+        mistakes: Table of the commonest mistakes.
+        remarks: Table of what is not right, with a row for each student and function.
+        is_report: Whether it begins with the answer, and the remarks are last and folded; in a
+            terminal the end stays in sight.
+        threshold: Likeness from which on submissions are called alike.
+        only_watched: What is said where code is only watched.
+    """
+
+    template = "classroom.md.j2"
+    result: ClassResult
+    entries: Table
+    functions: Table
+    mistakes: Table
+    remarks: Table
+    is_report: bool = False
+    threshold: str = f"{ALIKE:.0%}"
+    only_watched: str = ONLY_WATCHED
+
+    @property
+    def size(self) -> str:
+        """How many students or files count."""
+        counted = self.result.counted
+        return count(len(counted), "student" if counted[0].student else "file")
+
+    @property
+    def made_with(self) -> str:
+        """Versions and settings."""
+        return self.result.entries[0].made_with
+
+    @property
+    def solved(self) -> int:
+        """How many have all functions right."""
+        return sum(entry.solved for entry in self.result.counted)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether what some code reads is only watched, not prevented."""
+        return any(entry.watched for entry in self.result.entries)
+
+    @property
+    def looks(self) -> list[_Look]:
+        """What somebody should look at."""
+        looks: list[_Look] = []
+        for entry in self.result.entries:
+            looks += [_Look(entry.label, text) for text in entry.looks]
+        return looks
+
+    @property
+    def groups(self) -> list[_Group]:
+        """Groups of submissions that are alike."""
+        return [_Group(group) for group in self.result.alike]
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Submissions that are alike, as the page names them.
+
+    Attributes:
+        group: The submissions.
+    """
+
+    group: AlikeGroup
+
+    @property
+    def percent(self) -> str:
+        """How much they are alike, rounded down so that 100 % is the same code."""
+        least, most = (math.floor(100 * part) for part in (self.group.least, self.group.most))
+        return f"{least}%" if least == most else f"{least} to {most}%"
+
+
+def class_page(result: ClassResult) -> Page:
+    """Make the page of a class for a terminal."""
+    return render(_content(result))
+
+
+def class_report(result: ClassResult) -> Page:
+    """Make the page of a class for HTML, with its answer."""
+    return with_answer(render(replace(_content(result), is_report=True)))
+
+
+def _content(result: ClassResult) -> ClassPage:
+    """Return the content of the page of a class."""
+    return ClassPage(
+        result,
+        class_table(result.entries),
+        functions_table(result.functions),
+        mistakes_table(result.mistakes),
+        remarks_table(result.entries),
+    )
+
+
+def class_table(entries: Sequence[ClassEntry]) -> Table:
+    """Make the table of a class, without columns in which nothing stands."""
+    columns: dict[str, Callable[[ClassEntry], str]] = {}
+    columns["student" if any(entry.student for entry in entries) else "file"] = _label
+    columns["right"] = _right_of
+    for name in JUDGES:
+        columns[_short(name)] = _marker_of(name)
+    columns["tests"] = lambda entry: entry.tests.partition(";")[0]
+    columns["predictions"] = lambda entry: entry.predictions
+    columns["most like"] = lambda entry: entry.alike.replace(" ", "\u00a0")
+    filled = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
+    return Table.of(entries, filled, words=filled, wide={"predictions", "most like"})
+
+
+def functions_table(functions: Sequence[FunctionCount]) -> Table:
+    """Make the table of how many have each function right."""
+    headers = ["function", *(f"{word} {mark}" for word, mark in _MARKS.items())]
+    rows: list[list[str]] = []
+    for each in functions:
+        counts = (each.right, each.wrong, each.not_written, each.not_judged)
+        rows.append([_short(each.function), *map(str, counts)])
+    return Table(headers, rows)
+
+
+def mistakes_table(mistakes: Sequence[Mistake]) -> Table:
+    """Make the table of the commonest mistakes, each of several students."""
+    columns: dict[str, Callable[[Mistake], str]] = {
+        "students": lambda mistake: str(mistake.count),
+        "function": _functions_of,
+        "mistake": lambda mistake: mistake.remark,
+        "who": lambda mistake: ", ".join(mistake.students),
+    }
+    common = [mistake for mistake in mistakes if mistake.count >= COMMON]
+    return Table.of(common[:_COMMONEST], columns, words=("function", "mistake", "who"))
+
+
+def remarks_table(entries: Sequence[ClassEntry]) -> Table:
+    """Make the table of what is not right: all of it, a row for each student and function."""
+    remarks: list[_Remark] = []
+    for entry in entries:
+        reasons = entry.reasons_not_judged
+        for remark in entry.remarks:
+            if remark.text not in reasons:  # which stand below, once
+                remarks.append(_Remark(entry.label, _short(remark.function), remark.text))
+    columns: dict[str, Callable[[_Remark], str]] = {
+        "student": lambda remark: remark.student,
+        "function": lambda remark: remark.function if remark.function else "file",
+        "what is not right": lambda remark: remark.text,
+    }
+    return Table.of(remarks, columns, words=columns)
+
+
+def _functions_of(mistake: Mistake) -> str:
+    """Return the functions in which a mistake was made."""
+    if mistake.functions == tuple(JUDGES):
+        return "all"
+    return ", ".join(map(_short, mistake.functions))
+
+
+def _label(entry: ClassEntry) -> str:
+    """Return who handed a submission in, or its name."""
+    return entry.label
+
+
+def _right_of(entry: ClassEntry) -> str:
+    """Return how many functions are right; "?" where the file was not judged."""
+    return f"{entry.right}/{len(JUDGES)}" if entry.judged else "?"
+
+
+def _marker_of(function: str) -> Callable[[ClassEntry], str]:
+    """Return what gives the mark of a function in a submission."""
+
+    def mark(entry: ClassEntry) -> str:
+        return _MARKS[verdicts_of(entry)[function]]
+
+    return mark
+
+
+def _short(function: str) -> str:
+    """Return the name of a function without what all have in common."""
+    return function.removeprefix("demo_")

@@ -1,0 +1,213 @@
+"""A class at a glance: counts, common mistakes, what was not judged; on the page, JSON, HTML."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from statemachine.course.grading.alike import AlikeGroup
+from statemachine.course.grading.class_page import (
+    class_page,
+    class_report,
+    mistakes_table,
+    remarks_table,
+)
+from statemachine.course.grading.class_table import NOTHING, ClassEntry
+from statemachine.course.grading.exercise import LOOK
+from statemachine.course.grading.judges import JUDGES, Judgement
+from statemachine.course.grading.overview import (
+    ClassResult,
+    FunctionCount,
+    Mistake,
+    Unjudged,
+    class_result,
+)
+from statemachine.show.as_json import dumps
+from statemachine.show.blocks import Section, Table, Verdict
+from statemachine.show.html import report
+
+from .support.pages import blocks, shown
+
+GRAVITY, STATE, FORWARD, REPLAY = JUDGES
+RIGHT = "all is well"
+
+
+def _judgement(function: str, said: str) -> Judgement:
+    """A judgement: of what is right, not written, not judged ("? why"), or wrong with remarks."""
+    if said == RIGHT:
+        return Judgement(function, True, True, (RIGHT,))
+    if said == "":
+        return Judgement(function, False, False, ("not written yet. TODO",))
+    if said.startswith("? "):
+        return Judgement(function, True, False, (said.removeprefix("? "),), judged=False)
+    return Judgement(function, True, False, tuple(said.split(" | ")))
+
+
+def _entry(name: str, *said: str, refusal: str = "", student: str = "") -> ClassEntry:
+    functions = tuple(map(_judgement, JUDGES, said)) if said else ()
+    return ClassEntry(name, "", functions, refusal, "mujoco", student=student)
+
+
+ENTRIES = (
+    _entry("ann", RIGHT, RIGHT, "reading 2: 4.5 mm away", "ctrl[2] was written | nan at 1 s"),
+    _entry("bob", RIGHT, "", "reading 3: 27 mm away", RIGHT),
+    _entry("cy", *(["line 7: NameError (in `x = y`)"] * 4)),
+    _entry("dee", *(["line 12: NameError (in `a`)"] * 4)),
+    _entry("eve", "? it reads bob/a.py", "? it reads bob/a.py", "reading 2: 1 mm away", RIGHT),
+    _entry("fay", refusal="a notebook"),
+    _entry("gus", refusal="a notebook"),
+    _entry("hal", refusal=NOTHING, student=""),
+)
+GROUP = AlikeGroup(("ann", "bob"), 0.957, 1.0, 57, is_short=True, is_solution=False)
+
+
+@pytest.fixture
+def result() -> ClassResult:
+    """What came of a small class."""
+    return class_result(ENTRIES, (GROUP,), ("notes.txt",))
+
+
+def test_right_and_wrong_are_counted_for_each_function(result: ClassResult) -> None:
+    assert result.functions == (
+        FunctionCount(GRAVITY, right=2, wrong=2, not_written=1, not_judged=3),
+        FunctionCount(STATE, right=1, wrong=2, not_written=2, not_judged=3),
+        FunctionCount(FORWARD, right=0, wrong=5, not_written=1, not_judged=2),
+        FunctionCount(REPLAY, right=2, wrong=3, not_written=1, not_judged=2),
+    )
+    for each in result.functions:
+        assert each.right + each.wrong + each.not_written + each.not_judged == len(ENTRIES)
+
+
+def test_remarks_that_differ_in_figures_are_one_mistake(result: ClassResult) -> None:
+    assert result.mistakes == (
+        Mistake("reading …: … mm away", (FORWARD,), ("ann", "bob", "eve")),
+        Mistake("line …: NameError (in …)", tuple(JUDGES), ("cy", "dee")),
+        Mistake("ctrl[2] was written", (REPLAY,), ("ann",)),
+        Mistake("nan at 1 s", (REPLAY,), ("ann",)),
+    )
+    assert [mistake.count for mistake in result.mistakes] == [3, 2, 1, 1]
+
+
+def test_a_figure_that_all_have_is_shown() -> None:
+    said = ("0.8 rad, 3 mm away", "0.8 rad, 5 mm away")
+    entries = [_entry(f"{k}", text, RIGHT, RIGHT, RIGHT) for k, text in enumerate(said)]
+    (mistake,) = class_result(entries).mistakes
+    assert mistake.remark == "0.8 rad, … mm away"
+
+
+def test_one_student_with_a_mistake_in_four_functions_is_one_student() -> None:
+    said = [f"the file has no function {name}" for name in JUDGES]
+    (mistake,) = class_result([_entry("ann", *said)]).mistakes
+    assert (mistake.remark, mistake.count) == ("the file has no function …", 1)
+    assert mistake.functions == tuple(JUDGES)
+
+
+def test_five_mistakes_are_shown_and_only_of_several_students() -> None:
+    mistakes = [Mistake(f"m{k}", (STATE,), ("a", "b", "c")[: 4 - k // 2]) for k in range(8)]
+    rows = mistakes_table(mistakes).rows
+    assert [row[2] for row in rows] == ["m0", "m1", "m2", "m3", "m4"]
+    assert [row[0] for row in mistakes_table(mistakes[5:]).rows] == ["2"]
+    assert rows[0] == ["3", "state", "m0", "a, b, c"]
+
+
+def test_why_something_was_not_judged_is_told_once(result: ClassResult) -> None:
+    assert result.unjudged == (
+        Unjudged("it reads bob/a.py", ("eve",)),
+        Unjudged("a notebook", ("fay", "gus")),
+    )
+    assert not result.complete
+    page = class_page(result)
+    assert [verdict.holds for verdict in blocks(page, Verdict)] == [False, False]
+    for reason in ("it reads bob/a.py", "a notebook"):
+        assert shown(page).count(reason) == 1
+
+
+def test_a_remark_is_a_row_for_each_student_and_function_uncut() -> None:
+    long = "x" * 500
+    entries = [*ENTRIES, _entry("ida", long, f"wrong | {LOOK}: a.txt", RIGHT, "a | b")]
+    rows = remarks_table(entries).rows
+    assert rows == [
+        ["ann", "forward", "reading 2: 4.5 mm away"],
+        ["ann", "replay", "ctrl[2] was written; nan at 1 s"],
+        ["bob", "state", "not written"],
+        ["bob", "forward", "reading 3: 27 mm away"],
+        ["cy", "file", "line 7: NameError (in `x = y`)"],
+        ["dee", "file", "line 12: NameError (in `a`)"],
+        ["eve", "forward", "reading 2: 1 mm away"],
+        ["hal", "file", NOTHING],
+        ["ida", "gravity", long],
+        ["ida", "state", "wrong"],
+        ["ida", "replay", "a; b"],
+    ]
+
+
+def test_what_somebody_should_look_at_is_no_mistake() -> None:
+    entry = _entry("ida", f"wrong | {LOOK}: it reads a.txt", RIGHT, RIGHT, RIGHT)
+    assert [mistake.remark for mistake in class_result([entry]).mistakes] == ["wrong"]
+    assert shown(class_page(class_result([entry]))).count("it reads a.txt") == 1
+
+
+def test_with_a_roster_files_of_nobody_on_it_are_not_counted() -> None:
+    entries = [
+        _entry("x1.py", "bad", RIGHT, RIGHT, RIGHT, student="Ann"),
+        _entry("x2.py", "bad", RIGHT, RIGHT, RIGHT),
+    ]
+    result = class_result(entries)
+    assert result.functions[0].wrong == 1
+    assert result.mistakes[0].students == ("Ann",)
+
+
+def test_groups_are_named_with_what_is_no_sign_of_copying(result: ClassResult) -> None:
+    texts = " ".join(shown(class_page(result)).split())
+    assert "2 are alike, 95 to 100%, which short functions often are: ann, bob." in texts
+    assert "solution" not in texts
+    same = replace(GROUP, least=1.0, is_short=False, is_solution=True)
+    texts = shown(class_page(class_result(ENTRIES, (same,))))
+    assert "2 are alike, 100%: ann, bob." in texts
+    assert "short functions" not in texts
+    assert "solution" in texts
+
+
+def test_almost_the_same_is_not_called_the_same() -> None:
+    group = replace(GROUP, least=0.9999, most=0.9999)
+    assert "alike, 99%" in shown(class_page(class_result(ENTRIES, (group,))))
+
+
+def test_all_of_it_is_in_the_json(result: ClassResult) -> None:
+    document = json.loads(dumps(result))
+    assert document["functions"][0] == {
+        "function": GRAVITY, "right": 2, "wrong": 2, "not_written": 1, "not_judged": 3,
+    }  # fmt: skip
+    assert document["mistakes"][1]["count"] == 2
+    assert document["alike"][0]["students"] == ["ann", "bob"]
+    assert document["unjudged"][1] == {"reason": "a notebook", "students": ["fay", "gus"]}
+    assert document["ignored"] == ["notes.txt"]
+    assert document["complete"] is False
+    assert [each["name"] for each in document["entries"]] == [each.name for each in ENTRIES]
+
+
+def test_in_a_terminal_the_overview_is_last_and_on_html_the_remarks_are(
+    result: ClassResult,
+) -> None:
+    tables = blocks(class_page(result), Table)
+    assert [table.headers[-1] for table in tables[:4]] == [
+        "what is not right", "replay", "not judged ?", "who",
+    ]  # fmt: skip
+    page = class_report(result)
+    assert page.headline is not None
+    assert page.headline.lead == "0 of 8 files have all functions right"
+    last = page.blocks[-1]
+    assert isinstance(last, Section)
+    assert last.folded
+    html = report(page)
+    for text in ("reading 2: 4.5 mm away", "reading …: … mm away", "which short functions", "eve"):
+        assert text in html.replace("\u00a0", " ")
+
+
+def test_a_row_of_the_class_fits_80_columns(result: ClassResult) -> None:
+    entry = _entry("a" * 30, RIGHT, RIGHT, RIGHT, RIGHT)
+    page = class_page(class_result([replace(entry, nearest="b", likeness=0.5)]))
+    (line,) = [line for line in shown(page).splitlines() if line.startswith("a" * 30)]
+    assert line.split() == ["a" * 30, "4/4", "✓", "✓", "✓", "✓"]
