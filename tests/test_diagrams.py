@@ -570,6 +570,12 @@ def test_shapes_are_painted(shapes: Sequence[Shape], lines: Sequence[str]) -> No
     assert in_a_terminal(Diagram("t", "w", shapes)) == list(lines)
 
 
+def test_an_arrow_leaves_a_box_its_look() -> None:
+    box = Box(0, 2, 9, 2, "call", "title")
+    (_, _, edge, _) = painted([box, Arrow(((3, 0), (3, 2)), "state")], str)
+    assert [part.look for part in edge] == ["call"]
+
+
 @pytest.mark.parametrize(
     ("text", "room", "expected"),
     [("abc", 3, "abc"), ("abcd", 3, "ab…"), ("关关关", 4, "关…"), ("W" * 2000, 5, "WWWW…")],

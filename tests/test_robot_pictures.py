@@ -22,6 +22,7 @@ from statemachine.errors import MissingEngineError
 from statemachine.lab.questions import film
 from statemachine.show import terminal
 from statemachine.show.blocks import Page, Printed, Question, Text
+from statemachine.show.html.page import Interaction, report
 from statemachine.show.pictures import RobotPicture
 from tools import docs_pages
 
@@ -111,6 +112,15 @@ def test_without_a_renderer_a_page_has_the_words(
 def test_it_is_a_picture_with_its_words_where_there_is_one() -> None:
     text = md.block_as_markdown(_picture(), lambda _: "file.webp")
     assert text.startswith("![the words](file.webp)")
+
+
+def test_the_html_page_has_it_or_its_words() -> None:
+    page = Page("t", "o", [Text("first"), _picture()])
+    drawn = report(page, Interaction(picture=lambda _: "data:image/webp;base64,AAAA"))
+    assert '<img src="data:image/webp;base64,AAAA" alt="the words">' in drawn
+    without = report(page)
+    assert "<img" not in without
+    assert_in(without, "<p>the words</p>", "the title", "<code>statemachine view</code>")
 
 
 def test_a_terminal_says_how_to_look_at_it_to_who_sits_there(

@@ -157,7 +157,7 @@ class _Canvas:
             if place != end:
                 leaving |= way
             self.ways[place] = self.ways.get(place, 0) | leaving
-            self.looks[place] = look
+            self.looks.setdefault(place, look)  # an arrow changes no box that it touches
             if is_dashed:
                 self.is_dashed.add(place)
             if place == end:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from ... import __version__
 from ...atomic_files import check_place, replace_text
 from ...errors import BadInputError
 from ..blocks import Block, Interactive, Page, Section, Text
+from ..pictures import RobotPicture
 from ..text_blocks import non_breaking
 from .blocks import DrawInteractive, drawn, headline_as_html, no_interaction
 from .markup import Html, filled, joined, tag, text_of
@@ -21,18 +22,25 @@ SUFFIXES = (".html", ".htm")
 _NO_DATA = Html("{}")
 
 
+def no_picture(_picture: RobotPicture) -> str:
+    """Return no address: a page has the words of a picture that nothing draws."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Interaction:
     """What moves on a page.
 
     Attributes:
         draw: Draws an interactive block.
+        picture: Returns the address of a drawn robot; "" where nothing draws it.
         above: What stands above the headline; empty for the title of the page.
         data: JSON that the script reads.
         script: JavaScript; "" for none.
     """
 
     draw: DrawInteractive = no_interaction
+    picture: Callable[[RobotPicture], str] = no_picture
     above: Sequence[Html] = ()
     data: Html = _NO_DATA
     script: str = ""
@@ -49,7 +57,7 @@ def report(page: Page, interaction: Interaction = NOTHING_MOVES) -> str:
         interaction: What moves on it.
     """
     opening = list(itertools.takewhile(_is_above_sections, page.blocks))
-    rest = drawn(page.blocks[len(opening) :], interaction.draw)
+    rest = _all_drawn(page.blocks[len(opening) :], interaction)
     main = tag("main", _header(page, opening, interaction), rest)
     footer = tag(
         "footer",
@@ -75,6 +83,24 @@ def report(page: Page, interaction: Interaction = NOTHING_MOVES) -> str:
     return filled("show/html/page.html", slots)
 
 
+def _all_drawn(blocks: Sequence[Block], interaction: Interaction) -> Html:
+    """Return blocks one after the other, pictures of a robot among them."""
+    parts: list[Html] = []
+    for block in blocks:
+        if isinstance(block, RobotPicture):
+            parts.append(_robot(block, interaction.picture(block)))
+        else:
+            parts.append(drawn([block], interaction.draw))
+    return joined(parts)
+
+
+def _robot(picture: RobotPicture, source: str) -> Html:
+    """Return the picture of a robot; without one, what would be seen."""
+    shown = tag("img", src=source, alt=picture.words) if source else tag("p", picture.words)
+    caption = tag("figcaption", picture.title, " Live: ", tag("code", picture.view))
+    return tag("figure", shown, caption, class_="drawn")
+
+
 def _is_above_sections(block: Block) -> bool:
     """Tell whether a block may stand in the header: it is no part that links lead to."""
     if isinstance(block, Section):
@@ -94,7 +120,7 @@ def _header(page: Page, opening: Sequence[Block], interaction: Interaction) -> H
     if opening and isinstance(opening[0], Text):
         parts.append(tag("p", non_breaking(opening[0].text), class_="says"))
         opening = opening[1:]
-    return tag("header", *parts, tag("div", drawn(opening, interaction.draw), class_="words"))
+    return tag("header", *parts, tag("div", _all_drawn(opening, interaction), class_="words"))
 
 
 def check_target(path: str | Path) -> Path:
