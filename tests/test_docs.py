@@ -107,7 +107,7 @@ _ELSEWHERE = re.compile(
 )
 _FOLDED = re.compile(r"<details[ >].*?</details>", re.DOTALL)
 # It stands open, below the fold: it is what a lesson is to be remembered by.
-_DIAGRAM = re.compile(r'<figure class="diagram">.*?</figure>', re.DOTALL)
+_DIAGRAM = re.compile(r'<figure class="diagram".*?</figure>', re.DOTALL)
 # A paragraph that was meant to be a table.
 _RAW_TABLE = re.compile(r"<p>\s*\|[^<]*\|")
 _SMALL: dict[str, dict[str, Any]] = {
