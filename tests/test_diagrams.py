@@ -25,7 +25,7 @@ from statemachine.show import terminal
 from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Page
 from statemachine.show.diagrams.canvas import painted
-from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Shape, Words, cut, length_of
+from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Label, Shape, cut, length_of
 from statemachine.show.html.diagram import figure, svg
 from statemachine.show.html.page import report
 from statemachine.show.pictures import Diagram
@@ -77,7 +77,7 @@ def mixed(tmp_path: Path) -> sm.Model:
 
 
 def texts(diagram: Diagram) -> list[str]:
-    return [shape.text for shape in diagram.shapes if isinstance(shape, Words)]
+    return [shape.text for shape in diagram.shapes if isinstance(shape, Label)]
 
 
 def in_a_terminal(diagram: Diagram, spelled: Callable[[str], str] = str) -> list[str]:
@@ -98,7 +98,7 @@ def inside(box: Box, diagram: Diagram) -> str:
     """Return what stands in a box."""
     words: list[str] = [box.title]
     for shape in diagram.shapes:
-        is_inside = isinstance(shape, Words) and box.top < shape.row < box.bottom
+        is_inside = isinstance(shape, Label) and box.top < shape.row < box.bottom
         if is_inside and box.left < shape.column < box.right:
             words.append(shape.text)
     return "\n".join(words)
@@ -182,7 +182,7 @@ def test_the_slots_are_those_of_the_compiled_model(mixed: sm.Model) -> None:
         ]
         name = mujoco.mj_id2name(raw, mujoco.mjtObj.mjOBJ_JOINT, joint)
         (label,) = [text for text in texts(diagram) if text.split()[0] == name]
-        at = next(s for s in diagram.shapes if isinstance(s, Words) and s.text == label)
+        at = next(s for s in diagram.shapes if isinstance(s, Label) and s.text == label)
         assert (at.column, at.row) == (leader.places[0][0] + 1, leader.places[0][1])
 
 
@@ -381,7 +381,7 @@ def test_the_svg_says_what_the_terminal_says(drawn: Sequence[Diagram]) -> None:
         ]
         whole = "\n".join(in_a_terminal(diagram))
         for shape in diagram.shapes:
-            if isinstance(shape, Words):
+            if isinstance(shape, Label):
                 text = cut(shape.text, shape.room)
                 assert text in written
                 assert text in whole
@@ -562,9 +562,9 @@ def _luminance(channels: Sequence[str]) -> float:
         pytest.param([Arrow(((0, 1), (0, 0), (3, 0)))], ["┌─▶", "│"], id="turn"),
         pytest.param([Bracket(1, 0, 2, "f")], ["─┐", " │ f", "─┘"], id="bracket"),
         pytest.param([Box(0, 0, 4, 3, is_dashed=True)], ["┌╌╌┐", "╎  ╎", "└╌╌┘"], id="dashed"),
-        pytest.param([Words("abcdef", 1, 0, 4)], [" abc…"], id="cut"),
-        pytest.param([Words("a\nb\x1b", 0, 0, 9)], ["a?b?"], id="control"),
-        pytest.param([Words("关x", 0, 0, 9)], ["关x"], id="wide"),
+        pytest.param([Label("abcdef", 1, 0, 4)], [" abc…"], id="cut"),
+        pytest.param([Label("a\nb\x1b", 0, 0, 9)], ["a?b?"], id="control"),
+        pytest.param([Label("关x", 0, 0, 9)], ["关x"], id="wide"),
     ],
 )
 def test_shapes_are_painted(shapes: Sequence[Shape], lines: Sequence[str]) -> None:

@@ -23,7 +23,7 @@ from statemachine.errors import BadInputError
 from statemachine.show import terminal
 from statemachine.show.blocks import Heading, Page, Printed, Question, Table, Text
 from statemachine.show.charts import drawn
-from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Words
+from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Label
 from statemachine.show.pictures import Diagram, Traces
 from tools.docs_pages import make_path
 
@@ -44,7 +44,7 @@ _BRACKET = Bracket(11, 0, 2, "step")
     [
         Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
         Traces("t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True),
-        Diagram("d", "w", (_BOX, Words("a", 2, 1, 5), Arrow(((9, 1), (4, 1))), _BRACKET)),
+        Diagram("d", "w", (_BOX, Label("a", 2, 1, 5), Arrow(((9, 1), (4, 1))), _BRACKET)),
     ],
     ids=lambda each: type(each).__name__,
 )

@@ -17,6 +17,8 @@ from ...lab.runs.robot import (
 )
 from ...measures.text import command
 
+ARM, BOX = "so101/scene", "so101/scene_box"  # the models of the lessons
+
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
 _VALUE = 0.8  # rad
 _SHIFT = 0.05  # m; of a slide without a range, or up

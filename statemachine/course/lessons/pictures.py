@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 from ...show.blocks import Page, Printed
 from ...show.pictures import RobotPicture
 from . import PATH
+from ._robot import ARM, BOX
 
 if TYPE_CHECKING:
     from .poses import Poses
-
-ARM, BOX = "so101/scene", "so101/scene_box"
 
 
 def with_picture(page: Page, lesson: str) -> Page:

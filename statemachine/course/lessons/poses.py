@@ -13,7 +13,7 @@ import numpy as np
 from ...backends import load
 from ...interface import Array, make_data, reset, step
 from ...lab.runs.robot import TARGET, UNACTUATED
-from .pictures import ARM, BOX
+from ._robot import ARM, BOX
 
 _EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later
 _SLOW = 4  # the same, for four times as slow

@@ -11,10 +11,10 @@ from .shapes import (
     Arrow,
     Box,
     Bracket,
+    Label,
     Look,
     Place,
     Shape,
-    Words,
     clean,
     cut,
     first_column,
@@ -82,7 +82,7 @@ class _Canvas:
     def draw(self, shape: Shape) -> None:
         """Draw a shape."""
         match shape:
-            case Words():
+            case Label():
                 self._words(shape)
             case Box():
                 self._box(shape)
@@ -91,7 +91,7 @@ class _Canvas:
             case Bracket():
                 self._bracket(shape)
 
-    def _words(self, words: Words) -> None:
+    def _words(self, words: Label) -> None:
         text = self._cut(words.text, words.room)
         column = words.column
         if words.is_centered:

@@ -9,10 +9,10 @@ from .shapes import (
     Arrow,
     Box,
     Bracket,
+    Label,
     Look,
     Place,
     Shape,
-    Words,
     box_below,
     clean,
     cut,
@@ -50,7 +50,7 @@ def draw(axes: Any, shapes: Sequence[Shape]) -> None:
     boxes = [shape for shape in shapes if isinstance(shape, Box)]
     for shape in shapes:
         match shape:
-            case Words():
+            case Label():
                 _words(axes, shape)
             case Box():
                 _box(axes, shape)
@@ -63,7 +63,7 @@ def draw(axes: Any, shapes: Sequence[Shape]) -> None:
     axes.axis("off")
 
 
-def _words(axes: Any, words: Words) -> None:
+def _words(axes: Any, words: Label) -> None:
     """Write a line of text."""
     style: dict[str, Any] = {"family": "monospace", "fontsize": _LETTERS, "va": "center"}
     column = float(words.column)
@@ -91,7 +91,7 @@ def _box(axes: Any, box: Box) -> None:
         style["linestyle"] = "--"
     axes.add_patch(FancyBboxPatch((box.left + 0.5, top), box.width - 1, bottom - top, **style))
     if box.title:
-        _words(axes, Words(box.title, box.left + 2, box.top, box.width - 4, box.look))
+        _words(axes, Label(box.title, box.left + 2, box.top, box.width - 4, box.look))
 
 
 def _arrow(axes: Any, arrow: Arrow, boxes: Sequence[Box]) -> None:
@@ -116,8 +116,8 @@ def _bracket(axes: Any, bracket: Bracket) -> None:
     top, bottom = bracket.top - 0.1, bracket.bottom + 0.5
     _line(axes, [(left, top), (x, top), (x, bottom), (left, bottom)], _COLOURS[bracket.look])
     column, row = bracket.column + 2, bracket.middle
-    _words(axes, Words(bracket.name, column, row, length_of(bracket.name), bracket.look))
-    _words(axes, Words(bracket.note, column, row + 1, length_of(bracket.note)))
+    _words(axes, Label(bracket.name, column, row, length_of(bracket.name), bracket.look))
+    _words(axes, Label(bracket.note, column, row + 1, length_of(bracket.note)))
 
 
 def _top(box: Box) -> float:

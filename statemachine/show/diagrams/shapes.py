@@ -19,7 +19,7 @@ _NO_LETTER = "?"  # in place of a line break and of what a terminal would obey
 
 
 @dataclass(frozen=True)
-class Words:
+class Label:
     """A line of text.
 
     Attributes:
@@ -118,7 +118,7 @@ class Bracket:
         return (self.top + self.bottom) // 2
 
 
-Shape = Words | Box | Arrow | Bracket
+Shape = Label | Box | Arrow | Bracket
 
 
 def size_of(shapes: Sequence[Shape]) -> tuple[int, int]:
@@ -133,7 +133,7 @@ def size_of(shapes: Sequence[Shape]) -> tuple[int, int]:
 def _last_place(shape: Shape) -> Place:
     """Return the last column and the last row of a shape."""
     match shape:
-        case Words(text, column, row, room):
+        case Label(text, column, row, room):
             length = min(length_of(clean(text)), room)
             if shape.is_centered:
                 return first_column(column, length) + length - 1, row

@@ -12,10 +12,10 @@ from ..diagrams.shapes import (
     Arrow,
     Box,
     Bracket,
+    Label,
     Look,
     Place,
     Shape,
-    Words,
     box_below,
     clean,
     cut,
@@ -77,7 +77,7 @@ def svg(diagram: Diagram) -> Html:
 def _drawn(shape: Shape, boxes: Sequence[Box]) -> list[Html]:
     """Return the elements of a shape."""
     match shape:
-        case Words():
+        case Label():
             return [_words(shape)]
         case Box():
             return _box(shape)
@@ -87,7 +87,7 @@ def _drawn(shape: Shape, boxes: Sequence[Box]) -> list[Html]:
             return _bracket(shape)
 
 
-def _words(words: Words) -> Html:
+def _words(words: Label) -> Html:
     """Return a line of text; that of code is as wide as its columns, whatever the font."""
     text = cut(clean(words.text), words.room)
     x = words.column * _COLUMN
@@ -134,7 +134,7 @@ def _box(box: Box) -> list[Html]:
     frame = tag("rect", **attributes)
     if not box.title:
         return [frame]
-    title = Words(box.title, box.left + 2, box.top, box.width - 4, box.look)
+    title = Label(box.title, box.left + 2, box.top, box.width - 4, box.look)
     return [frame, _words(title)]
 
 
@@ -179,10 +179,10 @@ def _bracket(bracket: Bracket) -> list[Html]:
     top, bottom = bracket.top * _ROW - _ABOVE_TITLE, (bracket.bottom + 0.5) * _ROW
     line = _line([(left, top), (x, top), (x, bottom), (left, bottom)], _COLOURS[bracket.look])
     column, row = bracket.column + 2, bracket.middle
-    name = Words(bracket.name, column, row, length_of(bracket.name), bracket.look, is_code=True)
+    name = Label(bracket.name, column, row, length_of(bracket.name), bracket.look, is_code=True)
     parts = [line, _words(name)]
     if bracket.note:
-        note = Words(bracket.note, column, row + 1, length_of(bracket.note))
+        note = Label(bracket.note, column, row + 1, length_of(bracket.note))
         parts.append(_words(note))
     return parts
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ....interface import JointType, Model
-from ....show.diagrams.shapes import Arrow, Box, Look, Shape, Words, clean, cut, length_of
+from ....show.diagrams.shapes import Arrow, Box, Label, Look, Shape, clean, cut, length_of
 from ....show.pictures import Diagram
 from ....show.templates import PageContent
 from .texts import diagram_of
@@ -105,9 +105,9 @@ def joint_slots(model: Model) -> Diagram:
         shapes += band_shapes
     hidden = sum(piece.joints for band in bands[_BANDS_MOST:] for piece in band)
     if hidden:
-        shapes.append(Words(f"{hidden} more joints", _LEFT, top, _WIDTH - _LEFT, "faint"))
+        shapes.append(Label(f"{hidden} more joints", _LEFT, top, _WIDTH - _LEFT, "faint"))
     if not joints:
-        shapes += [Words("no joints", 0, 0, _WIDTH, "faint")]
+        shapes += [Label("no joints", 0, 0, _WIDTH, "faint")]
     single = sum(1 for band in drawn for piece in band if piece.joints == 1)
     content = JointSlotsContent(
         nq=model.nq,
@@ -198,11 +198,11 @@ def _band(band: Sequence[_Piece], pitch: int, top: int) -> tuple[list[Shape], in
         cells += _between(piece, column, qpos_top + 3, between, pitch)
         middle = column + pitch // 2
         names.append(Arrow(((middle + 1, row), (middle, row), (middle, qpos_top)), has_head=False))
-        names.append(Words(piece.label, middle + 2, row, _ROOM, _strong(piece), is_code=True))
+        names.append(Label(piece.label, middle + 2, row, _ROOM, _strong(piece), is_code=True))
         column += piece.columns(pitch)
     arrays = [
-        Words("qpos", 0, qpos_top + 1, 4, is_code=True),
-        Words("qvel", 0, qvel_top + 1, 4, is_code=True),
+        Label("qpos", 0, qpos_top + 1, 4, is_code=True),
+        Label("qvel", 0, qvel_top + 1, 4, is_code=True),
     ]
     return [*cells, *names, *arrays], qvel_top + 4
 
@@ -220,7 +220,7 @@ def _slots(
     if piece.joints > 1:
         width = piece.columns(pitch)
         yield Box(left, top, width + 1, 3, piece.look, is_dashed=True)
-        yield Words(
+        yield Label(
             _range(slots),
             left + width // 2,
             top + 1,
@@ -233,7 +233,7 @@ def _slots(
     for number in range(start, stop):
         column = left + (number - start) * pitch
         yield Box(column, top, pitch + 1, 3, piece.look)
-        yield Words(
+        yield Label(
             str(number),
             column + pitch // 2,
             top + 1,
@@ -252,14 +252,14 @@ def _between(piece: _Piece, left: int, top: int, rows: int, pitch: int) -> Itera
     of_qpos, of_qvel = (slots[1] - slots[0] for slots in (piece.qpos, piece.qvel))
     if piece.joints == 1 and of_qpos != of_qvel:
         mark = f"≠  {of_qpos} above {of_qvel}"
-    yield Words(mark, left + width // 2, middle, width - 1, piece.look, is_centered=True)
+    yield Label(mark, left + width // 2, middle, width - 1, piece.look, is_centered=True)
     if piece.joints > 1:
         return
     for parts, row in ((_QPOS_PARTS, top), (_QVEL_PARTS, top + 2)):
         column = left
         for slots, name in parts.get(piece.type, ()):
             half = slots * pitch // 2
-            yield Words(name, column + half, row, slots * pitch - 1, is_centered=True)
+            yield Label(name, column + half, row, slots * pitch - 1, is_centered=True)
             column += slots * pitch
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ....interface import Model, make_data
-from ....show.diagrams.shapes import Arrow, Box, Shape, Words
+from ....show.diagrams.shapes import Arrow, Box, Label, Shape
 from ....show.pictures import Diagram
 from ....show.templates import PageContent
 from .texts import diagram_of, file_of, lines, rows_of, stored_arrays
@@ -58,8 +58,8 @@ def model_and_data(model: Model) -> Diagram:
     rows = rows_of(_counts(content), _WIDTH - 4)
     model_box = Box(0, _MODEL_TOP, _WIDTH, len(rows) + 2, "constant", "Model: never changes")
     shapes: list[Shape] = [
-        Words(content.file, 2, 0, _WIDTH - 2, is_code=True),
-        Words("load, once", 7, 1, 20),
+        Label(content.file, 2, 0, _WIDTH - 2, is_code=True),
+        Label("load, once", 7, 1, 20),
         model_box,
         Arrow(((4, 1), (4, _MODEL_TOP)), "constant"),
     ]
@@ -109,7 +109,7 @@ def _stored(content: ModelAndDataContent, data: Box) -> list[Shape]:
     left, room = data.left + 2, data.width - 4
     return [
         *lines(content.arrays, left, data.top + 1, room, is_code=True),
-        Words("derived arrays", left, data.bottom - 1, room, "faint"),
+        Label("derived arrays", left, data.bottom - 1, room, "faint"),
     ]
 
 
@@ -125,7 +125,7 @@ def _from_the_model(edge: int, boxes: tuple[Box, Box, Box]) -> list[Shape]:
         column = box.left + 4
         shapes.append(Arrow(((column, edge), (column, box.top)), "constant"))
         is_code = name != "reads"
-        shapes.append(Words(name, column + 2, edge + 1, _STEP - 6, is_code=is_code))
+        shapes.append(Label(name, column + 2, edge + 1, _STEP - 6, is_code=is_code))
     return shapes
 
 
@@ -138,5 +138,5 @@ def _between(step: Box, data: Box) -> list[Shape]:
         Arrow(((step.right, back), (data.left, back)), "call"),
     ]
     for text, row in (("reads", there - 1), ("overwrites", back + 1), ("in place", back + 2)):
-        shapes.append(Words(text, middle, row, gap, is_centered=True))
+        shapes.append(Label(text, middle, row, gap, is_centered=True))
     return shapes

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ....interface import Data, Model, get_state
 from ....show.blocks import Text
-from ....show.diagrams.shapes import Look, Shape, Words, length_of
+from ....show.diagrams.shapes import Label, Look, Shape, length_of
 from ....show.markdown import plain_text
 from ....show.pictures import Diagram
 from ....show.templates import render
@@ -68,7 +68,7 @@ def lines(
     room: int,
     is_code: bool = False,
     look: Look = "plain",
-) -> list[Words]:
+) -> list[Label]:
     """Return lines of text, one below the other.
 
     Args:
@@ -80,5 +80,5 @@ def lines(
         look: What they are about.
     """
     return [
-        Words(text, left, row, room, look, is_code) for row, text in enumerate(texts, start=top)
+        Label(text, left, row, room, look, is_code) for row, text in enumerate(texts, start=top)
     ]
