@@ -67,6 +67,7 @@ def demo_gravity(model, seconds=4):
     with the model as it is, then with its servos off. For the second run, `model.replace`
     gives you another Model. MuJoCo's own way: set the bit mjDSBL_ACTUATION of
     `mujoco.mjtDisableBit` in `model.raw.opt.disableflags`, and switch it back before you return.
+    `statemachine lesson gravity` shows such a run.
 
     Args:
         model: A Model of the arm. Ask it for its timestep, and for where a joint begins in
@@ -84,7 +85,8 @@ def demo_state(model):
     """TODO(you): which numbers of qpos and qvel belong to which joint?
 
     A joint may own several numbers, and another number of them in qpos than in qvel. A hinge
-    owns one in each. A free joint, which lets a body move anywhere, owns more: see `JointType`.
+    owns one in each. A free joint, which lets a body move anywhere, owns more: see `JointType`,
+    and `statemachine lesson state`.
 
     Args:
         model: A Model with at least one keyframe.
@@ -104,6 +106,7 @@ def demo_forward(model):
     In one new Data, read the position of the site gripperframe four times:
     1. at once; 2. after a forward; 3. after you have written 0.8 [rad] into qpos, at the place
     of the joint shoulder_lift; 4. after a second forward. No time passes in all this.
+    `statemachine lesson forward` asks the same question.
 
     Args:
         model: A Model of the arm. Ask it where a joint begins in qpos.
@@ -115,11 +118,11 @@ def demo_forward(model):
 
 
 def demo_replay(model, ctrl, nstep=600):
-    """TODO(you): do the same start and the same command lead to the same end?
+    """TODO(you): do two equal runs end in the same state?
 
     Do this twice: reset to keyframe 0, set data.time to zero, write the command `ctrl` into
     data.ctrl, take `nstep` steps, and keep a copy of qpos. Then compare the two copies
-    exactly: every bit counts, and nearly equal is not equal.
+    exactly: every bit counts, and nearly equal is not equal. See `statemachine lesson replay`.
 
     Args:
         model: A Model with at least one keyframe.

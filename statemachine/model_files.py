@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from .errors import ModelError, shown
-from .models import AnyPath, included_file, mesh_places, resolve, what_is_there
+from .models import AnyPath, included_file, kind_of_path, mesh_places, resolve
 from .processes import free_memory
 
 _BINARY = ".mjb"
@@ -142,7 +142,7 @@ def _check_named_file(
         for part in names
     ]
     places += mesh_places(name, path.parent)
-    found = [kind for kind in map(what_is_there, places) if kind not in ("nothing", "a file")]
+    found = [kind for kind in map(kind_of_path, places) if kind not in ("nothing", "a file")]
     special = [kind for kind in found if kind != "a folder"]
     is_folder = bool(found) and bool(name) and not any(_is_file(place) for place in places)
     if special or is_folder:
@@ -153,7 +153,7 @@ def _check_named_file(
 
 
 def _is_file(place: Path) -> bool:
-    return what_is_there(place) == "a file"
+    return kind_of_path(place) == "a file"
 
 
 def _check_numbers(file: Path, element: Element, attribute: str, value: str) -> None:

@@ -48,7 +48,7 @@ def model_names() -> list[str]:
     return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
 
 
-def what_is_there(path: Path) -> str:
+def kind_of_path(path: Path) -> str:
     """Say what a path leads to, in two words: "a file", "a folder", "a named pipe", "nothing".
 
     To open what is neither a file nor a folder may wait for ever, or do something.
@@ -75,7 +75,7 @@ def check_is_file(path: Path, error: Callable[[str], Exception] = BadInputError)
         path: That is to be read.
         error: Makes the error of a text.
     """
-    kind = what_is_there(path)
+    kind = kind_of_path(path)
     if kind not in ("a file", "nothing"):
         raise error(f"{path} is {kind}, not a file")
 
@@ -144,7 +144,7 @@ def _path_of_name(name: str, menagerie: AnyPath | None) -> Path:
         return models_dir() / name
     if menagerie is not None and (Path(menagerie).expanduser() / name).is_file():
         return (Path(menagerie).expanduser() / name).absolute()
-    kind = what_is_there(Path(name).expanduser())
+    kind = kind_of_path(Path(name).expanduser())
     what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
     raise ModelFileError(f"model file {name} {what}")
 
@@ -201,7 +201,7 @@ def refuse_xacro(path: Path) -> None:
     waiting, seen = [path], set[Path]()
     while waiting:
         file = waiting.pop()
-        if file.suffix.lower() == _BINARY_SUFFIX or what_is_there(file) != "a file":
+        if file.suffix.lower() == _BINARY_SUFFIX or kind_of_path(file) != "a file":
             continue  # what is no text is no xacro, and to open a pipe would wait for ever
         try:
             place, content = file.resolve(), file.read_bytes()
@@ -294,7 +294,7 @@ def mesh_file(name: str, folder: Path) -> Path | None:
         folder: That of the URDF.
     """
     for place in mesh_places(name, folder):
-        if what_is_there(place) == "a file":
+        if kind_of_path(place) == "a file":
             return place
     return None
 

@@ -9,20 +9,20 @@ from .installed import DEFAULT
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)", re.ASCII)
 _EXAMPLE = f"{DEFAULT}==3.3.7"
-_OLDEST = (3, 0, 0)  # whose contacts are arrays, as those of every release since
+_OLDEST = (3, 0, 0)  # the first whose contacts are arrays
 
 
 def is_release(name: str) -> bool:
-    """Return whether the name of a backend means a release of MuJoCo."""
+    """Tell whether the name of a backend is that of a release, as "mujoco==3.3.7"."""
     return "==" in name
 
 
 def version_of(name: str) -> str:
-    """Return the version that a release's name has.
+    """Return the version in the name of a release: "3.3.7" of "mujoco==3.3.7".
 
     Raises:
-        BadInputError: It is no such name.
-        UnknownNameError: It is not one of MuJoCo.
+        BadInputError: It is not the name of a release.
+        UnknownNameError: It is a release of another engine than MuJoCo.
     """
     match = _NAME.fullmatch(name)
     if match is None:
@@ -35,10 +35,11 @@ def version_of(name: str) -> str:
 
 
 def check_age(name: str) -> None:
-    """Raise BadInputError for a release that is too old to be driven.
+    """Raise an error for a release that is too old to be driven.
 
     Raises:
-        BadInputError: As `version_of`, or it is older than 3.0.0.
+        BadInputError: It is not the name of a release, or is older than 3.0.0.
+        UnknownNameError: It is a release of another engine than MuJoCo.
     """
     numbers = re.findall(r"[0-9]+", version_of(name))
     if tuple(map(int, numbers[:3])) < _OLDEST:
@@ -50,5 +51,5 @@ def check_age(name: str) -> None:
 
 
 def engine_of(name: str) -> str:
-    """Return the engine that a backend's name has, be it a release or not."""
+    """Return the engine in the name of a backend, whether that is a release or not."""
     return name.partition("==")[0]

@@ -26,7 +26,7 @@ from statemachine.lab.robots import ExaminedModel, Survey
 from statemachine.lab.robots.examine import examine
 from statemachine.lab.robots.page import page as survey_page
 from statemachine.lab.runs.robot import is_servo
-from statemachine.lab.runs.scenarios import SCENARIOS, fitting
+from statemachine.lab.runs.scenarios import SCENARIOS, suitable_scenarios
 from statemachine.lab.runs.usual_commands import hold_ctrl
 from statemachine.show.blocks import Code, Page, Question, Table, Text
 
@@ -123,7 +123,7 @@ def test_home_is_where_another_robot_starts(model: Any) -> None:
 
 
 def test_a_force_is_never_read_as_a_place(model: Any) -> None:
-    found, page, _ = lesson("hold", model(MIXED.format(rest="")), target=[0.4, 40, 0], seconds=0.5)
+    found, page, _ = lesson("hold", model(MIXED.format(rest="")), ctrl=[0.4, 40, 0], seconds=0.5)
     assert found.joints == ("rail",)
     assert found.goal.tolist() == pytest.approx([0.2])  # of the joint: the gear is 2
     rows = [row for table in blocks(page, Table) if "joint" in table.headers for row in table.rows]
@@ -148,7 +148,7 @@ def test_what_has_no_servo_is_pointed_to_what_runs_it(model: Any) -> None:
 
 def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
     passive, still = model(PASSIVE, "passive.xml"), model(STILL, "still.xml")
-    assert (fitting(passive), fitting(still)) == (("gravity", "fall"), ())
+    assert (suitable_scenarios(passive), suitable_scenarios(still)) == (("gravity", "fall"), ())
     without = r"no actuators.*makes sense.*: gravity, fall"
     wrong: list[tuple[Any, Any, sm.Model, str]] = [
         *((record_scenario, SCENARIOS[name], passive, without) for name in ("hold", "droop")),
@@ -178,7 +178,9 @@ def test_sentences_are_true_of_the_robot(
 
 
 def test_gravity_takes_a_joint_with_a_servo(model: Any) -> None:
-    found, page, code = lesson("gravity", model(MIXED.format(rest="")), seconds=0.5, longer=0.5)
+    found, page, code = lesson(
+        "gravity", model(MIXED.format(rest="")), seconds=0.5, longer=0.5, further=True
+    )
     assert found.joint == "rail"  # the load of the others is larger
     assert "1000 * data.qpos[slot]" in code  # millimetres, as in the table
     assert set(found.longer) == {"contacts", "no contacts"}
@@ -205,7 +207,9 @@ def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch)
         sm.step(model, data)
 
     monkeypatch.setattr(drive, "step", step)
-    found, page, _ = lesson("gravity", model(MIXED.format(rest="")), seconds=0.1, longer=2.0)
+    found, page, _ = lesson(
+        "gravity", model(MIXED.format(rest="")), seconds=0.1, longer=2.0, further=True
+    )
     run = found.longer["contacts"]
     assert run.diverged == pytest.approx(1.4)
     assert run.position.tolist()[:2] == run.path[[0, 500]].tolist()
@@ -215,14 +219,14 @@ def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch)
 def test_a_free_body_is_written_at_its_height(model: Any) -> None:
     found, page, code = lesson("forward", model(BOX), further=True)
     assert_has(found, value=1.05)
-    assert found.further.slide
+    assert found.further.effects.slide
     assert "+ 2  # the height of a free body" in code
     assert page.holds
 
 
 ROBOTS = {"mixed": MIXED.format(rest=HOME), "floating": FLOATING, "box": BOX, "passive": PASSIVE}
 _QUICK: dict[str, dict[str, Any]] = {
-    "gravity": {"seconds": 0.2, "longer": 0.2},
+    "gravity": {"seconds": 0.2, "longer": 0.2, "further": True},
     "hold": {"seconds": 0.2},
     "replay": {"steps": 30},
     "forward": {"further": True, "seconds": 0.1},

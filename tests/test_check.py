@@ -113,6 +113,13 @@ def test_hints_do_not_lead_astray(prepared: Prepare) -> None:
         assert not any(misleading in text for text in texts), texts
 
 
+def test_a_command_that_was_written_for_nothing_is_mentioned(prepared: Prepare) -> None:
+    right = {attempt.name: attempt for attempt in RIGHT}
+    needless = right["forward-command_written_too"]
+    (remark,) = _verdict(needless, prepared(needless.solves, "mujoco")).remarks
+    assert "you wrote ctrl, too, which moved nothing" in remark
+
+
 def test_every_wrong_solution_has_a_message_of_its_own() -> None:
     assert len({attempt.message for attempt in WRONG}) == len(WRONG)
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli.common import EXPERIMENTS
+from statemachine.cli.experiments import EXPERIMENTS
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.lab.compare import (
     Request,
@@ -26,7 +26,7 @@ from statemachine.lab.compare import (
 from statemachine.lab.compare.series import normal_forces, total_forces
 from statemachine.lab.recordings import Trace, record, write
 from statemachine.lab.runs.scenarios import SCENARIOS
-from statemachine.measures import COUNT, QUANTITIES, parse_tolerances, tolerance_of
+from statemachine.measures import ENCODER_COUNT, QUANTITIES, parse_tolerances, tolerance_of
 
 from .support.claims import assert_has, assert_in, refused
 from .support.compared import page_of
@@ -63,7 +63,7 @@ def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
         rms=pytest.approx(np.sqrt((50 * 0.01**2 + 101 * 0.001**2) / 201), rel=1e-9),
         settled=pytest.approx(0.001, rel=1e-9),
         verdict="settles",
-        tolerance=COUNT,
+        tolerance=ENCODER_COUNT,
     )
     assert all(each.verdict == "agrees" for each in found.values())
 
@@ -100,13 +100,17 @@ def test_a_moved_and_turned_fingertip(hold: Trace) -> None:
     )
     assert found["gripperframe, rotation"].rms == pytest.approx(0.1, rel=1e-9)
     # One count of an encoder, over the reach: the arm's is near 0.4 m.
-    assert 0.3 < found["gripperframe, position"].tolerance / COUNT < 0.5
+    assert 0.3 < found["gripperframe, position"].tolerance / ENCODER_COUNT < 0.5
 
 
 def test_a_tip_without_a_lever_arm_has_the_tolerance_of_a_slide() -> None:
     """A site in the origin of a cart is 0 from its foot: rounding must not count."""
     zero, slide = np.zeros(2), QUANTITIES["slide"].tolerance
-    for lever, given, value in ((0.0, {}, slide), (0.4, {}, 0.4 * COUNT), (0.0, {"tip": 1.0}, 1.0)):
+    for lever, given, value in (
+        (0.0, {}, slide),
+        (0.4, {}, 0.4 * ENCODER_COUNT),
+        (0.0, {"tip": 1.0}, 1.0),
+    ):
         tolerance = tolerance_of("tip", zero, zero, lever, 0.01, given)
         assert tolerance.value == pytest.approx(value)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from statemachine.errors import BadInputError
 from statemachine.lab.compare import Agreement, Comparison, Request, Side, compare
 from statemachine.lab.compare.chaos import Band, Chance, ChaosFloor
 from statemachine.lab.compare.instead import Instead
@@ -118,6 +119,35 @@ def test_timesteps_that_meet_seldom_are_compared_where_they_meet_and_it_says_so(
     pybullet.disconnect(client)
     (swing,) = [each for each in comparison.agreements if each.kind == "joint"]
     assert swing.max == pytest.approx(float(np.abs(np.subtract(ours, theirs)).max()), rel=1e-6)
+
+
+def test_actuators_that_an_experiment_switches_off_are_missed_by_nobody(tmp_path: Path) -> None:
+    bare = '<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/>'
+    bare += '<geom size="0.1" pos="0.2 0 0"/></body></worldbody>{}</mujoco>'
+    drive = '<actuator><position joint="j" kp="9"/></actuator>'
+    files = [
+        str(written(tmp_path / name, bare.format(text)))
+        for name, text in (("a.xml", ""), ("b.xml", drive))
+    ]
+    sides = Side(files[0]), Side(files[1], options={"gravity": (0, 0, -9.0)})
+    falls = CompareRequest(Request(("gravity",), sides=sides, seconds=0.1), uncertainty=None)
+    assert answer(falls).finding.missing == ()
+    with pytest.raises(BadInputError, match=r"--actuators right gives the left those of b\.xml"):
+        answer(CompareRequest(Request(("hold",), sides=sides, seconds=0.1), uncertainty=None))
+
+
+def test_where_nothing_but_the_timestep_differs_the_next_question_is_whether_the_gap_vanishes(
+    tmp_path: Path,
+) -> None:
+    file = str(written(tmp_path / "pendulum.urdf", PENDULUM))
+    coarse, fine = (Side(file, options={"timestep": step}) for step in (0.01, 0.001))
+    damped = replace(fine, options={"timestep": 0.001, "damping": 2})
+    purposes = []
+    for right in (fine, damped):
+        run = Request(("gravity",), sides=(coarse, right), seconds=0.3)
+        result = answer(CompareRequest(run, uncertainty=None))
+        purposes.append(next_command(run, result.finding, None).purpose)
+    assert purposes == ["converge", "why"]
 
 
 def test_timesteps_of_which_one_is_a_multiple_of_the_other_leave_nothing_out(

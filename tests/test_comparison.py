@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.lab.recordings import record, record_scenario, shipped
+from statemachine.lab.recordings import read_shipped_trace, record, record_scenario
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.measures import (
     ContactNames,
     Gap,
+    contacts_in_words,
     joint_gap,
     largest,
     nearest,
-    same_pairs,
     text,
-    together,
+    with_left_pair_names,
 )
 
 from .support.claims import overlapping
@@ -31,7 +31,7 @@ from .support.small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 def test_a_recorded_trace_has_the_same_names(mujoco_scene: sm.Model) -> None:
     trace = record_scenario(SCENARIOS["hold"], mujoco_scene, seconds=0.5)
-    assert set(shipped("hold", "pybullet").touches()) == set(trace.touches())
+    assert set(read_shipped_trace("hold", "pybullet").touches()) == set(trace.touches())
 
 
 @overlapping
@@ -82,9 +82,12 @@ def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
         (text.sentence("it is so"), "It is so."),
         (text.command(["see", "a b"], ("--n", 1, 1), ("--m", 2, 1), ("--x", True, False)),
          "see 'a b' --m 2 --x"),
-        (together(["a on b (c)", "d on b", "a on b (e)"]), "a on b (c, e), d on b"),
-        (together([]), ""),
-        (same_pairs({"a on b": 1}, {"b on a": 2, "c on d": 3}), {"a on b": 2, "c on d": 3}),
+        (contacts_in_words(["a on b (c)", "d on b", "a on b (e)"]), "a on b (c, e), d on b"),
+        (contacts_in_words([]), ""),
+        (
+            with_left_pair_names({"a on b": 1}, {"b on a": 2, "c on d": 3}),
+            {"a on b": 2, "c on d": 3},
+        ),
         (largest(np.array([1.0, 3.0, 2.0])), (3.0, 1)),
         (largest(np.array([1.0, np.nan, np.inf]))[1], 1),
         (str(Gap.of(np.array([0.001, 0.002]), "m", ["a", "b"])), "2 mm at b"),

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from statemachine.course.lessons.speed import SpeedResult
 
 import statemachine as sm
-from statemachine.course.lessons import session
+from statemachine.course.lessons import _loop_cost
 from statemachine.course.lessons._falling import Forces, milestones
 from statemachine.errors import BadInputError, ModelError
-from statemachine.lab.runs import in_turns
+from statemachine.lab.runs import drive, interleaved_timing
 from statemachine.lab.runs.provenance import provenance
 from statemachine.lab.validate import fingertip
 from statemachine.lab.validate.certificate import page
@@ -72,7 +71,7 @@ def test_gravity_is_read_at_the_moment_of_the_end(mujoco_scene: sm.Model) -> Non
 
 def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
     found = lesson_result("hold", sm.load("so101/scene"), seconds=0.2)
-    assert np.array_equal(found.error, np.abs(found.qpos - found.goal).max(axis=1))
+    assert np.array_equal(found.error, np.abs(found.qpos - found.target).max(axis=1))
     assert np.abs(found.speed).max() > 1.0
     assert np.abs(found.speed - (found.qpos[-1] - found.qpos[-2]) / 0.005).max() < 1e-9
 
@@ -101,28 +100,26 @@ def test_replay_compares_what_it_says(mujoco_box: sm.Model) -> None:
     assert lesson_result("replay", mujoco_box, steps=5).close is True
 
 
-def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_loop_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     counted: list[int] = []
-    monkeypatch.setattr(session, "step", lambda _model, _data, n=1: counted.append(n))
-    found = lesson_result("speed", sm.load("so101"), steps=47)
-    code, rounds = counted[:48], counted[48:]
-    assert code == [47] + [1] * 47
-    assert sum(rounds) == 3 * 47  # in bulk twice
-    assert rounds.count(1) >= 47
+    monkeypatch.setattr(_loop_cost, "step", lambda _model, _data, n=1: counted.append(n))
+    found = _loop_cost.measured(sm.load("so101"), 47, drive.no_progress)
+    assert sum(counted) == 3 * 47  # in bulk twice
+    assert counted.count(1) >= 47
     assert found.simulated == pytest.approx(47 * 0.005)
 
 
-def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> SpeedResult:
-    """The lesson by a clock that only `cost` moves: of a call of n steps, after so many."""
-    now, calls = [0.0], [-1 - 400]  # those of the code come before the rounds
+def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> _loop_cost.LoopCost:
+    """What a loop costs by a clock that only `cost` moves: of a call of n steps, after so many."""
+    now, calls = [0.0], [0]
 
     def step(_model: Any, _data: Any, n: int = 1) -> None:
         now[0] += cost(n, calls[0])
         calls[0] += 1
 
-    monkeypatch.setattr(session, "step", step)
-    monkeypatch.setattr(in_turns.time, "perf_counter", lambda: now[0])
-    return lesson_result("speed", sm.load("so101"), steps=400)
+    monkeypatch.setattr(_loop_cost, "step", step)
+    monkeypatch.setattr(interleaved_timing.time, "perf_counter", lambda: now[0])
+    return _loop_cost.measured(sm.load("so101"), 400, drive.no_progress)
 
 
 def test_what_is_smaller_than_the_noise_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,16 +136,18 @@ def test_what_is_smaller_than_the_noise_is_not_told(monkeypatch: pytest.MonkeyPa
 
 
 def test_few_rounds_tell_nothing() -> None:
-    null = in_turns.Ratio.of("null", [1.0] * 20, [1.0] * 20)
+    null = interleaved_timing.Ratio.of("null", [1.0] * 20, [1.0] * 20)
     for rounds in (1, 4, 5):
-        ratio = in_turns.Ratio.of("dear", [3.0] * rounds, [1.0] * rounds)
+        ratio = interleaved_timing.Ratio.of("dear", [3.0] * rounds, [1.0] * rounds)
         assert_has(ratio, median=3.0, rounds=rounds)
         assert ratio.differs_from(null) == (rounds >= 5)
 
 
 def test_every_way_has_its_turn_in_every_round() -> None:
     order: list[str] = []
-    times = in_turns.in_turns({name: partial(order.append, name) for name in "abc"}, 10)
+    times = interleaved_timing.time_interleaved(
+        {name: partial(order.append, name) for name in "abc"}, 10
+    )
     assert {name: len(each) for name, each in times.items()} == dict.fromkeys("abc", 10)
     turns = [tuple(order[k : k + 3]) for k in range(0, 30, 3)]
     assert all(sorted(turn) == ["a", "b", "c"] for turn in turns)

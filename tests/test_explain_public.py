@@ -13,7 +13,7 @@ from statemachine.engines.mujoco.differences import edited
 from statemachine.errors import StateMachineError
 from statemachine.interface import Model
 from statemachine.lab.compare.matching import match_models
-from statemachine.lab.runs.scenarios import SCENARIOS, fitting
+from statemachine.lab.runs.scenarios import SCENARIOS, suitable_scenarios
 from statemachine.lab.why import WhyRequest, explain
 from statemachine.lab.why.causes import differences_of
 
@@ -48,7 +48,7 @@ def test_public_robots(path):
     model = _loaded(path)
     again = sm.load(path)
     assert differences_of(model, again, match_models(model, again)) == ()
-    raw, fits = model.compiled, fitting(model)
+    raw, fits = model.compiled, suitable_scenarios(model)
     if not fits or not _moving(raw):
         return
     random = np.random.default_rng([1, zlib.crc32(path.name.encode())])

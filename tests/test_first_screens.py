@@ -14,6 +14,7 @@ import pytest
 
 from statemachine.cli.compare.options import add
 from statemachine.cli.compare.requests import request_of
+from statemachine.engines.description.file_changes import UnwrittenChange
 from statemachine.engines.records import KnownChange
 from statemachine.lab.compare.sides import Request, Side
 from statemachine.lab.model_differences import ModelsComparison, compare
@@ -108,6 +109,19 @@ def test_its_verdict_comes_first_and_the_next_command_last(result: ShownResult) 
     assert page.headline is not None
     assert shown(page).startswith("✗ ")
     assert isinstance(page.blocks[-1], Code)
+
+
+def test_two_files_of_which_one_is_written_take_one_screen(
+    chains: tuple[str, str],
+) -> None:
+    request = models.ModelsRequest(chains, write="fixed.xml")
+    result = models.answer(request)
+    assert result.rewritten is not None
+    assert len(result.rewritten.written) == 36
+    assert lines_of(result.page()) <= LINES
+    refusals = tuple(UnwrittenChange(f"cause {k}", "of a reason " * 5) for k in range(20))
+    refused = replace(result.rewritten, not_written=refusals)
+    assert lines_of(replace(result, rewritten=refused).page()) <= LINES
 
 
 def test_details_have_more(result: ShownResult) -> None:

@@ -20,7 +20,7 @@ from statemachine.errors import (
     StaleReadError,
 )
 from statemachine.freshness.age import Scratch
-from statemachine.freshness.gaps import gaps, worth_telling
+from statemachine.freshness.gaps import gaps, significant_gaps
 from statemachine.freshness.rows import table
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.measures import Gap
@@ -315,8 +315,8 @@ def test_gaps_in_words(gap: Gap, text: str) -> None:
 
 def test_rounding_is_left_out_beside_more() -> None:
     small, large = Gap(1e-15, "N", "box"), Gap(0.5, "N·m", "j")
-    assert list(worth_telling([small, large])) == [large]
-    assert list(worth_telling([small])) == [small]
+    assert list(significant_gaps([small, large])) == [large]
+    assert list(significant_gaps([small])) == [small]
 
 
 def test_a_gap_has_a_line_of_its_own() -> None:

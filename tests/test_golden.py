@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.lab.runs.robot import TARGET
+from statemachine.lab.runs.robot import ARM_TARGET
 
 from .support.golden import angles, columns
 from .support.motions import opened, path
@@ -51,7 +51,7 @@ def test_servos_off(mujoco_scene: sm.Model, golden: Golden) -> None:
 def test_hold_until_and_after_its_first_contact(mujoco_scene: sm.Model, golden: Golden) -> None:
     table = golden("golden_hold")
     expected = angles(table)
-    run = path(mujoco_scene, 400, ctrl=TARGET)
+    run = path(mujoco_scene, 400, ctrl=ARM_TARGET)
     first = int(np.flatnonzero(table["ncon"])[0])
     assert first == 56
     gaps = np.abs(run - expected).max(axis=1)

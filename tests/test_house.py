@@ -286,3 +286,98 @@ def test_every_room_of_a_floor_is_on_the_map(floor: str) -> None:
         if f"`{floor}/{room}/`" in line or (f"`{floor}/`" in line and f"`{room}/`" in line)
     }
     assert rooms - named == set()
+
+
+# A sentence of a page stands in its template.
+
+# Calls whose texts are errors, or the help of an option or a command; and patterns.
+_ERRORS = re.compile(r"(?:Error|complain|refuse\w*|_fault|error|exit|SystemExit)$")
+_HELP = re.compile(r"(?:^_?add_\w+|\.add_\w+|_action|_Parser|ArgumentParser|^re\.\w+)$")
+_NAMES_OF_HELP = ("description", "epilog", "says", "message", "_MORE", "_RUNS", "_EACH")
+# Files whose longer texts are no sentences of a page, or are said where there is no page.
+_NO_PAGES = {
+    "cli/__init__.py": "hints that end an error",
+    "cli/commands.py": "the help of each command",
+    "cli/common.py": "the help of options",
+    "cli/compare/requests.py": "an error that names the option",
+    "cli/experiments.py": "the help of what can be run",
+    "cli/help_all.py": "the help of an option",
+    "cli/lesson.py": "where the reader stopped, in one line; a command that is typed next",
+    "cli/resuming.py": "the end of a command by Ctrl-C",
+    "cli/trace.py": "what was written, in one line",
+    "cli/view.py": "the address of a server that runs",
+    "show/html/chart.py": "styles",
+    "show/html/diagram.py": "styles and names of fonts",
+    "show/html/notebook.py": "the name of a file",
+    "show/html/page.py": "names of files, and a policy for the browser",
+    "show/lesson_template.py": "the title of a table that many lessons end with",
+    "show/markdown.py": "what replaces a pattern",
+    "show/templates.py": "an assertion",
+    "show/terminal.py": "what is said to somebody who predicts, while they sit there",
+}
+
+
+def sentences(tree: ast.AST) -> list[str]:
+    """Return the texts of four words or more in a module, but for errors, help and docstrings."""
+    found = list[str]()
+    nodes: list[ast.AST] = [tree]
+    while nodes:
+        node = nodes.pop()
+        if not _may_be_said(node):
+            continue
+        text = _literal(node)
+        if len(re.findall(r"[A-Za-z][\w'-]*", text)) >= 4:
+            found.append(text)
+        elif not isinstance(node, ast.JoinedStr):
+            nodes += ast.iter_child_nodes(node)
+    return found
+
+
+def _may_be_said(node: ast.AST) -> bool:
+    """Tell whether a text of a node may be one of a page."""
+    if isinstance(node, ast.Raise):
+        return False
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return False
+    if isinstance(node, ast.Call):
+        name = ast.unparse(node.func)
+        return not (_ERRORS.search(name) or _HELP.search(name))
+    if isinstance(node, ast.Assign):
+        names = {ast.unparse(target).rpartition(".")[2] for target in node.targets}
+        return not names & set(_NAMES_OF_HELP)
+    return True
+
+
+def _literal(node: ast.AST) -> str:
+    """Return the words of a text, without what is filled in."""
+    if isinstance(node, ast.JoinedStr):
+        return " ".join(str(part.value) for part in node.values if isinstance(part, ast.Constant))
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    return ""
+
+
+def test_sentences_of_pages_stand_in_templates() -> None:
+    """In the rooms that draw pages and answer commands; each exception is still needed."""
+    saying = {
+        path
+        for path, source in _sources().items()
+        if path.startswith(("show/", "cli/")) and sentences(ast.parse(source))
+    }
+    assert saying == set(_NO_PAGES)
+
+
+@pytest.mark.parametrize(
+    ("code", "count"),
+    [
+        ("Text('The runs agree to the bit.')", 1),
+        ("Text(f'{name} is {x} away from {y}, at most')", 1),
+        ("Text(f'{a} of {b} {c} {d}')", 0),
+        ("raise BadInputError('expected one of these two files')", 0),
+        ("parser.add_argument('--x', help='how many times it is run')", 0),
+        ('def f():\n    """Return the number of all rows."""', 0),
+        ("headers = ('at the end', 'largest')", 0),
+    ],
+)
+def test_a_sentence_in_python_is_seen(code: str, count: int) -> None:
+    assert len(sentences(ast.parse(code))) == count

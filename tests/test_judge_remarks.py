@@ -38,8 +38,9 @@ def _calls() -> Iterator[tuple[Remark, set[str]]]:
     """Yield the remarks that are said where they are named, with the slots that are filled."""
     for remark, node, tree in _uses():
         for call in ast.walk(tree):
-            function = call.func if isinstance(call, ast.Call) else None
-            if isinstance(function, ast.Attribute) and function.value is node:
+            if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Attribute):
+                continue
+            if call.func.value is node:
                 yield remark, {keyword.arg for keyword in call.keywords if keyword.arg}
 
 

@@ -105,7 +105,7 @@ WORLD = "<mujoco><worldbody>{}</worldbody></mujoco>"
         (WORLD.format("<body><joint class='c'/></body>"), "no default class"),
         (
             WORLD.format("<site pos='1 2'/><body euler='1 2 x'/><frame pos='1 2'/>"),
-            "numbers wanted: 3",
+            "it must have 3 finite numbers",
         ),
         ("<mujoco><worldbody", "not an XML file"),
         ("<sdf/>", "neither MJCF nor URDF"),

@@ -382,7 +382,8 @@ def test_print_shows_what_the_command_prints(light: str, heavy: str) -> None:
     words = ("compare", "hold", light, heavy, "--seconds", "0.1", "--no-chaos")
     printed = of_python("-m", "statemachine", *words, code=1).stdout
     result = lab.compare(light, heavy, what="hold", seconds=0.1, chaos=False)
-    assert str(result) == printed.strip("\n")
+    option, call = "--details", "`result.text(details=True)`"
+    assert str(result).replace(call, option).split() == printed.split()
     assert not wide_lines(str(result).splitlines())
     assert "\x1b" not in str(result)
 
@@ -438,6 +439,19 @@ def test_a_notebook_gets_html_whose_styles_stay_inside(any_result: Any) -> None:
     assert "<table>" in html
     assert "<script" not in html
     assert "<details>" in html
+
+
+def test_no_page_of_python_says_an_option_of_the_command(any_result: Any) -> None:
+    commands = [line for line in str(any_result).splitlines() if line.startswith("    ")]
+    rest = [line for line in str(any_result).splitlines() if line not in commands]
+    assert "--details" not in "\n".join(rest)
+    assert "--details" not in re.sub(r"<pre.*?</pre>", "", any_result._repr_html_(), flags=re.S)
+
+
+def test_where_a_page_has_more_it_says_what_to_call(light: str, heavy: str) -> None:
+    result = lab.models(light, heavy)
+    assert "result.text(details=True)" in str(result)
+    assert result.text(details=True) != str(result)
 
 
 def test_a_name_of_a_file_is_no_markup(tmp_path: Path, light: str) -> None:

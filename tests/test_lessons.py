@@ -40,7 +40,7 @@ from statemachine.course.lessons.session import CodeRun, LessonRun, load_line, p
 from statemachine.course.quiz import RecordedReader
 from statemachine.errors import BadInputError, StateMachineError, UnknownNameError
 from statemachine.lab.recordings import record_scenario
-from statemachine.lab.runs.in_turns import Ratio
+from statemachine.lab.runs.interleaved_timing import Ratio
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.show import lesson_template as template
 from statemachine.show import progress as bar
@@ -112,18 +112,16 @@ def test_what_many_worlds_cost(backend: str, monkeypatch: pytest.MonkeyPatch) ->
     (curves,) = blocks(page, Traces)
     assert list(curves.curves) == [backend]
     if not shared:
-        many = with_figures(many, limit="the reason")
+        many = with_figures(many, data_bytes=30e6, free_bytes=450e6)
         page = _repage("objects", backend, with_figures(result, further=many))
-        assert any("the reason" in text.text for text in blocks(page, Text))
+        assert any("30 MB, and 450 MB are free" in text.text for text in blocks(page, Text))
 
 
 def test_worlds_that_are_apart_fit_into_the_memory_that_is_free(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(_many_worlds, "free_memory", lambda: 5 * 3 * 30e6)
-    most, why = _many_worlds._limit(4096, 30e6)
-    assert most == 5
-    assert "about 30 MB, and 450 MB are free" in why
+    assert _many_worlds._limit(4096, 30e6) == (5, 5 * 3 * 30e6)
 
 
 # --- templates
@@ -271,7 +269,7 @@ def test_a_lesson_runs_what_is_compared(
     lesson: str, of: Callable[[Any], np.ndarray], name: str, scene: sm.Model
 ) -> None:
     seconds = 0.5 if lesson == "gravity" else 2.0
-    options = {"longer": seconds} if lesson == "gravity" else {}
+    options = {"longer": seconds, "further": True} if lesson == "gravity" else {}
     found = of(lesson_result(lesson, scene, seconds=seconds, **options))
     trace = record_scenario(SCENARIOS[name], scene, seconds=seconds)
     assert found.tobytes() == trace.qpos[-1].tobytes()
@@ -280,6 +278,17 @@ def test_a_lesson_runs_what_is_compared(
 def test_the_line_that_loads_a_model() -> None:
     assert load_line("a", "b", "c d") == 'sm.load("a", backend="b", menagerie=\'c d\')'
     assert eval(load_line('x"y\\z', "b"), {"sm": type("S", (), {"load": lambda m, **_: m})})
+
+
+def _without_lag(further: Any) -> Any:
+    """As if each step left what belongs to the state after it."""
+    lag = further.lag
+    return with_figures(further, lag=with_figures(lag, of_before=dict.fromkeys(lag.of_before, 0)))
+
+
+def _anew(further: Any) -> Any:
+    """As if a call made the inputs anew."""
+    return with_figures(further, effects=with_figures(further.effects, same_arrays=False))
 
 
 Change = Callable[[Any], Any]
@@ -291,19 +300,20 @@ _BELIED: dict[str, tuple[str, Change]] = {
     "a fresh Data is not empty": ("nowhere", lambda r: with_figures(r, empty=False)),
     "forward changes what is stored": ("nowhere", lambda r: with_figures(r, stored=False)),
     "forward computes something else": ("nowhere", lambda r: with_figures(r, repeats=False)),
-    "qpos is a copy": ("forward", lambda r: with_figures(r, view=r.copy)),
-    "the engine has another array": ("forward", lambda r: with_figures(r, in_engine=0.0)),
-    "an array is made anew": (
+    "qpos is a copy": (
         "forward",
-        lambda r: with_figures(r, further=with_figures(r.further, same_arrays=False)),
+        lambda r: with_figures(r, written=with_figures(r.written, view=r.written.copy)),
     ),
+    "the engine has another array": (
+        "forward",
+        lambda r: with_figures(r, written=with_figures(r.written, in_engine=0.0)),
+    ),
+    "an array is made anew": ("forward", lambda r: with_figures(r, further=_anew(r.further))),
     "a program prints something else": ("summary", lambda r: with_figures(r, changed=("replay",))),
     "readings 3 and 4 are equal": ("forward", lambda r: with_figures(r, equal=((2, 3),))),
     "a step leaves what is new": (
         "forward",
-        lambda r: with_figures(
-            r, lag=with_figures(r.lag, of_before=dict.fromkeys(r.lag.of_before, 0))
-        ),
+        lambda r: with_figures(r, further=_without_lag(r.further)),
     ),
     "a reset forgets the time": (
         "reset",
@@ -456,7 +466,7 @@ def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> Non
 @pytest.mark.slow
 def test_what_catches_the_falling_arm() -> None:
     """Against the course's text: the floor does, and the arm does not settle on it."""
-    page, taken = _take("gravity", "mujoco", longer=100.0)
+    page, taken = _take("gravity", "mujoco", longer=100.0, further=True)
     touching, free = (taken.result.longer[name] for name in ("contacts", "no contacts"))
     limit = sm.load("so101/scene").jnt_range[1, 1]
     assert free.position[-1] == pytest.approx(limit, abs=1.7e-3)
@@ -470,11 +480,12 @@ def test_what_catches_the_falling_arm() -> None:
 @pytest.mark.parametrize("further", [False, True])
 def test_forward_computes_what_it_shows(further: bool, backend: str) -> None:
     page, taken = _take("forward", backend, further=further, seconds=0.5)
-    found = taken.result
-    assert bool(found.changes) == bool(found.lag) == bool(found.further) == further
-    assert found.lag is None or len(found.lag.time) == 100
-    own = {"write", "step"} if further and backend != "mujoco" else set()
-    assert {answer.question for answer in found.itself} == own
+    found = taken.result.further
+    assert (found is not None) == further
+    if found is not None:
+        assert len(found.lag.time) == 100
+        own = {"write", "step"} if backend != "mujoco" else set()
+        assert {answer.question for answer in found.itself} == own
     assert bool(blocks(page, Heading)) == further
     said = any("lesson forward --further" in text.text for text in blocks(page, Text))
     assert said is not further
@@ -484,12 +495,12 @@ def test_forward_computes_what_it_shows(further: bool, backend: str) -> None:
 def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
     """Against the course's figure: of the state before, 9.95 mm behind at worst."""
     page, taken = _take("forward", backend, seconds=2.0)
-    lag = taken.result.lag
+    lag = taken.result.further.lag
     assert lag.distance.max() == pytest.approx(9.95e-3, abs=0.02e-3)
     assert lag.of_before["site_xpos"] == lag.of_before["contacts"] == 400
     assert lag.of_after["site_xpos"] < 400
     assert any("9.95 mm behind" in verdict.text for verdict in blocks(page, Verdict))
-    changes = {change.name: change for change in taken.result.changes}
+    changes = {change.name: change for change in taken.result.further.changes}
     assert changes["qpos"].write
     assert not any(change.write for change in changes.values() if not change.stored)
     assert not any(change.forward for change in changes.values() if change.stored)
@@ -546,7 +557,7 @@ def test_a_reset_of_a_model_that_lacks_something(cli: Cli, tmp_path: Path, body:
 
 @pytest.mark.slow
 def test_our_keyframe_holds_the_box(backend: str) -> None:
-    held, pickup = _take("reset", backend)[1].result.scenes
+    held, pickup = _take("reset", backend, further=True)[1].result.scenes
     assert_has(held, held=True, on_world=0, robot_steps=held.nstep)
     assert abs(held.rise) < 1e-3
     assert_has(pickup, held=False, on_robot=0)
@@ -657,8 +668,12 @@ _LATER = r"Go on later with: [^\n]*statemachine lesson --from "
             *(f"{_MORE}.*press Enter alone.*{_MORE}", ""),
         ),
         (
-            *("hold", [(_ASKED, "b\n"), (_ASKED, "a\n")], {}),
+            *("hold --further", [(_ASKED, "a\n")], {}),
             *(r"You predicted a; it is c((?!You predicted).)*A result depends", "You had"),
+        ),
+        (  # two questions, one after the other
+            *("time --steps 200", [(_ASKED, "a\n"), (_ASKED, "b\n")], {}),
+            *(r"times real time.*You predicted it: a.*You predicted( it: b|\s+b)", "You had"),
         ),
         (  # three are predicted, and not more
             *("questions", [(_ASKED, "a\n")] * 6, {}),
@@ -668,7 +683,7 @@ _LATER = r"Go on later with: [^\n]*statemachine lesson --from "
             ),
         ),
         (  # a long question, which is wrapped
-            *("hold", [(_ASKED, "\n")] * 2, {"columns": 50}),
+            *("hold", [(_ASKED, "\n")], {"columns": 50}),
             *(
                 rf"Before you read on((?!{_ASKED})[^\n]*\n){{4}}",
                 rf"Before you read on((?!{_ASKED}).)*[^\r\n]{{51}}",
@@ -871,7 +886,7 @@ def test_broken_code_differs_as_its_page_says(way: str, steps: int) -> None:
 
 def test_two_worst_joints_are_named() -> None:
     page, taken = _take("hold", "mujoco")
-    target, free = taken.result.goal, taken.result.without_contacts
+    target, free = taken.result.target, taken.result.without_contacts
     (said,) = (text.text for text in blocks(page, Text) if "without contacts" in text.text)
     for gaps in (taken.result.qpos[-1] - target, free - target):
         joint = int(np.argmax(np.abs(gaps)))
@@ -883,7 +898,7 @@ def test_pictures_of_a_lesson(tmp_path: Path, here: Cli) -> None:
     words = "lesson", "hold", "--no-questions", "--plot"
     files = [tmp_path / "one.svg", tmp_path / "two.svg"]
     assert [here(*words, file).returncode for file in files] == [0, 0]
-    assert "distance to the goal" in files[0].read_text(encoding="utf-8")
+    assert "distance to the target" in files[0].read_text(encoding="utf-8")
     assert files[0].read_bytes() == files[1].read_bytes()
 
 

@@ -14,6 +14,7 @@ from statemachine.course.grading import course_code
 from statemachine.course.grading.alike import ALIKE, SHORT, compare_submissions
 from statemachine.course.grading.judges import JUDGES
 from statemachine.course.grading.likeness import OwnCode, code_of_trees, likeness, own_code
+from statemachine.course.grading.roster import enrolled
 from statemachine.course.grading.submissions import submissions
 
 from .support.class_of_students import COPIES, SIZE, renamed, write_class
@@ -180,6 +181,14 @@ def test_what_is_short_is_told(tmp_path: Path) -> None:
     written_all(tmp_path, {"a.py": ONE, "b.py": SAME["names of variables"](ONE)})
     (group,) = compare_submissions(submissions([tmp_path])).groups
     assert group.is_short
+
+
+def test_students_are_named_by_the_roster(tmp_path: Path) -> None:
+    written_all(tmp_path / "class", {"x_41001.py": CEM, "x_41002.py": renamed(CEM, 1)})
+    roster = written(tmp_path / "roster.csv", "name,number\nAnn Lee,41001\nBo Wu,41002\n")
+    compared = compare_submissions(enrolled(submissions([tmp_path / "class"]), roster))
+    assert compared.groups[0].students == ("Ann Lee", "Bo Wu")
+    assert compared.nearest["x_41001.py"].student == "Bo Wu"
 
 
 def test_a_chain_of_copies_is_one_group(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ COMMANDS = [
     ("lesson hold", 0, NAME),
     ("lesson hold --json", 0, f'"{NAME}": {{'),
     ("lesson forward --calls", 0, "not asked which of its own functions it ran"),
-    _slow("lesson gravity --seconds 0.5 --longer 0", 0, NAME),
+    _slow("lesson gravity --seconds 0.5", 0, NAME),
     ("lesson reset", 0, NAME),
     ("lesson replay --steps 100", 0, NAME),
     ("lesson time --steps 200", 0, NAME),

@@ -507,7 +507,7 @@ def test_what_is_only_drawn_is_compared_for_the_record(
         (
             '<robot name="r"><link name="a"><collision><origin xyz="1 2"/><geometry>'
             '<sphere radius="1"/></geometry></collision></link></robot>',
-            "numbers wanted: 3",
+            "it must have 3 finite numbers",
         ),
         (
             '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'

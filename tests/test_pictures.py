@@ -42,7 +42,7 @@ from statemachine.lab.questions.plot import (
     write_plot,
 )
 from statemachine.lab.questions.stage.quantity_chart import charts_of
-from statemachine.lab.recordings import RunMetadata, Trace, record, shipped, write
+from statemachine.lab.recordings import RunMetadata, Trace, read_shipped_trace, record, write
 from statemachine.lab.recordings.header import INPUTS
 from statemachine.show.drawing.scene import Camera, Shot, compose, framed, smaller
 
@@ -395,7 +395,7 @@ def _drawing(place: Path) -> list[int]:
 @pytest.fixture(scope="module")
 def compared() -> tuple[Trace, Trace, Any]:
     """Hold on MuJoCo, and as PyBullet was recorded."""
-    two = shipped("hold", "pybullet")
+    two = read_shipped_trace("hold", "pybullet")
     one = record(
         sm.load("so101/scene"),
         lambda _m, _d: np.array(FIRST),

@@ -14,7 +14,7 @@ import pytest
 import statemachine as sm
 import statemachine.worlds as many
 from statemachine.errors import TraceError, UnsupportedError
-from statemachine.lab.recordings import files, play, replayed
+from statemachine.lab.recordings import files, play, rerun_of_trace
 from statemachine.lab.recordings.recorder import record
 from statemachine.worlds import make_worlds
 
@@ -154,7 +154,7 @@ def test_a_trace_has_where_mocap_bodies_were(tmp_path: Path) -> None:
     read = files.read(files.write(trace, tmp_path / "run.npz"))
     assert np.array_equal(read["mocap_pos"][:, 0, 2], 1 + 0.1 * read.time)
     for model in (ours, theirs):
-        again = replayed(read, model).record()
+        again = rerun_of_trace(read, model).record()
         assert np.abs(again.qpos - trace.qpos).max() < 1e-9
         assert np.array_equal(again["mocap_pos"], read["mocap_pos"])
     assert files.column_labels(read.header, "mocap_quat")[0] == "mocap_quat.0.qw"

@@ -15,7 +15,7 @@ from statemachine.lab.compare.one_step import OneStep, one_step
 from statemachine.lab.compare.sides import Request, Side
 from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult, answer
 from statemachine.lab.recordings import Rerun
-from statemachine.measures import RobotScale, places_of, tolerance_of
+from statemachine.measures import RobotScale, robot_points, tolerance_of
 
 from .support.files import written
 from .support.small_models import model_of
@@ -59,7 +59,7 @@ DISC = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody>
 def scale_of(model: sm.Model) -> RobotScale:
     with sm.make_data(model) as data:
         sm.forward(model, data)
-        return RobotScale.of(model, places_of(model, data.xpos, data.site_xpos))
+        return RobotScale.of(model, robot_points(model, data.xpos, data.site_xpos))
 
 
 def raw(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -38,7 +38,7 @@ from statemachine.lab.questions.stage.page import report
 from statemachine.lab.questions.stage.poses import rows_at
 from statemachine.lab.questions.stage.quantity_chart import CHARTS_SHOWN, charts_of
 from statemachine.lab.questions.stage.scene import Look, moments_of
-from statemachine.lab.recordings import Trace, record_scenario, shipped
+from statemachine.lab.recordings import Trace, read_shipped_trace, record_scenario
 from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.lab.why import Explanation, Share
 from statemachine.lab.why.answer_page import answer, parts
@@ -90,7 +90,7 @@ def recorded(name: str, kind: Any = "model") -> Made:
     """MuJoCo against the recorded run of PyBullet: no second engine is needed."""
     scenario = SCENARIOS[name]
     one = record_scenario(scenario, sm.load(scenario.model, defaults=kind), defaults=kind)
-    return of(one, shipped(name, "pybullet", kind))
+    return of(one, read_shipped_trace(name, "pybullet", kind))
 
 
 @pytest.fixture(scope="module")

@@ -48,7 +48,7 @@ TYPED = [
     (
         "lesson hold --seconds 0.3",
         LessonRequest(
-            "hold", "so101/scene", options={"seconds": 0.3, "target": None, "further": False}
+            "hold", "so101/scene", options={"seconds": 0.3, "ctrl": None, "further": False}
         ),
     ),
     (

@@ -11,13 +11,15 @@ from typing import Literal
 
 import jinja2
 import pytest
+from rich.console import Console
 
 from statemachine.course.notebook import markdown
-from statemachine.show import terminal
-from statemachine.show.blocks import Items, Markdown, Page, Section, Table, Text, Verdict
+from statemachine.show import terminal, text_blocks
+from statemachine.show.blocks import Items, Markdown, Page, Question, Section, Table, Text, Verdict
 from statemachine.show.check_templates import faults_of
 from statemachine.show.html.blocks import drawn
 from statemachine.show.markdown import code, escape, inline_html, plain_text, spans
+from statemachine.show.page_text import text_of
 from statemachine.show.templates import FILTERS, PageContent, environment, render
 from tools import check_templates
 
@@ -224,3 +226,39 @@ def test_every_template_names_fields_alone(capsys: pytest.CaptureFixture[str]) -
 def test_a_filter_is_documented(name: str) -> None:
     filter_ = FILTERS[name]
     assert isinstance(filter_, type) or filter_.__doc__
+
+
+# A table in a narrow window.
+
+HOLDERS = Table(
+    ("who", "mujoco\nservos on", "mujoco\nservos off", "pybullet\nservos on"),
+    [("gravity (−bias)", "+0.5694", "+0.6168", "+0.5694"), ("springs, damping", "0", "-1", "2")],
+)
+
+
+def lines_at(width: int, table: Table) -> list[str]:
+    console = Console(width=width, highlight=False, color_system=None)
+    with console.capture() as captured:
+        for part in text_blocks.drawn(table, plain=False, piped=True, width=width):
+            console.print(part)
+    return captured.get().splitlines()
+
+
+@pytest.mark.parametrize("width", [80, 60, 40, 30])
+def test_no_name_and_no_figure_breaks_in_a_narrow_window(width: int) -> None:
+    lines = lines_at(width, HOLDERS)
+    assert max(map(len, lines)) <= width
+    words = " ".join(lines).split()
+    cells = [cell for row in (HOLDERS.headers, *HOLDERS.rows) for cell in row]
+    assert set(" ".join(cells).split()) <= set(words)
+
+
+def test_a_table_that_fits_has_a_line_for_each_row() -> None:
+    names = [line for line in lines_at(80, HOLDERS) if line.startswith(("gravity", "springs"))]
+    assert [line.split("  ")[0] for line in names] == ["gravity (−bias)", "springs, damping"]
+
+
+def test_a_piped_quiz_has_its_choices_and_the_answer() -> None:
+    question = Question("Which of `a` and b?", ("the `first`", "the second"), 1, "So it is.", True)
+    text = text_of(Page("t", "o", [question]))
+    assert "Which of `a` and b?\n\na) the `first`\nb) the second\n\nAnswer: b) the second." in text

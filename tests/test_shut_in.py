@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 import sys
 import textwrap
 import tomllib
@@ -328,6 +329,43 @@ def test_who_is_watched_is_refused(names: list[str], tmp_path: Path, secret: Pat
     _assert_got_nothing(SEEN_BY_THE_WATCH, names, tmp_path / "class", secret)
 
 
+# What the watch does not see, as docs/teaching.md says: for these, only to be shut in helps.
+UNSEEN = {
+    "code that changes the watch": (
+        "import gc\n"
+        "for each in gc.get_objects():\n"
+        "    if type(each).__name__ == 'Guard':\n"
+        "        each._open = ('/',)\n"
+        "return 'GOT ' + open({secret!r}).read()"
+    ),
+    "C code that opens files": (
+        "import mujoco\n"
+        'xml = \'<mujoco><asset><hfield name="h" size="1 1 1 1" file="\' + {heights!r} + \'" \'\n'
+        "xml += 'content_type=\"image/vnd.mujoco.hfield\"/></asset></mujoco>'\n"
+        "return 'GOT', mujoco.MjModel.from_xml_string(xml).hfield_data.tolist()"
+    ),
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="both ways are tried where both can be")
+@pytest.mark.usefixtures("shut_in")
+@pytest.mark.parametrize("attack", UNSEEN)
+def test_where_it_is_only_watched_who_changes_the_watch_is_not_seen(
+    attack: str, tmp_path: Path, secret: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heights = tmp_path / "answers.hfield"
+    heights.write_bytes(struct.pack("ii4f", 2, 2, 0.0, 0.25, 0.5, 1.0))
+    body = UNSEEN[attack].format(secret=str(secret), heights=str(heights))
+    text = f"def demo_state(model):\n{textwrap.indent(body, '    ')}\n"
+    file = written_all(tmp_path / "class", {"step_loop.py": text}) / "step_loop.py"
+    for is_shut_in in (True, False):
+        if not is_shut_in:
+            monkeypatch.setattr(sandbox, "shut_in", lambda: False)
+        _, judgement, _, _ = exercise.run(file).functions
+        (remark,) = judgement.remarks
+        assert ("GOT" in re.sub(r" \(in `.*`\)", "", remark)) != is_shut_in, remark
+
+
 # A submission is still what it was.
 
 
@@ -572,6 +610,18 @@ def test_a_file_or_a_folder_that_is_itself_a_link_is_refused(tmp_path: Path) -> 
         (BadInputError, "eve.py is a link to bob", lambda: exercise.run(folder / "eve.py")),
         (BadInputError, "eve.py is a link to bob", lambda: examine(folder / "eve.py")),
     )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links are those of POSIX")
+def test_a_hard_link_is_as_good_as_the_file(tmp_path: Path) -> None:
+    """docs/teaching.md says so: nothing tells it from a file."""
+    folder = _class(tmp_path, {})
+    mine = folder / "ann" / "step_loop.py"
+    mine.unlink()
+    mine.hardlink_to(folder / "bob" / "step_loop.py")
+    ann, bob = judge_all(submissions([folder / "ann", folder / "bob"]), "mujoco")
+    assert (ann.right, bob.right) == (4, 4)
+    assert ann.looks == ()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights on Windows")

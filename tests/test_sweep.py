@@ -37,16 +37,16 @@ from statemachine.lab.sweep import (
     Sweep,
     Vary,
     design_of,
-    prepared,
+    prepare_sweep,
     read_cells,
     read_manifest,
     run_sweep,
 )
 from statemachine.lab.sweep.design import parse_vary
-from statemachine.lab.sweep.folder import locked, settle_manifest
-from statemachine.lab.sweep.kinds import VariableNames, with_kinds
-from statemachine.lab.sweep.rows import KEY, RowWriter, counted, remove_failed
-from statemachine.lab.sweep.worker import differing, run_batch
+from statemachine.lab.sweep.folder import locked, write_or_check_manifest
+from statemachine.lab.sweep.kinds import VariableNames, resolve_kinds
+from statemachine.lab.sweep.rows import KEY, RowWriter, iter_cell_outcomes, remove_failed
+from statemachine.lab.sweep.worker import environment_difference, run_batch
 
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
@@ -96,7 +96,7 @@ def small(what: str, *vary: str, **others: Any) -> Sweep:
 
 def in_process(sweep: Sweep) -> list[dict[str, Any]]:
     """The rows of a sweep, run here one after the other."""
-    ready = prepared(sweep)
+    ready = prepare_sweep(sweep)
     cells = [cell for name in ready.backends for cell in ready.cells(name)]
     return run_batch(ready, cells, False)
 
@@ -166,7 +166,7 @@ def start(tmp_path: Path) -> Start:
 )
 def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
     options = ("timestep", "damping", "contacts", "integrator")
-    (vary,) = with_kinds(parse_vary([word]), VariableNames(options, parameters=("gain",)))
+    (vary,) = resolve_kinds(parse_vary([word]), VariableNames(options, parameters=("gain",)))
     assert_has(vary, values=values, times=times, bounds=None, numeric=isinstance(values[0], float))
 
 
@@ -216,7 +216,7 @@ def test_what_is_refused_before_anything_runs(
         (
             StateMachineError,
             re.escape(says),
-            lambda: prepared(dataclasses.replace(sweep, **given)),
+            lambda: prepare_sweep(dataclasses.replace(sweep, **given)),
         )
     )
 
@@ -267,7 +267,7 @@ def test_a_name_of_nothing_of_both_or_without_effect_is_refused_in_one_line(
     function = f"{written(tmp_path / 'walk.py', TWO_NAMES)}:walk"
     model = str(written(tmp_path / "motor.xml", MOTOR))
     with pytest.raises(kind, match=re.escape(says)) as caught:
-        prepared(small(function, word, model=model))
+        prepare_sweep(small(function, word, model=model))
     message = str(caught.value)
     assert "\n" not in message
     if not word.startswith("gain["):  # what there is
@@ -278,7 +278,7 @@ def test_a_name_of_nothing_of_both_or_without_effect_is_refused_in_one_line(
 def test_a_parameter_of_the_function_and_one_of_the_robot_vary_in_one_sweep(tmp_path: Path) -> None:
     function = f"{written(tmp_path / 'walk.py', TWO_NAMES.replace('friction', 'other'))}:walk"
     model = str(written(tmp_path / "motor.xml", MOTOR))
-    ready = prepared(small(function, "gain=1,2", "mass[link]=0.5x,1x", model=model))
+    ready = prepare_sweep(small(function, "gain=1,2", "mass[link]=0.5x,1x", model=model))
     assert [vary.kind for vary in ready.design.factors] == ["parameter", "option"]
 
 
@@ -294,7 +294,7 @@ def test_how_a_file_is_read_is_varied_where_it_is_loaded(tmp_path: Path) -> None
 
 
 def test_many_cells_are_told_beforehand() -> None:
-    assert any("20,000 cells" in line for line in prepared(small("hold", seeds=20_000)).said)
+    assert any("20,000 cells" in line for line in prepare_sweep(small("hold", seeds=20_000)).said)
 
 
 RANGES = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
@@ -321,7 +321,7 @@ def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
         f"qpos[elbow_flex]={low}:{high}:3",
         "qvel[elbow_flex]=-30:30:3",
     )
-    said = [line for word in words for line in prepared(small("hold", word)).said]
+    said = [line for word in words for line in prepare_sweep(small("hold", word)).said]
     (line,) = (line for line in said if "outside" in line)
     assert line.startswith("qpos[elbow_flex]=-3 starts outside the range of the joint")
     assert f"{low:.4g} to {high:.4g} rad" in line
@@ -355,7 +355,7 @@ def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
 
 def test_a_cell_does_not_depend_on_the_one_before(backend: str) -> None:
     """They use one Data, also of PyBullet, whose contacts remember."""
-    ready = prepared(Sweep("hold", (), (backend,), 3, model="so101/scene_box", seconds=0.5))
+    ready = prepare_sweep(Sweep("hold", (), (backend,), 3, model="so101/scene_box", seconds=0.5))
     cells = list(ready.cells(backend))
     rows, reversed_rows = (run_batch(ready, order, False) for order in (cells, cells[::-1]))
     for row, other in zip(rows, reversed_rows[::-1], strict=True):
@@ -404,20 +404,20 @@ def test_a_cell_that_fails_is_a_row(policy: str) -> None:
 
 
 def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
-    first = prepared(small("hold", "timestep=0.005,0.01"))
-    settle_manifest(tmp_path, first.manifest(), False)
-    settle_manifest(tmp_path, first.manifest(), False)
+    first = prepare_sweep(small("hold", "timestep=0.005,0.01"))
+    write_or_check_manifest(tmp_path, first.manifest(), False)
+    write_or_check_manifest(tmp_path, first.manifest(), False)
     told = read_manifest(tmp_path)
     assert (design_of(told), told["cells"], told["points"]) == (first.design, 2, 2)
     longer, more, other = (
-        prepared(small("hold", vary, **others)).manifest()
+        prepare_sweep(small("hold", vary, **others)).manifest()
         for vary, others in (
             ("timestep=0.005,0.01", {"seconds": 0.1}),
             ("timestep=0.005,0.01", {"seeds": 2}),
             ("damping=1", {}),
         )
     )
-    settled = partial(settle_manifest, tmp_path)
+    settled = partial(write_or_check_manifest, tmp_path)
     refused(
         (BadInputError, r"seconds 0.05 there, 0.1 here", lambda: settled(longer, True)),
         (BadInputError, "varies timestep", lambda: settled(other, True)),
@@ -441,7 +441,7 @@ def test_two_drivers_are_refused(tmp_path: Path) -> None:
 @pytest.fixture
 def two_rows(tmp_path: Path) -> tuple[RowWriter, list[Any]]:
     """Who writes a sweep of two cells into the folder, and their rows."""
-    sweep = prepared(small("hold", "timestep=0.005,0.01"))
+    sweep = prepare_sweep(small("hold", "timestep=0.005,0.01"))
     rows = run_batch(sweep, list(sweep.cells("mujoco")), False)
     return RowWriter(tmp_path, sweep.design.factors, {"request": {}}), rows
 
@@ -453,7 +453,7 @@ def test_rows_are_written_whole_and_read_in_order(two_rows: Any, tmp_path: Path)
         writer.flush()
     place = tmp_path / "cells" / "backend=mujoco"
     (place / ".part-x.parquet.part-1.parquet").write_bytes(b"half")  # of a driver that was killed
-    assert dict(counted(tmp_path)) == {row["cell"]: "done" for row in rows}
+    assert dict(iter_cell_outcomes(tmp_path)) == {row["cell"]: "done" for row in rows}
     table = read_cells(tmp_path)
     assert table["cell"].to_pylist() == sorted(row["cell"] for row in rows)
     both = zip(table["backend"].to_pylist(), table["vary.timestep"].to_pylist(), strict=True)
@@ -465,13 +465,13 @@ def test_rows_are_written_whole_and_read_in_order(two_rows: Any, tmp_path: Path)
         "backend",
     ]
     (place / "part-0.parquet").write_bytes(b"no parquet")
-    refused((BadInputError, "cannot be read", lambda: dict(counted(tmp_path))))
+    refused((BadInputError, "cannot be read", lambda: dict(iter_cell_outcomes(tmp_path))))
 
 
 @pytest.fixture
 def dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A sweep of one file."""
-    monkeypatch.setattr(sys.modules["statemachine.lab.sweep.rows"], "_SOON", 60.0)
+    monkeypatch.setattr(sys.modules["statemachine.lab.sweep.rows"], "_MIN_PAUSE", 60.0)
     run_sweep(small("hold", "damping=0.5x,1x", "timestep=0.005"), tmp_path / "s", jobs=1)
     return tmp_path / "s"
 
@@ -494,7 +494,7 @@ def test_a_flipped_bit_is_never_another_value(dataset: Path) -> None:
         part.write_bytes(bad)
         refused(
             (BadInputError, says, lambda: read_cells(dataset)),
-            (BadInputError, says, lambda: dict(counted(dataset))),
+            (BadInputError, says, lambda: dict(iter_cell_outcomes(dataset))),
         )
     part.write_bytes(whole)
     assert read_cells(dataset).num_rows == 2
@@ -553,7 +553,7 @@ def test_every_kind_of_factor_has_a_meaning() -> None:
         "contacts=on": ("", "contacts of the model"),
     }
     names = VariableNames(["damping", "contacts"], parameters=["mass"])
-    found = with_kinds(parse_vary(told), names)
+    found = resolve_kinds(parse_vary(told), names)
     assert [(vary.unit_on(), vary.meaning) for vary in found] == list(told.values())
 
 
@@ -567,7 +567,7 @@ def test_a_folder_of_something_else_and_an_extra_that_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     thesis = written(tmp_path / "thesis.tex", "")
-    run = partial(run_sweep, prepared(small("hold")))
+    run = partial(run_sweep, prepare_sweep(small("hold")))
     cluster = partial(run, tmp_path / "new", scheduler="tcp://127.0.0.1:1")
     monkeypatch.setitem(sys.modules, "distributed", None)
     refused(
@@ -576,11 +576,13 @@ def test_a_folder_of_something_else_and_an_extra_that_is_missing(
         (MissingEngineError, r"statemachine-sim\[cluster\]", cluster),
     )
     monkeypatch.setitem(sys.modules, "joblib", None)
-    refused((MissingEngineError, r"statemachine-sim\[sweep\]", lambda: prepared(small("hold"))))
+    refused(
+        (MissingEngineError, r"statemachine-sim\[sweep\]", lambda: prepare_sweep(small("hold")))
+    )
 
 
 def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:
-    sweep = prepared(small("hold"))
+    sweep = prepare_sweep(small("hold"))
     (tmp_path / "cells").mkdir()
     run, read = partial(run_sweep, sweep, tmp_path), partial(read_manifest, tmp_path)
     refused(
@@ -597,8 +599,8 @@ def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> No
 
 def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> None:
     """Letters that make other valid JSON are tried, too: a digit for a digit, a key's letter."""
-    sweep = prepared(small("hold", "damping=0.5x,1x", "qpos[elbow_flex]=0:1:3", seeds=2))
-    settle_manifest(tmp_path, sweep.manifest(), extend=False)
+    sweep = prepare_sweep(small("hold", "damping=0.5x,1x", "qpos[elbow_flex]=0:1:3", seeds=2))
+    write_or_check_manifest(tmp_path, sweep.manifest(), extend=False)
     path, draw = tmp_path / "sweep.json", random.Random(1)
     whole = path.read_bytes()
     assert read_manifest(tmp_path) == json.loads(json.dumps(sweep.manifest()))
@@ -612,10 +614,14 @@ def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> Non
         says = rf"^{re.escape(str(path))} is damaged"
         refused(
             (BadInputError, says, lambda: read_manifest(tmp_path)),
-            (BadInputError, says, lambda: settle_manifest(tmp_path, sweep.manifest(), True)),
+            (
+                BadInputError,
+                says,
+                lambda: write_or_check_manifest(tmp_path, sweep.manifest(), True),
+            ),
         )
     path.write_bytes(whole)
-    settle_manifest(tmp_path, sweep.manifest(), extend=False)
+    write_or_check_manifest(tmp_path, sweep.manifest(), extend=False)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")
@@ -756,7 +762,7 @@ def test_a_sweep_that_is_stopped_or_killed_keeps_what_was_done_and_goes_on(
     said = [told, without_estimates(error)]
     assert driver.returncode in codes
     assert how == "SIGKILL" or said == ["", STOPPED if how.startswith("SIGINT") else ""]
-    before = dict(counted(out))
+    before = dict(iter_cell_outcomes(out))
     assert len(before) < 60
     assert before or begun == "sweep.json"
     assert soon(lambda: not _group(driver.pid), 120 if how == "SIGKILL" else 10)
@@ -766,9 +772,9 @@ def test_a_sweep_that_is_stopped_or_killed_keeps_what_was_done_and_goes_on(
     told, error = second.communicate(timeout=120)
     assert second.returncode == 0, error
     assert_has(json.loads(told), done=60, missing=0, ran=60 - len(before))
-    cells = [cell for cell, _ in counted(out)]
+    cells = [cell for cell, _ in iter_cell_outcomes(out)]
     sweep = small(f"{policy}:slow", "gain=1:60:60", seconds=0.1)
-    assert sorted(cell.id for cell in prepared(sweep).cells("mujoco")) == sorted(cells)
+    assert sorted(cell.id for cell in prepare_sweep(sweep).cells("mujoco")) == sorted(cells)
 
 
 @pytest.mark.slow
@@ -793,7 +799,7 @@ def test_cells_that_failed_are_run_again_if_asked(
     assert run()["ran"] == 0
     # A refused request touches nothing.
     assert start(*words, "--retry-failed", "--seeds", "2").wait() == 2
-    assert Counter(dict(counted(tmp_path / "out")).values())["BadInputError"] == 6
+    assert Counter(dict(iter_cell_outcomes(tmp_path / "out")).values())["BadInputError"] == 6
     # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
     code = (
         "import os, signal, sys; import statemachine.lab.sweep\n"
@@ -803,10 +809,10 @@ def test_cells_that_failed_are_run_again_if_asked(
         "main(sys.argv[1:])"
     )
     assert start("--retry-failed", program=["-c", code, *words]).wait() == -signal.SIGKILL
-    assert list(dict(counted(tmp_path / "out")).values()) == ["done", "done"]
+    assert list(dict(iter_cell_outcomes(tmp_path / "out")).values()) == ["done", "done"]
     last = run("--retry-failed")
     assert (last["done"], last["failed"], last["ran"]) == (8, {}, 6)
-    cells = [cell for cell, _ in counted(tmp_path / "out")]
+    cells = [cell for cell, _ in iter_cell_outcomes(tmp_path / "out")]
     assert len(cells) == len(set(cells)) == 8
     assert read_cells(tmp_path / "out")["error"].null_count == 8
 
@@ -816,7 +822,7 @@ def test_the_rows_of_failed_cells_are_removed_alone(two_rows: Any, tmp_path: Pat
     writer.add([{**rows[0], "status": "failed", "error_class": "DivergedError"}, rows[1]])
     writer.flush()
     remove_failed(tmp_path)
-    assert dict(counted(tmp_path)) == {rows[1]["cell"]: "done"}
+    assert dict(iter_cell_outcomes(tmp_path)) == {rows[1]["cell"]: "done"}
 
 
 @pytest.mark.slow
@@ -842,22 +848,24 @@ def test_dask_with_a_worker_that_is_killed(policy: str, tmp_path: Path, cluster:
 
 
 def test_a_worker_with_another_version_or_file_is_told_of(policy: str) -> None:
-    ready = prepared(small(f"{policy}:still"))
-    assert differing(ready, sm.__version__) == ""
+    ready = prepare_sweep(small(f"{policy}:still"))
+    assert environment_difference(ready, sm.__version__) == ""
     others = dataclasses.replace(ready, files={"so101": "", "none": ""}, places={
         "so101": "so101", "none": "none.xml"}, function="")  # fmt: skip
-    assert differing(others, "0") == "statemachine, so101 and none"
+    assert environment_difference(others, "0") == "statemachine, so101 and none"
     Path(policy).write_text("")
-    assert differing(ready, sm.__version__) == f"{policy}:still"
+    assert environment_difference(ready, sm.__version__) == f"{policy}:still"
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(sys.modules["statemachine.lab.sweep"], "_PATIENCE", 0.5)
+    monkeypatch.setattr(sys.modules["statemachine.lab.sweep"], "_SCHEDULER_TIMEOUT", 0.5)
     refused(
         (
             BadInputError,
             "no Dask scheduler answers at",
-            lambda: run_sweep(prepared(small("hold")), tmp_path, scheduler="tcp://127.0.0.1:9"),
+            lambda: run_sweep(
+                prepare_sweep(small("hold")), tmp_path, scheduler="tcp://127.0.0.1:9"
+            ),
         )
     )

@@ -15,7 +15,7 @@ import pytest
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError
-from statemachine.lab.sweep import Sweep, prepared
+from statemachine.lab.sweep import Sweep, prepare_sweep
 from statemachine.lab.sweep.analysis import MainEffect, SweepEffects
 from statemachine.lab.sweep.main_effects import LevelMean
 from statemachine.lab.sweep.page import page
@@ -80,7 +80,7 @@ def still(model, data):
 
 def rows_of(sweep: Sweep) -> list[dict[str, Any]]:
     """The rows of a sweep, run here one after the other."""
-    ready = prepared(sweep)
+    ready = prepare_sweep(sweep)
     cells = [cell for name in ready.backends for cell in ready.cells(name)]
     return run_batch(ready, cells, False)
 

@@ -16,7 +16,7 @@ import pytest
 from statemachine.course.grading.faults import FAULTS
 from statemachine.course.lessons import LESSONS
 from statemachine.lab.probes.conventions import CONCEPTS
-from statemachine.lab.probes.conventions.page import OURS, REMEMBER
+from statemachine.lab.probes.conventions.page import CALLS_OF_THIS_LIBRARY, REMINDERS
 
 from .support.claims import assert_not_in, refused
 from .support.exercises import WRONG
@@ -130,13 +130,81 @@ def test_the_mistakes_of_the_teachers_page_are_those_that_are_caught() -> None:
         assert fault in FAULTS
 
 
+# What docs/teaching.md says that the judge prevents, watches and does not see; and what proves it.
+PROOFS = {
+    "| what it reads |": (
+        "test_shut_in.test_who_is_shut_in_reads_nothing",
+        "test_shut_in.test_what_lies_below_the_judges_is_shown",
+        "test_shut_in.test_who_is_watched_is_refused",
+    ),
+    "| what it writes |": (
+        "test_sandbox.test_shut_in_it_writes_in_its_folder_only",
+        "test_check.test_a_signal_leaves_nothing_behind",
+    ),
+    "| other processes, the network |": (
+        "test_sandbox.test_shut_in_it_reaches_no_process_and_no_network",
+        "test_check.test_what_is_handed_in_is_judged",
+    ),
+    "| time |": (
+        "test_check.test_what_is_handed_in_is_judged",
+        "test_check.test_a_file_that_sleeps_is_ended_by_the_clock",
+    ),
+    "| the verdict |": (
+        "test_check.test_it_reaches_neither_us_nor_the_files",
+        "test_shut_in.test_a_record_of_runs_that_never_were_does_not_pass",
+    ),
+    "Where the last column holds, the page says so": (
+        "test_shut_in.test_the_table_says_where_reading_is_only_watched",
+    ),
+    'is "not graded", with the name of that file': (
+        "test_check.test_what_reads_somebody_s_answers_is_not_graded",
+    ),
+    "to import a judge, to start a program or to look into another process": (
+        "test_shut_in.test_who_is_watched_is_refused",
+        "test_check.test_what_is_handed_in_is_judged",
+    ),
+    "A symbolic link that leads out is refused unread": (
+        "test_shut_in.test_a_link_that_leads_out_is_refused_unread",
+    ),
+    "A submission may import the public interface": (
+        "test_shut_in.test_what_a_submission_needs_is_there",
+        "test_shut_in.test_the_public_interface_is_what_the_package_tells",
+    ),
+    "- somebody else's answers, typed in;": (
+        "test_likeness.test_twelve_copies_in_a_class_of_41_are_one_group",
+        "test_class_of_students.test_a_class_of_41_is_judged",
+    ),
+    "a copy that was rewritten;": ("test_likeness.test_a_copy_that_was_rewritten_is_not_seen",),
+    "- a record of runs of a student's own making that has the right numbers;": (
+        "test_shut_in.test_a_record_of_his_own_making_with_the_right_numbers_passes",
+    ),
+    "- a hard link, which cannot be told from a file;": (
+        "test_shut_in.test_a_hard_link_is_as_good_as_the_file",
+    ),
+    "C code that opens files, and code that changes the watch": (
+        "test_shut_in.test_where_it_is_only_watched_who_changes_the_watch_is_not_seen",
+    ),
+}
+
+
+def test_what_the_judge_prevents_watches_and_does_not_see_is_proven() -> None:
+    guide = " ".join((ROOT / "docs" / "teaching.md").read_text("utf-8").split())
+    section = guide.partition("## What the judge prevents")[2].partition("## ")[0]
+    for statement, tests in PROOFS.items():
+        assert statement in section, statement
+        for name in tests:
+            module, _, function = name.partition(".")
+            text = (ROOT / "tests" / f"{module}.py").read_text("utf-8")
+            assert f"def {function}(" in text, name
+
+
 def test_what_to_remember_is_of_the_lessons() -> None:
-    assert tuple(OURS) == CONCEPTS
-    assert {lesson for lesson, _ in REMEMBER} <= set(LESSONS)
+    assert tuple(CALLS_OF_THIS_LIBRARY) == CONCEPTS
+    assert {lesson for lesson, _ in REMINDERS} <= set(LESSONS)
 
 
 def test_our_column_of_the_cheat_sheet_runs(backend: str) -> None:
-    program = "\n".join(OURS.values()).replace(
+    program = "\n".join(CALLS_OF_THIS_LIBRARY.values()).replace(
         '"so101/scene"', f'"so101/scene", backend="{backend}"'
     )
     names: dict[str, Any] = {}

@@ -10,7 +10,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import ForeignDataError
-from statemachine.interface.told_apart import told_apart
+from statemachine.interface.model_labels import distinct_labels
 
 from .support.files import written
 from .support.small_models import mjcf
@@ -70,7 +70,7 @@ def test_two_models_that_are_alike_are_told_apart_by_their_id(file: Path) -> Non
 def test_files_of_one_name_are_named_with_their_folders(file: Path, tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     other = written(tmp_path / "b" / "pendulum.xml", PENDULUM)
-    left, right = told_apart(sm.load(file), sm.load(other))
+    left, right = distinct_labels(sm.load(file), sm.load(other))
     assert str(file) in left
     assert str(other) in right
 
@@ -79,6 +79,6 @@ def test_an_engine_as_it_comes_is_named(file: Path) -> None:
     emulated, native = (
         sm.load(file, backend="pybullet", defaults=defaults) for defaults in ("model", "engine")
     )
-    left, right = told_apart(emulated, native)
+    left, right = distinct_labels(emulated, native)
     assert 'with defaults="model"' in left
     assert 'with defaults="engine"' in right

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.course.lessons.hold import OLDER
+from statemachine.course.lessons._older_release import OLDER
 from statemachine.errors import (
     BadInputError,
     EngineError,
@@ -32,10 +32,10 @@ from statemachine.lab.recordings import (
     export_csv,
     play,
     read,
+    read_shipped_trace,
     record,
     record_scenario,
-    shipped,
-    shipped_names,
+    shipped_trace_names,
     write,
 )
 from statemachine.lab.runs.scenarios import SCENARIOS
@@ -405,16 +405,18 @@ def test_what_a_trace_cannot_do_is_refused(box: Trace, tmp_path: Path) -> None:
 
 def test_each_scenario_was_recorded_with_both_defaults() -> None:
     expected = {f"{name}.pybullet{end}" for name in SCENARIOS for end in ("", ".engine")}
-    assert set(shipped_names()) == {*expected, f"hold.{OLDER}"}
-    assert_has(shipped("hold", "pybullet", "engine").header, recorded=True, defaults="engine")
-    refused((UnknownNameError, "recorded trace", lambda: shipped("hold", "mujoco")))
+    assert set(shipped_trace_names()) == {*expected, f"hold.{OLDER}"}
+    assert_has(
+        read_shipped_trace("hold", "pybullet", "engine").header, recorded=True, defaults="engine"
+    )
+    refused((UnknownNameError, "recorded trace", lambda: read_shipped_trace("hold", "mujoco")))
 
 
 @pytest.mark.parametrize(
     "name",
     [
         name if name.startswith("droop") else pytest.param(name, marks=pytest.mark.slow)
-        for name in shipped_names()
+        for name in shipped_trace_names()
         if not is_release(name)
     ],
 )
@@ -454,7 +456,7 @@ def _is_as_recorded(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "models" / "so101")
     import make_traces  # pyright: ignore[reportMissingImports]
 
-    assert set(make_traces.RUNS) == set(shipped_names())
+    assert set(make_traces.RUNS) == set(shipped_trace_names())
     trace, kept = make_traces.recorded(name), read(make_traces.FOLDER / f"{name}.npz")
     assert kept.header.provenance.model_sha256 == trace.header.provenance.model_sha256
     for column in INPUTS:

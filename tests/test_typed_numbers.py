@@ -8,7 +8,7 @@ from statemachine.cli import main
 from statemachine.errors import BadInputError
 from statemachine.lab.compare.typed_sides import parse_sides
 from statemachine.lab.sweep.design import parse_vary
-from statemachine.lab.sweep.kinds import VariableNames, with_kinds
+from statemachine.lab.sweep.kinds import VariableNames, resolve_kinds
 from statemachine.measures import parse_tolerances
 from statemachine.typed_numbers import is_count, typed_float, typed_int
 
@@ -59,7 +59,7 @@ def test_a_side_a_tolerance_and_a_sweep_take_none(text: str) -> None:
         (
             BadInputError,
             "",
-            lambda: with_kinds(
+            lambda: resolve_kinds(
                 parse_vary([f"timestep=0.001,{text}"]), VariableNames(("timestep",))
             ),
         ),

@@ -161,16 +161,16 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         session.advance(5)
         bad = session.frame()
         assert_has(bad, running=False, steps=good.steps, time=good.time)  # the last good moment
-        assert bad.trouble.startswith("mujoco: ")
+        assert bad.error.startswith("mujoco: ")
         np.testing.assert_array_equal(bad.poses[0].xpos, good.poses[0].xpos)
         session.play()
         assert not session.running
         session.step(3)
-        assert session.frame().trouble == bad.trouble
+        assert session.frame().error == bad.error
         session.reset()
         session.advance(3)
         again = session.frame()
-        assert_has(again, trouble="", steps=3)
+        assert_has(again, error="", steps=3)
         np.testing.assert_array_equal(again.poses[0].xpos, good.poses[0].xpos)
 
 
@@ -181,10 +181,10 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
         session.play()
         session.advance()
         assert not session.running
-        assert session.frame().trouble.startswith("pybullet: ")
+        assert session.frame().error.startswith("pybullet: ")
         session.reset()
         session.advance(10)
-        assert session.frame().trouble == ""
+        assert session.frame().error == ""
 
 
 def test_a_session_refuses_what_does_not_fit(mujoco_scene: sm.Model, odd: sm.Model) -> None:
@@ -369,7 +369,7 @@ def test_the_readout_says_what_the_frame_says() -> None:
         poses=(pose("mujoco", (0.1, -0.02, 0.3)), pose("pybullet", (0.1, -0.02, 0.3015))),
         tips_apart=0.0015,
         joint_apart=joint,
-        trouble="",
+        error="",
     )
     assert dict(readout(frame, Tempo(1.0, 0.997, False), "tip")).items() >= {
         ("time", "1.250 s"),
@@ -381,7 +381,7 @@ def test_the_readout_says_what_the_frame_says() -> None:
     }
     assert "0.50 ×" in dict(readout(frame, Tempo(2.0, 0.5, True), "tip"))["pace"]
     assert warning(frame, "a note") == "a note"
-    stopped = replace(frame, running=False, trouble="mujoco: it blew up")
+    stopped = replace(frame, running=False, error="mujoco: it blew up")
     assert dict(readout(stopped, Tempo(1, None, False), ""))["pace"] == "paused"
     assert warning(stopped, "") == "mujoco: it blew up. Reset to go on."
 

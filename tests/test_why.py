@@ -306,7 +306,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
-    from statemachine.lab.runs.robot import TARGET
+    from statemachine.lab.runs.robot import ARM_TARGET
 
     fresh, found = dialled()
     ours = path_of(found.build({}, {}), HOLD)
@@ -323,7 +323,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
         for _ in ours:
             rows.append([s[0] for s in pb.getJointStates(arm, joints, client)])
             pb.setJointMotorControlArray(
-                arm, joints, pb.POSITION_CONTROL, targetPositions=TARGET, physicsClientId=client
+                arm, joints, pb.POSITION_CONTROL, targetPositions=ARM_TARGET, physicsClientId=client
             )
             pb.stepSimulation(client)
     finally:
@@ -353,7 +353,7 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
     def apart(names: dict[str, Any]) -> float:
         model = found.build(names, values_of(one)).replace(timestep=one.timestep)
         try:
-            rows = path_of(module._dialled(model, [motors_off]), experiment)
+            rows = path_of(module._with_settings(model, [motors_off]), experiment)
             return float(np.abs(rows - wanted).max())
         except DivergedError:
             return np.inf
@@ -392,7 +392,8 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     }[dial]
     experiment = replace(scenario("gravity"), seconds=1.0)
     plain, same, changed = (
-        path_of(module._dialled(fresh, [limp, *acts]), experiment) for acts in ([], [own], [other])
+        path_of(module._with_settings(fresh, [limp, *acts]), experiment)
+        for acts in ([], [own], [other])
     )
     assert np.abs(plain).max() > 0.35
     np.testing.assert_array_equal(same, plain)
@@ -401,7 +402,7 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     speeds = []
     for acts in ([], [own]):
         start = [0, 0, 0, 0, 0, 150.0]
-        with opened(module._dialled(fresh, [limp, *acts]), qvel=start, nstep=1) as (_, data):
+        with opened(module._with_settings(fresh, [limp, *acts]), qvel=start, nstep=1) as (_, data):
             speeds.append(data.qvel.copy())
     assert np.abs(speeds[0]).max() == pytest.approx(100.0)
     np.testing.assert_array_equal(*speeds)

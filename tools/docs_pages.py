@@ -28,7 +28,7 @@ from statemachine.lab.questions.requests.gap import CompareRequest, answer
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
 from statemachine.lab.why import page as why
-from statemachine.measures.text import reading
+from statemachine.measures.text import display_unit
 from statemachine.show.blocks import Page, Text
 from statemachine.show.pictures import Picture, RobotPicture, Traces
 
@@ -103,7 +103,10 @@ def make_comparisons(folder: Path) -> list[Path]:
         page = comparison.page(result, details=True)
         page = replace(page, title=title_of(compared), origin=origin_of(compared))
         curves = {
-            curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
+            curve.name: (
+                curve.time.tolist(),
+                (curve.difference * display_unit(curve.unit)[0]).tolist(),
+            )
             for curve in compared.curves
             if curve.kind == "joint"
         }

@@ -285,11 +285,11 @@ def load(
         check_takes_read_options(backend, takes, read_options)
         early["read_options"] = read_options
     loaded = loader(path, defaults=defaults, **early)
-    told = deepcopy(options) if takes_options else {}
-    vars(loaded).update(read_options=read_options, defaults=defaults, options=told)
+    named = deepcopy(options) if takes_options else {}
+    vars(loaded).update(read_options=read_options, defaults=defaults, options=named)
     if options and not takes_options:
         loaded = loaded.replace(**options)
-    if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
+    if not _WARNED_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
 
@@ -299,7 +299,7 @@ def _of_usual_start(model: Model) -> str:
 
 
 # Whether `load` leaves it to its caller to tell of shapes inside each other.
-_TOLD_BY_THE_RUN: ContextVar[bool] = ContextVar("told by the run", default=False)
+_WARNED_BY_THE_RUN: ContextVar[bool] = ContextVar("told by the run", default=False)
 
 
 def load_to_run(model: AnyPath, backend: str = DEFAULT, **arguments: Any) -> Model:
@@ -308,11 +308,11 @@ def load_to_run(model: AnyPath, backend: str = DEFAULT, **arguments: Any) -> Mod
     It is for what knows in which state its run starts, and tells of that state itself: the usual
     start, of which `load` tells, may be another one.
     """
-    token = _TOLD_BY_THE_RUN.set(True)
+    token = _WARNED_BY_THE_RUN.set(True)
     try:
         return load(model, backend, **arguments)
     finally:
-        _TOLD_BY_THE_RUN.reset(token)
+        _WARNED_BY_THE_RUN.reset(token)
 
 
 # Whether `load` reads a file of which places alone are asked.

@@ -34,7 +34,7 @@ def read_binary(path: AnyPath, trust: bool = False) -> bytes:
             one, as long as this process lives.
 
     Raises:
-        ModelError: It cannot be read, or nobody said that it is to be trusted.
+        ModelError: It cannot be read, or `trust_binary` was not given.
     """
     try:
         content = Path(path).read_bytes()

@@ -15,7 +15,7 @@ from ..errors import BadInputError
 from ..interface import Array
 from .actuators import servos
 from .compiled.flags import DisableFlag
-from .served.release_parts import held
+from .served.release_parts import owner_of_field
 
 if TYPE_CHECKING:
     from .compiled.types import MjModel
@@ -186,7 +186,7 @@ def put(raw: MjModel, name: str, value: Any, index: tuple[Any, ...] = ()) -> Non
         value: What is to stand there.
         index: Where in an array; or which bit of a set of flags.
     """
-    holder, field = held(raw, name)
+    holder, field = owner_of_field(raw, name)
     now = getattr(holder, field)
     if np.ndim(now):
         now[index] = value

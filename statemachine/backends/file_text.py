@@ -29,7 +29,7 @@ import numpy as np
 
 from ..interface.free_base import FreeBase
 from ..interface.records import AS_WRITTEN, ReadOptions
-from ..models import mesh_file, what_is_there
+from ..models import kind_of_path, mesh_file
 from ..rotations import matrix_from_quat
 from .repair_record import LEAST
 
@@ -223,7 +223,7 @@ def _name_meshes(root: Element, compiler: Element, folder: Path) -> bool:
     for mesh in root.iter("mesh"):
         name = mesh.get("filename", "")
         read_by_mujoco = meshdir / (_last_part(name) if strips else name)
-        if what_is_there(read_by_mujoco) == "a file":
+        if kind_of_path(read_by_mujoco) == "a file":
             places[name] = read_by_mujoco
         elif (place := _mesh_elsewhere(name, folder, meshdir)) is not None:
             places[name] = place
@@ -259,7 +259,7 @@ def _mesh_elsewhere(name: str, folder: Path, meshdir: Path) -> Path | None:
     if "://" in name and place is not None:
         return place
     stripped = meshdir / _last_part(name)
-    return stripped if what_is_there(stripped) == "a file" else place
+    return stripped if kind_of_path(stripped) == "a file" else place
 
 
 def _last_part(name: str) -> str:

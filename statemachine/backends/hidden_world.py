@@ -118,7 +118,7 @@ class HiddenWorld(ABC):
         """Give the world back. Idempotent."""
 
     def look(self, moment: Moment) -> None:
-        """Be where `derive` tells of a moment itself; only called where no Data steps.
+        """Be where `derive` computes a moment itself; only called where no Data steps.
 
         By default one step is taken from it.
         """

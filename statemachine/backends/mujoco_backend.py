@@ -35,7 +35,7 @@ from ..interface.records import AS_WRITTEN, Defaults, ReadOptions, StateLayout
 from ..models import AnyPath
 from .compiled.model import check_numbers, compile_file, compiler_warnings, facts
 from .compiled.spec_files import ENGINE_ERRORS
-from .mujoco.alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
+from .mujoco.alarms import AlarmError, Alarms, end_error, gave_up, pass_on, resets_itself
 from .served.release_parts import constraint_part, contact_arrays
 
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -322,7 +322,7 @@ class MujocoData(Data):
 
     def _raise_pending_warnings(self) -> None:
         if self._pending_warnings != self._seen_warnings:
-            self._alarms.attend()
+            self._alarms.raise_pending()
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
@@ -334,7 +334,7 @@ class MujocoData(Data):
             command = error.quantity == "ctrl"
             diverged = f"{entry} was not finite at time {error.time:g} s"
             self._make_unusable(f"it was stepped with a bad {entry}" if command else diverged)
-            raise ended(self._model, error, "This Data") from None
+            raise end_error(self._model, error, "This Data") from None
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:

@@ -264,7 +264,7 @@ class PybulletModel(HiddenModel):
 
     Attributes:
         plan: The compiled model, and what follows from it for every world.
-        defaults: As `load` was told: "engine" for PyBullet as it comes.
+        defaults: As `load` was given: "engine" for PyBullet as it comes.
         acts: What is set in every world that is opened.
     """
 

@@ -10,7 +10,7 @@ from xml.parsers import expat
 
 from ..interface.records import ReadOptions
 from ..measures.text import few
-from ..models import what_is_there
+from ..models import kind_of_path
 from .compiled.reading import compile_with
 from .compiled.spec_files import ENGINE_ERRORS, reason_of
 
@@ -115,7 +115,7 @@ def _of_missing_file(path: Path, name: str) -> str:
         name: The path that MuJoCo tried.
     """
     place = path.absolute().parent / Path(name).parent
-    if path.suffix.lower() != ".urdf" or what_is_there(place) == "a folder":
+    if path.suffix.lower() != ".urdf" or kind_of_path(place) == "a folder":
         return f"it is looked for in {place}: copy that folder along with the model"
     # Without the folders in a mesh's name `file_text` has looked for it, too.
     return (

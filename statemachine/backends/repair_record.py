@@ -35,7 +35,7 @@ class Repair:
         used: What the compiled model has instead; None where the element was deleted.
         unit: "kg", "kg m^2", or "" of a name.
         reason: Why, in one line; of the element that has the fault as MuJoCo says it.
-        line: Of the file, where MuJoCo tells it; None where it does not, as of a URDF.
+        line: Of the file, where MuJoCo reports it; None where it does not, as of a URDF.
     """
 
     kind: str

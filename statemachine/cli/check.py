@@ -16,10 +16,10 @@ from .common import (
     add_backend,
     add_json,
     file_name,
-    resumable,
     show,
     word_of_one_backend,
 )
+from .resuming import resumable
 
 if TYPE_CHECKING:
     from ..course.grading.request import CheckRequest, ClassRequest, FaultsRequest
@@ -57,8 +57,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--csv",
         type=file_name,
         metavar="TABLE",
-        help="of a class: write the table there after each file; typed again, it judges only "
-        "files that are new or changed",
+        help="of a class: write the table there after each file; typed again, the command judges "
+        "only files that are new or changed",
     )
     parser.add_argument(
         "--html",
@@ -230,6 +230,7 @@ def _run_one(options: argparse.Namespace) -> int:
 
 def _run_class(options: argparse.Namespace) -> int:
     """Judge the files of a class."""
+    from ..course.grading import judged_before
     from ..course.grading.class_page import class_page, class_report
     from ..course.grading.request import answer_class
     from ..show.html import check_target, report, write_report
@@ -237,7 +238,8 @@ def _run_class(options: argparse.Namespace) -> int:
     request = class_request_of(options)
     if options.html is not None:
         check_target(options.html)
-    with resumable(request.table, "judged"):
+    kept_in = judged_before.folder() if request.table is None else request.table
+    with resumable(kept_in, "judged"):
         result = answer_class(request, TerminalReporter())
     if options.html is not None:
         target = write_report(options.html, report(class_report(result)))

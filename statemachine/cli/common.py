@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, redirect_stdout
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ..errors import BadInputError, printable
+from ..errors import printable
 from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
 
@@ -30,57 +30,10 @@ def complain(error: Exception | str, code: int) -> int:
     return code
 
 
-@contextmanager
-def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
-    """Say, where a Ctrl-C ends it, what there is already, and how to go on.
-
-    Args:
-        written: The file or the folder that it is in.
-        what: What was done with what is there.
-        but: What is to be typed otherwise.
-    """
-    try:
-        yield
-    except KeyboardInterrupt:
-        if written is not None and written.exists():
-            text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
-            raise SystemExit(complain(text, INTERRUPTED)) from None
-        raise
-
-
 def is_given(options: argparse.Namespace, name: str) -> bool:
     """Tell whether an option is given that is None, False or empty where it is not."""
     value = getattr(options, name)
     return value is not None and value is not False and value != []  # 0 is given
-
-
-class _HelpAll(argparse.Action):
-    """--help-all: the help of every option; `const` has what --help leaves out."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        for action, text in (self.const or {}).items():
-            action.help = text
-        self.help = "every option: this list"
-        parser.print_help()
-        parser.exit()
-
-
-def shorten_help(parser: argparse.ArgumentParser, first: Collection[str]) -> None:
-    """Let --help show the options that are needed first, and --help-all all of them.
-
-    Args:
-        parser: Of the command, with all its options.
-        first: The names of those that are needed first.
-    """
-    later = {
-        action: action.help
-        for action in parser._actions
-        if action.dest != "help" and action.dest not in first and action.help != argparse.SUPPRESS
-    }
-    for action in later:
-        action.help = argparse.SUPPRESS
-    says = f"every option: {len(later)} more"
-    parser.add_argument("--help-all", action=_HelpAll, nargs=0, const=later, help=says)
 
 
 def flag_of(name: str) -> str:
@@ -101,22 +54,6 @@ def file_name(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("expected the name of a file")
     return Path(text)
-
-
-# As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
-EXPERIMENTS = {
-    "hold": "the servos go to one pose and hold it",
-    "gravity": "actuators off: what can move falls",
-    "droop": "nobody writes ctrl: the servos keep their first targets",
-    "fall": "actuators off, and nothing can touch",
-    "box": "the SO-101 swings with a box in its jaws",
-    "waves": "every actuator follows waves that a seed draws",
-}
-
-
-def experiments() -> str:
-    """Return a line for each experiment."""
-    return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
 
 
 class TerminalReporter:
@@ -229,25 +166,6 @@ def word_of_one_backend(words: Sequence[str] | None, what: str) -> str:
     from ..backends.chosen import one_backend
 
     return str(one_backend(words or [DEFAULT], what))
-
-
-def pairs_of(words: Iterable[str], option: str) -> dict[str, str]:
-    """Read names of the left and what the right calls them, from words A=B.
-
-    Args:
-        words: As typed.
-        option: The option, for the message.
-
-    Raises:
-        BadInputError: A word is not of that form.
-    """
-    names: dict[str, str] = {}
-    for text in words:
-        left, sign, right = text.partition("=")
-        if not (left and sign and right):
-            raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
-        names[left] = right
-    return names
 
 
 def show(

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..errors import BadInputError
-from .common import PROGRAM, TerminalReporter, add_backend, add_json, show
+from .common import TerminalReporter, add_backend, add_json, show
 
 if TYPE_CHECKING:
     from ..lab.probes.conventions.request import CallsRequest, ConventionsRequest
@@ -56,5 +56,4 @@ def run(options: argparse.Namespace) -> int:
         phrases = answer_calls(request, TerminalReporter())
         return show(report.calls_page(phrases), phrases, options.json)
     result = answer(request, TerminalReporter())
-    footer = f"Which call does what on each engine: {PROGRAM} conventions --calls"
-    return show(report.page(result), result, options.json, footer)
+    return show(report.page(result), result, options.json)

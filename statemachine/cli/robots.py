@@ -13,9 +13,9 @@ from .common import (
     add_seed,
     add_trust,
     file_name,
-    resumable,
     show,
 )
+from .resuming import resumable
 
 if TYPE_CHECKING:
     from ..lab.robots.request import RobotsRequest

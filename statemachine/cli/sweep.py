@@ -19,12 +19,12 @@ from .common import (
     add_menagerie,
     add_model,
     add_seconds,
-    experiments,
     flag_of,
-    resumable,
-    shorten_help,
     show,
 )
+from .experiments import experiments
+from .help_all import shorten_help
+from .resuming import resumable
 
 if TYPE_CHECKING:
     from ..lab.sweep import Sweep

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from ..errors import BadInputError, printable
 from .common import (
-    EXPERIMENTS,
     ONE_BACKEND,
     PROGRAM,
     SAYS_NO,
@@ -21,10 +20,10 @@ from .common import (
     add_seed,
     add_timestep,
     complain,
-    experiments,
     show,
     word_of_one_backend,
 )
+from .experiments import EXPERIMENTS, experiments
 
 if TYPE_CHECKING:
     from ..lab.recordings import Trace
@@ -48,7 +47,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         _action(
             actions,
             "play",
-            "play the ctrl of a trace on an engine",
+            "play the commands of a trace on an engine",
             "From the state that the trace starts in; the result is another trace.",
         )
     )
@@ -102,7 +101,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
         "what",
         nargs="?",
         metavar="WHAT",
-        help="an experiment, or FILE.py:FUNCTION, called with (model, data) for ctrl",
+        help="an experiment; or FILE.py:FUNCTION, which gets (model, data) and returns a command",
     )
     add_model(parser, "the model, instead of the experiment's own")
     parser.add_argument("--keyframe", metavar="NAME", help="where it starts")

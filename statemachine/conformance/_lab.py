@@ -27,7 +27,7 @@ from ..interface import (
 )
 from ..interface.checks import unsupported
 from ..interface.records import Arrays
-from ..measures.quantities import readings
+from ..measures.quantities import derived_arrays
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
@@ -157,7 +157,11 @@ def require(condition: bool, message: str) -> None:
 
 
 def require_equal(got: Any, expected: Any, what: str) -> None:
-    """Require bit-for-bit equality of arrays, shapes included."""
+    """Require bit-for-bit equality of arrays, shapes included.
+
+    Raises:
+        AssertionError: They differ, or one has a NaN.
+    """
     got, expected = np.asarray(got), np.asarray(expected)
     require(got.shape == expected.shape, f"{what}: shape {got.shape}, expected {expected.shape}")
     if got.dtype.kind == "f":
@@ -168,7 +172,11 @@ def require_equal(got: Any, expected: Any, what: str) -> None:
 
 
 def require_close(got: Any, expected: Any, within: float, what: str) -> None:
-    """Require that every entry is within an absolute bound, and the shapes are equal."""
+    """Require that every entry is within an absolute bound, and the shapes are equal.
+
+    Raises:
+        AssertionError: It is not so.
+    """
     got, expected = np.asarray(got, dtype=np.float64), np.asarray(expected, dtype=np.float64)
     require(got.shape == expected.shape, f"{what}: shape {got.shape}, expected {expected.shape}")
     gap = np.abs(got - expected).max(initial=0.0)
@@ -183,6 +191,10 @@ def require_raises(
     """Require that each call raises one of these errors, with a message; return the last of them.
 
     And the inputs and the time of `unchanged` are afterwards what they were, bit by bit.
+
+    Raises:
+        AssertionError: A call raises none of them, or an error without a message, or changes
+            an input.
     """
     caught, names = Exception(), (*INPUTS, "time") if unchanged else ()
     before = {name: np.array(getattr(unchanged, name)) for name in names}
@@ -203,7 +215,7 @@ def require_raises(
 def snapshot(data: Data) -> Arrays:
     """Return copies of everything derived that this backend offers, contacts included."""
     values: Arrays = {}
-    for name, held in readings(data).items():
+    for name, held in derived_arrays(data).items():
         if isinstance(held, Contacts):
             values |= {f"contacts.{part}": np.array(array) for part, array in vars(held).items()}
         else:

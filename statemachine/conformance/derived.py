@@ -6,7 +6,7 @@ import numpy as np
 
 from ..interface import POSES, Data, JointType, Model, forward, get_state, reset, set_state, step
 from ..kinematics import Kinematics
-from ..measures.quantities import readings
+from ..measures.quantities import derived_arrays
 from ..rotations import matrix_from_quat
 from ._lab import (
     TARGET,
@@ -120,12 +120,12 @@ def check_forward_perturbs_nothing(lab: Lab) -> None:
 
     def forward_and_read(data: Data) -> None:
         forward(data.model, data)
-        readings(data)
+        derived_arrays(data)
 
     undisturbed = run_on(lab.moving(), *(1,) * 100)
     for name, call in (
         ("forward", lambda data: forward(data.model, data)),
-        ("reading what is derived", readings),
+        ("reading what is derived", derived_arrays),
         ("forward, then reading", forward_and_read),
         ("get_state", lambda data: get_state(data.model, data)),
     ):

@@ -19,7 +19,7 @@ from ..errors import (
     UnknownNameError,
 )
 from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
-from ..measures.quantities import readings
+from ..measures.quantities import derived_arrays
 from ._lab import Lab, check, require, require_equal, require_raises
 
 
@@ -88,7 +88,7 @@ def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> 
 def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
     """Check that derived arrays can neither be written into nor assigned to."""
     forward(model, data)
-    held: dict[str, Any] = readings(data)
+    held: dict[str, Any] = derived_arrays(data)
     parts = vars(held.pop("contacts"))
     for name, array in {**held, **parts}.items():
         require(not array.flags.writeable, f"{name} can be written into")

@@ -79,7 +79,7 @@ def check_gains_are_those_of_the_servo(lab: Lab) -> None:
 def check_latency_delays_a_command(lab: Lab) -> None:
     """Check that under a latency of k steps the arm does what it does without, k steps later.
 
-    Weightless and at rest nothing else tells the moments apart. A latency is rounded up.
+    Weightless and at rest nothing else distinguishes the moments. A latency is rounded up.
     """
     arm = lab.arm.replace(gravity=[0, 0, 0])
     commands = np.random.default_rng(3).uniform(-0.1, 0.1, (40, arm.nu))

@@ -18,6 +18,7 @@ from ..backends import load
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..lab.questions.film import inline
+from ..measures.text import capital
 from ..show.blocks import (
     LETTERS,
     Block,
@@ -70,6 +71,8 @@ _END = """\
 
 `exercises/step_loop.py` in this project has four functions for you to write, and
 `statemachine check exercises/step_loop.py` says what they do. In a cell: `!statemachine check ...`
+
+What goes further than a lesson is shown by an option, as in `lesson("gravity", further=True)`.
 """
 
 
@@ -361,7 +364,7 @@ def asked(block: Question) -> str:
 
 def answer(block: Question) -> str:
     """Write what the run says about a question."""
-    return f"{_escaped(answer_of(block))}. {_escaped(block.because)}"
+    return f"{_escaped(capital(answer_of(block)))}. {_escaped(block.because)}"
 
 
 def _folded(inside: list[str], summary: str = "What the run says") -> str:

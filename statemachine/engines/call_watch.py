@@ -1,4 +1,4 @@
-"""What a room tells of its engine's calls: its functions, and what calls change.
+"""What a room knows of its engine's calls: its functions, and what calls change.
 
 `probes.calls` replaces the functions by ones that count and look. A `CallWatch` imports the
 engine's backend: what that takes from the engine must be the engine's own, and not a wrapper that
@@ -58,19 +58,19 @@ class WatchedObject(ABC):
     def __init__(self, kind: str, thing: Any) -> None:
         self.kind, self.label, self.named = kind, "", False
         self._seen: Contents | None = None
-        self._thing = weakref.ref(thing)
+        self._reference = weakref.ref(thing)
 
     @property
     def thing(self) -> Any:
         """Return the object; None if it no longer exists."""
-        return self._thing()
+        return self._reference()
 
     @property
-    def gone(self) -> bool:
+    def is_gone(self) -> bool:
         """Tell whether the object no longer exists."""
         return self.thing is None
 
-    def lead(self, label: str) -> None:
+    def note_variable(self, label: str) -> None:
         """Note that a variable leads here; the first that does gives the label."""
         if not self.named:
             self.label, self.named = label, True
@@ -79,14 +79,15 @@ class WatchedObject(ABC):
     def title(self) -> str:
         """Return the object's label, or its kind where no variable ever led to it."""
         return (
-            self.label or f"{self.kind} {'that is gone again' if self.gone else 'without a name'}"
+            self.label
+            or f"{self.kind} {'that is gone again' if self.is_gone else 'without a name'}"
         )
 
     def look_again(self, thoroughly: bool = False) -> dict[str, str]:
         """Return what differs from the last look: fields, and which of their entries; `CLOSED`
         if gone.
         """
-        if self.gone:
+        if self.is_gone:
             return {CLOSED: CLOSED}
         before, now = self._seen, self.contents(thoroughly)
         self._seen = {**(before or {}), **now}
@@ -109,7 +110,7 @@ class WatchedObject(ABC):
         """Return the fields of both looks that differ."""
         return [field for field, value in now.items() if before.get(field, value) != value]
 
-    def due(self) -> bool:
+    def is_outdated(self) -> bool:
         """Tell whether all derived values became outdated since this was last asked."""
         return False
 
@@ -152,7 +153,7 @@ class CallWatch(ABC):
         """Label the objects that variables lead to, where nothing led to one before."""
 
     @abstractmethod
-    def living(self) -> Sequence[WatchedObject]:
+    def live_objects(self) -> Sequence[WatchedObject]:
         """Return the objects that still exist."""
 
 
@@ -168,7 +169,7 @@ def entries(field: str, before: bytes, after: bytes, size: int) -> str:
     return f"{field}[{first}]" if end == first + 1 else f"{field}[{first}:{end}]"
 
 
-def named(namespace: Mapping[str, Any]) -> list[tuple[str, Any]]:
+def named_values(namespace: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Yield the names and values, Models first; what is in a list, tuple or dict too."""
     variables: list[tuple[str, Any]] = []
     for name, value in namespace.items():

@@ -1,8 +1,8 @@
-"""What rooms measure of tiny models, and the lines to type that they offer: the records.
+"""Records of what rooms measure of tiny models, and of the lines to type that they offer.
 
-The questions of `probes.conventions` let their answers follow from these, and say what a
-measurement is given and gives. All lines of the phrasebook use the same numbers, so that one law
-says what must come of them.
+The questions of `probes.conventions` derive their answers from these, and state the arguments and
+the result of each measurement. All lines to type use the same numbers, so that one closed form
+gives what they must lead to.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ..interface import Array
 from .samples import acceleration
 
-ANGLE, TORQUE = 0.4, 1.0  # rad, N·m; of the phrasebook
+ANGLE, TORQUE = 0.4, 1.0  # rad, N·m; of the lines to type
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Absent:
     figures: tuple[Measurement, ...] = ()
 
 
-# A body at 1 m/s, one step: the engine's timestep, as it tells it [s]; how far the body came [m];
+# A body at 1 m/s, one step: the engine's timestep, as it reports it [s]; how far the body came [m];
 # what the engine calls its time, if it has one; by how much that went on [s].
 OneStep = tuple[float, float, str, float]
 # The pendulum of `samples`, let go straight out: how it was loaded; its angle at the end [rad], or

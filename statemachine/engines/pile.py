@@ -23,14 +23,14 @@ _WRITTEN, _OTHER = 0.5, -0.25  # half of anything is not what it has at the star
 
 
 class Pile(ABC):
-    """A world of an engine with the pile in it; of all there is a new one for each trial.
+    """A world of an engine with a pile of bodies in it; each trial has a new one.
 
     Attributes:
-        quantities: What decides the future: what puts a number there, and what tells the number
-            that is there, which may take a step for it.
-        near: By what part of a number it may be read otherwise than it was written.
-        resets: Ways to the start, by name.
-        ways_to_save: Ways to save, by name.
+        quantities: What decides the future, by name: a function that writes a number there, and
+            one that reads it, which may take a step for it.
+        near: The relative error with which a number may be read back.
+        resets: The engine's functions that reset a world, by name.
+        ways_to_save: Functions that save a world, by name.
     """
 
     quantities: ClassVar[Mapping[str, tuple[Write, Read]]]
@@ -99,13 +99,13 @@ class Pile(ABC):
                 scene.disturb(quantity)
                 restore(scene)
 
-        brought_back: dict[str, dict[str, bool]] = {}
+        restored: dict[str, dict[str, bool]] = {}
         for name, save in cls.ways_to_save.items():
-            brought_back[name] = {}
+            restored[name] = {}
             for quantity in cls.quantities:
                 act = partial(there_and_back, quantity, save)
-                brought_back[name][quantity] = cls._survives(quantity, act)
-        return brought_back
+                restored[name][quantity] = cls._survives(quantity, act)
+        return restored
 
     @classmethod
     def future(cls, moments: Sequence[float], steps: int) -> dict[str, list[Futures]]:

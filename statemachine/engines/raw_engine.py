@@ -176,7 +176,7 @@ class RawEngine(CompiledModels):
             model: A Model on this engine.
             data: A Data of it.
             before: (nv,) arrays of that step by their names in the contract, those that the
-                other side tells: "qacc", "qfrc_contact", "qfrc_friction".
+                other side offers: "qacc", "qfrc_contact", "qfrc_friction".
         """
 
     # Pictures without a screen.

@@ -209,7 +209,7 @@ class ModelDifference:
         values: Each quantity that differs; none where only the element as a whole does.
         edits: What brings the second model to the first.
         edits_one: What brings the first to the second, where only it can be changed.
-        refused: Why neither can be brought to the other; "" if one can.
+        refused: Why neither can be equalized with the other; "" if one can.
         spec_edits: What brings the second to the first where it has to be compiled anew; needs a
             file that can be.
         spec_edits_one: What brings the first to the second so, where the second's file cannot.

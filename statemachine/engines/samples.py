@@ -89,7 +89,7 @@ def _mark(k: int) -> str:
     )
 
 
-# A mark is a link of next to no mass: of a centre of mass PyBullet tells the place in double.
+# A mark is a link of next to no mass: of a centre of mass PyBullet reports the place in double.
 MARKED_URDF = (
     '<robot name="marked"><link name="body">'
     + _MARKED_INERTIAL.format(at=numbers(CENTRE), mass=1)

@@ -19,7 +19,7 @@ from types import ModuleType
 from typing import cast
 
 from ..interface import Contacts, Data, Model, get_state
-from ..measures.quantities import readings
+from ..measures.quantities import derived_arrays
 from .age import Scratch, age_of
 from .rows import Freshness, Row, notes_on, row
 from .watch import StaleRead, Watch
@@ -48,8 +48,8 @@ def freshness(model: Model, data: Data) -> Freshness:
     """
     state = get_state(model, data)
     watch = getattr(type(data), "_watch", None)
-    with nullcontext() if watch is None else watch.aside():
-        held = readings(data)
+    with nullcontext() if watch is None else watch.uncounted():
+        held = derived_arrays(data)
     if watch is not None:
         now, age = watch.scratch.now(state), watch.age()
     else:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..interface import Array, JointType, Model, State, forward, make_data, set_state
-from ..measures.quantities import Readings, readings
+from ..measures.quantities import Readings, derived_arrays
 from ..rotations import times
 from .gaps import same
 
@@ -53,7 +53,7 @@ class Scratch:
         if self._now[0] != state:
             set_state(self._model, self._data, state)
             forward(self._model, self._data)
-            self._now = state, readings(self._data, copied=True)
+            self._now = state, derived_arrays(self._data, copied=True)
         return self._now[1]
 
     def one_step_back(self, state: State) -> Array:

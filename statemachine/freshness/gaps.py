@@ -10,7 +10,7 @@ import numpy as np
 
 from ..interface import Array, Contacts, JointType, Model
 from ..measures import ContactNames, Gap
-from ..measures.text import TINY, grouped
+from ..measures.text import SHOWN_AS_TINY, grouped
 from ..rotations import angle_between, matrix_from_quat
 
 
@@ -150,6 +150,6 @@ def _along_world(contacts: Contacts, part: str) -> Array:
     return np.einsum("nij,ni->nj", contacts.frame, getattr(contacts, part))
 
 
-def worth_telling(off: Sequence[Gap]) -> Sequence[Gap]:
-    """Return the gaps without what is nothing but rounding beside what is more."""
-    return [gap for gap in off if gap.shown >= TINY] or off[:1]
+def significant_gaps(off: Sequence[Gap]) -> Sequence[Gap]:
+    """Return the gaps that are more than rounding, or the first where none is."""
+    return [gap for gap in off if gap.shown >= SHOWN_AS_TINY] or off[:1]

@@ -12,7 +12,7 @@ from ..measures import Gap
 from ..measures.text import count, few, listed, milliseconds
 from ..release_names import engine_of
 from .age import Age, engine_step
-from .gaps import gaps, same, worth_telling
+from .gaps import gaps, same, significant_gaps
 
 WIDTH = 80
 # The inputs that each is computed from; a write to another is not a reason why it is stale.
@@ -204,7 +204,7 @@ def table(
     lines = [line(names, last)]
     room = max(WIDTH - indent, 20)
     for cells, off in rows:
-        texts = [str(gap) for gap in worth_telling(off)] or [no_gap]
+        texts = [str(gap) for gap in significant_gaps(off)] or [no_gap]
         first, *others = [part for text in texts for part in textwrap.wrap(text, room)]
         lines.append(line(cells, first))
         lines += [" " * indent + other for other in others]

@@ -15,10 +15,10 @@ import numpy as np
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from ..measures import Gap
-from ..measures.quantities import readings
+from ..measures.quantities import derived_arrays
 from ..measures.text import few
 from .age import Age, Scratch, age_of
-from .gaps import worth_telling
+from .gaps import significant_gaps
 from .rows import DEPEND, Row, row, table
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parents[1]) + os.sep
@@ -55,7 +55,7 @@ class Watch:
         self._model, self._data, self._raise = model, data, raise_on_stale
         self.reads = 0
         self._stale: dict[tuple[str, str, str], StaleRead] = {}
-        self._aside = False
+        self._uncounted = False
 
     @property
     def stale_reads(self) -> tuple[StaleRead, ...]:
@@ -80,7 +80,7 @@ class Watch:
         state = get_state(model, data)
         self.scratch = Scratch(model)
         try:
-            age = age_of(model, state, readings(data), self.scratch)
+            age = age_of(model, state, derived_arrays(data), self.scratch)
         except BaseException:
             self.scratch.close()
             raise
@@ -97,13 +97,13 @@ class Watch:
         self.scratch.close()
 
     @contextmanager
-    def aside(self) -> Iterator[None]:
+    def uncounted(self) -> Iterator[None]:
         """Let reads that are not the watched program's go uncounted."""
-        before, self._aside = self._aside, True
+        before, self._uncounted = self._uncounted, True
         try:
             yield
         finally:
-            self._aside = before
+            self._uncounted = before
 
     def age(self) -> Age:
         """Return how old derived values are, as counted."""
@@ -120,11 +120,15 @@ class Watch:
                 self._writes[name] += 1
 
     def check(self, name: str, held: Array | Contacts) -> None:
-        """Look at one read; raise if it is stale and that is wanted."""
-        if self._aside:
+        """Count one read, and note it where it is stale.
+
+        Raises:
+            StaleReadError: It is stale, and the Watch raises.
+        """
+        if self._uncounted:
             return
         self.reads += 1
-        with self.aside():
+        with self.uncounted():
             age, state = self.age(), self._state()
             if state is not None and state == self._fresh:
                 return
@@ -203,13 +207,13 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
     def overwritten(*_: object) -> None:
         watch.begin(None, never=True)
 
-    tells: dict[str, Callable[..., None]] = {
+    recorders: dict[str, Callable[..., None]] = {
         "_derive": derived,
         "_recompute": recomputed,
         "_reset": overwritten,
         "_set_state": overwritten,
     }
-    hooks = {name: _after(getattr(kind, name), tell) for name, tell in tells.items()}
+    hooks = {name: _after(getattr(kind, name), tell) for name, tell in recorders.items()}
     inputs = {name: seen(slot) for name, slot in _SLOTS.items()}
     # Without slots of its own it has the layout that a change of class needs.
     members = {"__slots__": (), "_watch": watch, **hooks, **inputs}
@@ -218,7 +222,7 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
 
 def _stale_read(stale: Row, entries: list[str]) -> StaleReadError:
     never = stale.of == "never computed"
-    facts = [str(gap) for gap in worth_telling(stale.gaps)]
+    facts = [str(gap) for gap in significant_gaps(stale.gaps)]
     facts += [f"written since: {few(entries)}"] if entries and not never else []
     said = f"{stale.name} {'was' if never else 'is of'} {stale.of}"
     said += f" ({'; '.join(facts)})" if facts else ""

@@ -3,16 +3,18 @@
 A simulator is a state machine. A `Model` never changes; a `Data` holds all that does;
 `step` turns one Data into the next. From the bottom up:
 
-- `records`: what a backend says of itself, and what it hands out
-- `checks`: what is checked of an argument before an engine sees it
+- `records`: capabilities, keyframes, contacts and States
+- `checks`: how an argument is checked before an engine sees it
 - `options`: what `Model.replace` takes
-- `free_base`: where a base that floats starts
-- `read_options`: which options act only while a file is read
+- `free_base`: where a floating base starts
+- `read_options`: the options that act only while a file is read
 - `sites`: which site stands for the fingertip
 - `model`: the constants of a simulation
+- `model_labels`: labels that tell two Models apart
 - `exclusive_access`: one thread at a time
-- `data`: what changes, and what follows from it
-- `verbs`: what a user calls
+- `data`: inputs, and what is derived from them
+- `worlds`: many Data of one Model, in arrays
+- `verbs`: the functions that a user calls
 """
 
 from .data import Data

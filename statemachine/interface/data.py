@@ -44,13 +44,13 @@ if TYPE_CHECKING:
         def __get__(self, data: object, owner: object) -> Array: ...
 
 
-def _derived(name: str, says: str) -> _Derived:
-    """Return a property of Data that reads one of its derived arrays."""
+def _derived(name: str, doc: str) -> _Derived:
+    """Return a property of Data that reads one of its derived arrays, with this docstring."""
 
     def get(data: Data) -> Array:
         return with_exclusive_access(data, data._derive, name)
 
-    return cast("_Derived", property(get, doc=says))
+    return cast("_Derived", property(get, doc=doc))
 
 
 class Data(Closable, ABC):
@@ -90,7 +90,7 @@ class Data(Closable, ABC):
     _unusable: str  # the reason why it is unusable; "" if it is usable
     _layout: StateLayout  # fingerprint and layout of its States
     _advance: Any  # the engine's own step: (_raw_model, _raw, nstep=1)
-    _raw_model: Any  # what that takes; all of `_ENGINE` is None once closed
+    _raw_model: Any  # all of `_ENGINE` is None once closed
     _raw: Any
     _pending_warnings: Any  # differs from `_seen_warnings` when the engine has something to say
     _seen_warnings: Any
@@ -124,8 +124,8 @@ class Data(Closable, ABC):
                 than one step, their number. (Bound to them it would cost 0.5 % of a step.)
             inputs: The arrays qpos, qvel, ctrl, mocap_pos and mocap_quat, the same for the whole
                 life.
-            warnings: Two things of the engine's; when they differ after a step, the verb
-                calls `_raise_pending_warnings`.
+            warnings: The engine's count of its warnings, pending and seen; when the two differ
+                after a step, the verb calls `_raise_pending_warnings`.
             engine: The engine's model and data, or whatever `advance` takes first.
         """
         self._model, self._advance = model, advance
@@ -241,18 +241,18 @@ class Data(Closable, ABC):
         for name in _WRITABLE:
             check_writable(getattr(self, name), name)
 
-    def _make_unusable(self, why: str) -> None:
-        """Refuse everything but `reset` and `set_state`, once the verb that runs has ended."""
-        self._unusable = why
+    def _make_unusable(self, reason: str) -> None:
+        """Refuse, for this reason and once the verb has ended, all but `reset` and `set_state`."""
+        self._unusable = reason
 
     def _make_usable(self) -> None:
         self._unusable = ""
 
     def _raise_pending_warnings(self) -> None:
-        """Raise, or pass on, what the engine warned of since the last time."""
+        """Raise an error, or warn, for what the engine has warned of since the last call."""
 
     def _failed(self, error: Exception) -> None:
-        """Raise what `error`, out of the engine, means for this Data, if it means more."""
+        """Make this Data unusable where `error` calls for it, and raise what it means to a user."""
 
     @abstractmethod
     def _derive(self, name: str) -> Any:

@@ -68,9 +68,9 @@ class Model(ABC):
         mocap_pos0, mocap_quat0: (nmocap, 3) [m] and (nmocap, 4) wxyz, where the file has them.
         site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
         keyframes: The states that the file names.
-        read_options: How the file was read, as `load` was told.
-        defaults: As `load` was told: "engine" for the engine as its own users meet it.
-        options: What `load` and `replace` were told of all that `replace` takes, by name.
+        read_options: How the file was read.
+        defaults: "engine" for the engine as its own users meet it, else "model".
+        options: The options given to `load` and `replace`, of those that `replace` takes, by name.
     """
 
     backend: str
@@ -134,8 +134,8 @@ class Model(ABC):
         missing = Model.__annotations__.keys() - facts.keys()
         if missing:
             raise TypeError(f"a backend must give its Model: {', '.join(sorted(missing))}")
-        told: dict[str, Any] = {"defaults": "model", "options": {}}
-        for name, value in (told | facts).items():
+        defaults: dict[str, Any] = {"defaults": "model", "options": {}}
+        for name, value in (defaults | facts).items():
             vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
         # Once: NumPy swallows a Ctrl-C that falls into a comparison with an enum.
         vars(self)["_quaternions"] = _quaternions(self.jnt_type, self.jnt_qposadr)

@@ -80,8 +80,8 @@ def checked_options(of: OptionFacts, options: Mapping[str, Any]) -> dict[str, An
             ) from None
         if name not in of.capabilities.options:
             raise unsupported(of, name)
-        if name in _OF_MODELS:
-            checked[name] = _OF_MODELS[name](of, name, value)
+        if name in _CHECKED_AGAINST_MODEL:
+            checked[name] = _CHECKED_AGAINST_MODEL[name](of, name, value)
         else:
             checked[name] = as_option(name, value, of.capabilities.integrators)
     return checked
@@ -89,72 +89,72 @@ def checked_options(of: OptionFacts, options: Mapping[str, Any]) -> dict[str, An
 
 def _mass(of: OptionFacts, name: str, value: Any) -> Array:
     """Return the mass of each body, (nbody,), as a new array."""
-    given = as_vector(value, (of.nbody,), name)
-    wrong = (given > 0) != (of.body_mass > 0)
-    for body in np.flatnonzero(wrong | (given < 0))[:1].tolist():
+    values = as_vector(value, (of.nbody,), name)
+    wrong = (values > 0) != (of.body_mass > 0)
+    for body in np.flatnonzero(wrong | (values < 0))[:1].tolist():
         wanted = (
             "must be above 0" if of.body_mass[body] > 0 else "must be 0: the body has no inertia"
         )
         label = of.body_names[body]
         raise BadInputError(
-            f"mass[{body}]{f' ({label})' if label else ''} = {given[body]:g} {wanted}",
+            f"mass[{body}]{f' ({label})' if label else ''} = {values[body]:g} {wanted}",
             quantity=name,
             index=body,
         )
-    return given
+    return values
 
 
 def _gain(of: OptionFacts, name: str, value: Any) -> Array:
     """Return a gain, one number or (nu,), as a new array (nu,) with NaN where there is no servo."""
     servo = ~np.isnan(of.actuator_kp)
     numbers = as_numbers(value, name)
-    given = np.array(np.broadcast_to(numbers, (of.nu,) if numbers.ndim == 0 else numbers.shape))
-    given = given.astype(np.float64)
+    values = np.array(np.broadcast_to(numbers, (of.nu,) if numbers.ndim == 0 else numbers.shape))
+    values = values.astype(np.float64)
     if not servo.any():
         raise BadInputError(f"{name} is of position servos, and the model has none")
-    if given.shape != (of.nu,):
-        as_vector(given, (of.nu,), name)  # says which shape it wants
+    if values.shape != (of.nu,):
+        as_vector(values, (of.nu,), name)  # says which shape it wants
     if not numbers.ndim:
-        given[~servo] = np.nan
-    for k in np.flatnonzero(~servo & ~np.isnan(given))[:1].tolist():
+        values[~servo] = np.nan
+    for k in np.flatnonzero(~servo & ~np.isnan(values))[:1].tolist():
         raise BadInputError(
             f"{name}[{k}] is given for {of.actuator_names[k] or f'actuator {k}'}, which is not a "
             f"position servo: write NaN there, as actuator_{name} has"
         )
-    as_vector(given[servo], (int(servo.sum()),), name)  # finite
-    least = given[servo].min()
+    as_vector(values[servo], (int(servo.sum()),), name)  # finite
+    least = values[servo].min()
     if name == "kp" and least <= 0:
         raise BadInputError(
             f"kp must be above 0; actuation=False turns servos off; got {shown(value)}"
         )
     if least < 0:
         raise BadInputError(f"{name} must not be negative; got {shown(value)}")
-    return given
+    return values
 
 
 def _numbers(of: OptionFacts, name: str, value: Any) -> Array:
     """Return the value of an option of `_LENGTHS`, one number or one for each, as a new array."""
     length, numbers = getattr(of, _LENGTHS[name]), as_numbers(value, name)
-    given = as_vector(numbers, (length,) if numbers.ndim else (), name)
-    if name == "max_qvel" and (given <= 0).any():
+    checked = as_vector(numbers, (length,) if numbers.ndim else (), name)
+    if name == "max_qvel" and (checked <= 0).any():
         raise BadInputError(f"{name} must be above 0; got {shown(value)}")
-    if (given < 0).any():
+    if (checked < 0).any():
         raise BadInputError(f"{name} must not be negative; got {shown(value)}")
-    if name == "latency" and (given > LONGEST).any():
+    if name == "latency" and (checked > LONGEST).any():
         raise BadInputError(f"{name} is at most {LONGEST:g} s; got {shown(value)}")
-    values = np.array(np.broadcast_to(given, (length,)))
-    if name in PER_DOF and not given.ndim:
+    values = np.array(np.broadcast_to(checked, (length,)))
+    if name in PER_DOF and not checked.ndim:
         # One number is meant for the joints of the robot, not for a free body.
         scalar = np.isin(of.jnt_type, (JointType.SLIDE, JointType.HINGE))
         values = np.array(getattr(of, f"dof_{name}"))
-        values[of.jnt_dofadr[scalar]] = given
+        values[of.jnt_dofadr[scalar]] = checked
     return values
 
 
 # Options with one number for each of what a Model counts.
 _LENGTHS = dict.fromkeys(PER_DOF, "nv") | {"friction": "ngeom", "latency": "nu", "max_qvel": "nv"}
 # What depends on the model: its options, and how a value is checked.
-_OF_MODELS: dict[str, Callable[[OptionFacts, str, Any], Array]] = {
+_CHECKED_AGAINST_MODEL: dict[str, Callable[[OptionFacts, str, Any], Array]] = {
     **dict.fromkeys(_LENGTHS, _numbers),
     "mass": _mass,
     "kp": _gain,

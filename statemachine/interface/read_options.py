@@ -48,8 +48,8 @@ def checked_read_options(
     return replace(options, base="free", start=FreeBase(tuple(pos), tuple(quat.tolist())))
 
 
-def told(options: ReadOptions) -> dict[str, bool | str]:
-    """Return the options that `load` must be told, by name: all that are not as by default."""
+def non_default_options(options: ReadOptions) -> dict[str, bool | str]:
+    """Return the options that differ from the defaults of `load`, by name."""
     named: dict[str, bool | str] = {}
     for name in READ_OPTIONS:
         value = getattr(options, name)
@@ -72,7 +72,9 @@ def check_takes_read_options(
         UnsupportedError: It reads files in its own way.
     """
     if "read_options" not in parameters:
-        raise unsupported_by(backend, next(iter(told(options))), "it reads files in its own way")
+        raise unsupported_by(
+            backend, next(iter(non_default_options(options))), "it reads files in its own way"
+        )
 
 
 def without_read_options(of: WasRead, options: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The records of the contract: what a backend says of itself, and what it hands out."""
+"""The records of the contract: capabilities, keyframes, contacts, States."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ OPTIONS = (
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How the file of a Model is read, beside what it says itself: options of `load` alone.
+    """How the file of a Model is read, beyond what the file says: options of `load` only.
 
     Attributes:
         balance_inertia: Whether principal moments of an inertia that break A + B >= C, or of which

@@ -201,9 +201,9 @@ def _admit(model: Model, data: Data) -> None:
             f"got {kind_of(model)} and {kind_of(data)}"
         )
     if data._model is not model:
-        from .told_apart import told_apart
+        from .model_labels import distinct_labels
 
-        maker, other = told_apart(data._model, model)
+        maker, other = distinct_labels(data._model, model)
         raise ForeignDataError(
             f"this Data was made by {maker}, and is used with {other}: make one of this Model, "
             "sm.make_data(model); a State moves between the two"

@@ -155,13 +155,13 @@ class Worlds(Closable, ABC):
 
     def _close_once(self) -> None:
         # Copies: a view would keep the memory of the engine alive, or outlive it.
-        own = vars(self)
-        own["_unusable"] = "closed"
+        fields = vars(self)
+        fields["_unusable"] = "closed"
         for name in self.derived:
-            own.pop(name, None)
+            fields.pop(name, None)
         for name in WRITABLE:
-            view = own[name]
-            own[name] = read_only(view)
+            view = fields[name]
+            fields[name] = read_only(view)
             view.setflags(write=False)  # where the caller kept it
         if self._process == os.getpid():
             self._close()
@@ -223,7 +223,7 @@ class Worlds(Closable, ABC):
         """
 
     def _failed(self, error: Exception) -> None:
-        """Raise what `error`, out of a hook, means for all worlds, if it means more."""
+        """Raise what `error`, out of a hook, means to a user of all worlds, if it means more."""
 
     def _refuse_if_unusable(self) -> None:
         if self._unusable:

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 if TYPE_CHECKING:
-    from ..show.blocks import Page
+    from ..show.blocks import Block, Page
+
+_OPTION = "--details"
+_CALL = "`result.text(details=True)`"
+_FOLDED = "“Details” below"
 
 # A column of the table: values of one type, among which None stands for what is not known.
 Column = list[Any]
@@ -64,7 +69,7 @@ class ShownResult(ABC):
         """
         from ..show.page_text import text_of
 
-        return text_of(self.page(details)).strip("\n")
+        return text_of(_saying(self.page(details), _CALL)).strip("\n")
 
     def to_json(self) -> str:
         """Return what the command prints with --json."""
@@ -86,7 +91,27 @@ class ShownResult(ABC):
         """Return the page as a notebook shows it, with everything else folded below."""
         from ..show.html.notebook import fragment
 
-        return fragment(self.page(), self.page(details=True))
+        return fragment(_saying(self.page(), _FOLDED), _saying(self.page(details=True), _FOLDED))
+
+
+def _saying(page: Page, words: str) -> Page:
+    """Return a page that says how one sees everything where nobody types an option.
+
+    Args:
+        page: As the command prints it.
+        words: What stands for its option --details.
+    """
+    from ..show.blocks import Text
+    from ..show.markdown import Markdown
+
+    blocks: list[Block] = []
+    for block in page.blocks:
+        if isinstance(block, Text) and _OPTION in block.text:
+            text = block.text.replace(f"`{_OPTION}`", words).replace(_OPTION, words)
+            blocks.append(replace(block, text=Markdown(text)))
+        else:
+            blocks.append(block)
+    return replace(page, blocks=blocks)
 
 
 def columns_of(records: Sequence[object], names: Iterable[str]) -> dict[str, Column]:

@@ -9,87 +9,87 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .contacts import ContactNames, overlaps, same_pairs, together
-    from .floors import OF_A_RUN, RobotScale, places_of
-    from .gaps import Deviation, Gap, JointPlaces, joint_gap
-    from .moments import SAME, Common, at_moments, common_moments, nearest
+    from .contacts import ContactNames, contacts_in_words, overlaps, with_left_pair_names
+    from .floors import RUN_FLOORS, RobotScale, robot_points
+    from .gaps import Deviation, Gap, JointAddresses, joint_gap
+    from .moments import SAME_MOMENT, CommonMoments, at_moments, common_moments, nearest
     from .quantities import (
-        COUNT,
+        ENCODER_COUNT,
         QUANTITIES,
         Quantity,
         Tolerance,
-        amount,
+        parse_amount,
         parse_tolerances,
         tolerance_of,
     )
-    from .sizes import distances, farthest, largest, largest_or_inf, turns
+    from .sizes import distances, largest, largest_difference, largest_or_inf, rotation_angles
 
-_HOMES = {
-    "COUNT": "quantities",
-    "Common": "moments",
+_MODULES = {
+    "ENCODER_COUNT": "quantities",
+    "CommonMoments": "moments",
     "ContactNames": "contacts",
     "Deviation": "gaps",
     "Gap": "gaps",
-    "JointPlaces": "gaps",
-    "OF_A_RUN": "floors",
+    "JointAddresses": "gaps",
+    "RUN_FLOORS": "floors",
     "QUANTITIES": "quantities",
     "Quantity": "quantities",
     "RobotScale": "floors",
-    "SAME": "moments",
+    "SAME_MOMENT": "moments",
     "Tolerance": "quantities",
-    "amount": "quantities",
+    "parse_amount": "quantities",
     "at_moments": "moments",
     "common_moments": "moments",
     "distances": "sizes",
-    "farthest": "sizes",
+    "largest_difference": "sizes",
     "joint_gap": "gaps",
     "largest": "sizes",
     "largest_or_inf": "sizes",
     "nearest": "moments",
     "overlaps": "contacts",
     "parse_tolerances": "quantities",
-    "places_of": "floors",
-    "same_pairs": "contacts",
-    "together": "contacts",
+    "robot_points": "floors",
+    "with_left_pair_names": "contacts",
+    "contacts_in_words": "contacts",
     "tolerance_of": "quantities",
-    "turns": "sizes",
+    "rotation_angles": "sizes",
 }
 
 __all__ = [
-    "COUNT",
-    "OF_A_RUN",
+    "ENCODER_COUNT",
     "QUANTITIES",
-    "SAME",
-    "Common",
+    "RUN_FLOORS",
+    "SAME_MOMENT",
+    "CommonMoments",
     "ContactNames",
     "Deviation",
     "Gap",
-    "JointPlaces",
+    "JointAddresses",
     "Quantity",
     "RobotScale",
     "Tolerance",
-    "amount",
     "at_moments",
     "common_moments",
+    "contacts_in_words",
     "distances",
-    "farthest",
     "joint_gap",
     "largest",
+    "largest_difference",
     "largest_or_inf",
     "nearest",
     "overlaps",
+    "parse_amount",
     "parse_tolerances",
-    "places_of",
-    "same_pairs",
-    "together",
+    "robot_points",
+    "rotation_angles",
     "tolerance_of",
-    "turns",
+    "with_left_pair_names",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    value = getattr(import_module(f".{_MODULES[name]}", __name__), name)
     globals()[name] = value  # so that the next use is an ordinary look-up
     return value

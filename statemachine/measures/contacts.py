@@ -10,8 +10,8 @@ from ..interface import Array, Ints, Model
 from .text import few, grouped, rounded
 
 _T = TypeVar("_T")
-_LISTED = 8  # pairs in a sentence
-_DEEP = 1e-3  # m; what rests on a floor sinks in by less
+_MAX_PAIRS = 8  # pairs in a sentence
+_MIN_OVERLAP = 1e-3  # m; what rests on a floor sinks in by less
 
 
 class ContactNames:
@@ -39,14 +39,14 @@ class ContactNames:
     @classmethod
     def of(cls, model: Model) -> ContactNames:
         """Return the names of a Model, which are made once."""
-        if model not in _OF:
-            _OF[model] = cls(
+        if model not in _NAMES_BY_MODEL:
+            _NAMES_BY_MODEL[model] = cls(
                 model.body_names,
                 model.geom_names,
                 model.geom_bodyid.tolist(),
                 model.body_parentid.tolist(),
             )
-        return _OF[model]
+        return _NAMES_BY_MODEL[model]
 
     def pair(self, left: int, right: int) -> str:
         """Return the names of the bodies of two geoms in contact: "gripper on floor"."""
@@ -87,10 +87,10 @@ class ContactNames:
         return len(self._parents), body  # a file may say that a body hangs on itself
 
 
-_OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
+_NAMES_BY_MODEL: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
 
 
-def together(contacts: Iterable[str]) -> str:
+def contacts_in_words(contacts: Iterable[str]) -> str:
     """List contacts, the geoms of a pair of bodies in brackets: "a on b (c, d), e on f"."""
     parts = (contact.partition(" (") for contact in contacts)
     geoms = grouped((pair, shapes.removesuffix(")")) for pair, _, shapes in parts)
@@ -98,7 +98,7 @@ def together(contacts: Iterable[str]) -> str:
     for pair, shapes in geoms.items():
         named = [shape for shape in shapes if shape]
         pairs.append(f"{pair} ({', '.join(named)})" if named else pair)
-    return few(pairs, _LISTED)
+    return few(pairs, _MAX_PAIRS)
 
 
 def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
@@ -113,14 +113,14 @@ def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
     """
     nearest: dict[str, float] = {}
     for pair, distance in zip(geoms.tolist(), distances.tolist(), strict=True):
-        if distance < -_DEEP and min(pair) >= 0:
+        if distance < -_MIN_OVERLAP and min(pair) >= 0:
             name = names.pair(*pair)
             nearest[name] = min(distance, nearest.get(name, 0.0))
     deepest = sorted(nearest.items(), key=lambda item: item[1])
     return [f"{pair} by {rounded(-distance, 'm')}" for pair, distance in deepest]
 
 
-def same_pairs(left: Mapping[str, _T], right: Mapping[str, _T]) -> dict[str, _T]:
+def with_left_pair_names(left: Mapping[str, _T], right: Mapping[str, _T]) -> dict[str, _T]:
     """Return the entries of `right` by pair of bodies, each pair named as in `left`.
 
     Two models may number the same bodies in another order.

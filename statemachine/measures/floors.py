@@ -24,15 +24,15 @@ import numpy as np
 
 from ..interface import Array, Model
 
-SHARE = 2.0**-23  # of a weight, in a run: the precision of a float32
-OF_A_STEP = 1e-9  # of g, of a size, of an inertia, of a radian
+RUN_FORCE_SHARE = 2.0**-23  # of a weight, in a run: the precision of a float32
+STEP_SHARE = 1e-9  # of g, of a size, of an inertia, of a radian
 GRAVITY = 9.81  # m/s², whatever that of the model is: a robot in orbit is as heavy to move
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
-OF_A_RUN = {"rad": 1e-8, "m": 1e-9, "s": 1e-9}
+RUN_FLOORS = {"rad": 1e-8, "m": 1e-9, "s": 1e-9}
 _UNKNOWN_SIZE = 1.0  # m; of one point that moves
 # J, N; of a robot whose weight is not known, as of a recorded run whose file is not here
-_LEAST_ENERGY, _LEAST_FORCE = 1e-9, 1e-6
+_ENERGY_FLOOR, _FORCE_FLOOR = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -78,12 +78,12 @@ class RobotScale:
     @property
     def force(self) -> float:
         """Floor of a contact's force [N]; what it does to a joint has a lower one of its own."""
-        return SHARE * self.weight
+        return RUN_FORCE_SHARE * self.weight
 
     @property
     def energy(self) -> float:
         """Floor of a change of energy [J]: what lifts the whole robot by a share of its size."""
-        return SHARE * self.weight * self.size
+        return RUN_FORCE_SHARE * self.weight * self.size
 
     @property
     def acceleration(self) -> float:
@@ -91,7 +91,7 @@ class RobotScale:
 
         The floor of a force on it is that, times the inertia of its degree of freedom.
         """
-        return OF_A_STEP * GRAVITY
+        return STEP_SHARE * GRAVITY
 
     @property
     def angular_acceleration(self) -> float:
@@ -100,27 +100,27 @@ class RobotScale:
         It is that of a pendulum as long as the robot. The floor of a torque is that, times the
         inertia of its degree of freedom.
         """
-        return OF_A_STEP * GRAVITY / self.size
+        return STEP_SHARE * GRAVITY / self.size
 
     @property
     def length(self) -> float:
         """Floor of a place, or of a depth, in one step [m]."""
-        return OF_A_STEP * self.size
+        return STEP_SHARE * self.size
 
     @property
     def angle(self) -> float:
         """Floor of a rotation, in one step [rad]."""
-        return OF_A_STEP
+        return STEP_SHARE
 
 
 def force_floor(robot: RobotScale | None) -> float:
     """Return the floor of a contact's force [N], of a robot whose weight may be unknown."""
-    return _LEAST_FORCE if robot is None else robot.force
+    return _FORCE_FLOOR if robot is None else robot.force
 
 
 def energy_floor(robot: RobotScale | None) -> float:
     """Return the floor of a change of energy [J], of a robot whose weight may be unknown."""
-    return _LEAST_ENERGY if robot is None else robot.energy
+    return _ENERGY_FLOOR if robot is None else robot.energy
 
 
 def moving_bodies(model: Model) -> frozenset[int]:
@@ -132,7 +132,7 @@ def moving_bodies(model: Model) -> frozenset[int]:
     return frozenset(moving)
 
 
-def places_of(model: Model, xpos: Array, site_xpos: Array) -> Array:
+def robot_points(model: Model, xpos: Array, site_xpos: Array) -> Array:
     """Return where what moves is (n, 3) [m]: the origins of its bodies, and its sites.
 
     The body that carries the first joint counts, too: it is the robot's foot.

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..interface import Array, Ints, JointType
 from .sizes import largest
-from .text import distance, reading
+from .text import display_unit, distance
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Gap:
     @property
     def shown(self) -> float:
         """The size in the unit that is read, mm or degrees; infinite if it has none."""
-        return np.inf if self.size is None else reading(self.unit)[0] * self.size
+        return np.inf if self.size is None else display_unit(self.unit)[0] * self.size
 
     def __str__(self) -> str:
         if self.size is None:
@@ -78,7 +78,7 @@ class Deviation:
 
 
 @dataclass(frozen=True, eq=False)
-class JointPlaces:
+class JointAddresses:
     """Where in qpos each kind of joint has its numbers.
 
     Attributes:
@@ -94,7 +94,7 @@ class JointPlaces:
     free: Ints
 
     @classmethod
-    def of(cls, types: Sequence[int] | Ints, addresses: Sequence[int] | Ints) -> JointPlaces:
+    def of(cls, types: Sequence[int] | Ints, addresses: Sequence[int] | Ints) -> JointAddresses:
         """Return the addresses of joints (n,) of each `JointType` in qpos."""
         kinds, places = np.asarray(types), np.asarray(addresses, dtype=np.int64)
         of = {kind: places[kinds == int(kind)] for kind in JointType}

@@ -9,12 +9,12 @@ import numpy as np
 from ..errors import TraceError
 from ..interface import Array, Ints
 
-SAME = 1e-6  # of a timestep: two moments nearer than this are one
-_FEW = 5  # common moments below which a comparison says nothing
+SAME_MOMENT = 1e-6  # of a timestep: two moments nearer than this are one
+_MIN_COMMON_MOMENTS = 5  # common moments below which a comparison says nothing
 
 
 @dataclass(frozen=True, eq=False)
-class Common:
+class CommonMoments:
     """The moments that two runs share, counted from the start of each.
 
     Attributes:
@@ -28,7 +28,7 @@ class Common:
     right: Ints
 
 
-def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Common:
+def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> CommonMoments:
     """Return the rows of the same moments in two runs: nothing is interpolated.
 
     Timesteps of 1/200 and 1/240 s meet every 25 ms, those of 1/500 and 1/240 s every 50 ms; what
@@ -45,14 +45,14 @@ def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Com
     times = [time - time[0] for time in (left, right)]
     near = nearest(times[1], times[0])
     # A time is a sum of timesteps: its rounding grows with their number.
-    slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
+    slack = SAME_MOMENT * min(steps) + 1e-12 * np.arange(len(times[0]))
     rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
-    if len(rows) < min(_FEW, len(left), len(right)):
+    if len(rows) < min(_MIN_COMMON_MOMENTS, len(left), len(right)):
         raise TraceError(
             f"timesteps of {steps[0]:g} and {steps[1]:g} s have only {len(rows)} moments "
             "in common: record one of them with the other's timestep"
         )
-    return Common(times[0][rows], rows, near[rows])
+    return CommonMoments(times[0][rows], rows, near[rows])
 
 
 def nearest(time: Array, wanted: Array) -> Ints:

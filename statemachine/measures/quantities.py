@@ -15,12 +15,15 @@ from .floors import RobotScale, energy_floor, force_floor
 from .text import milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
-COUNT = 2 * np.pi / 4096
-_COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as small servos have"
-_LEVER = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
-_ENERGY = 0.01  # of what the energy changes by in the run
-_FORCE = 0.05  # of its mean while it acts
-_DISTANCE, _NEAR = 0.01, 1e-3  # of the distance that a base travels; m, what is less is nothing
+ENCODER_COUNT = 2 * np.pi / 4096
+_ENCODER_COUNT_REASON = "1/4096 turn, one count of a 12-bit encoder as small servos have"
+_MIN_LEVER_ARM = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
+_ENERGY_SHARE = 0.01  # of what the energy changes by in the run
+_FORCE_SHARE = 0.05  # of its mean while it acts
+_DISTANCE_SHARE, _MIN_DISTANCE = (
+    0.01,
+    1e-3,
+)  # of the distance that a base travels; m, what is less is nothing
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ _KINDS = (
         "joints",
         moves=True,
         own=True,
-        tolerance=COUNT,
-        reason=_COUNT_SAYS,
+        tolerance=ENCODER_COUNT,
+        reason=_ENCODER_COUNT_REASON,
     ),
     Quantity(
         "slide",
@@ -75,8 +78,8 @@ _KINDS = (
         "rad",
         "rotation of sites",
         moves=True,
-        tolerance=COUNT,
-        reason=_COUNT_SAYS,
+        tolerance=ENCODER_COUNT,
+        reason=_ENCODER_COUNT_REASON,
     ),
     Quantity(
         "body",
@@ -131,8 +134,8 @@ _KINDS = (
         "rad",
         "tracking errors",
         is_outcome=True,
-        tolerance=COUNT,
-        reason=_COUNT_SAYS,
+        tolerance=ENCODER_COUNT,
+        reason=_ENCODER_COUNT_REASON,
     ),
     Quantity(
         "slide tracking",
@@ -184,48 +187,51 @@ def tolerance_of(
             not known.
     """
     # A site that has hardly a lever arm goes where its foot goes, as a slide does.
-    known = QUANTITIES["slide" if kind == "tip" and reach < _LEVER else kind]
+    known = QUANTITIES["slide" if kind == "tip" and reach < _MIN_LEVER_ARM else kind]
     if given and kind in given:
         return Tolerance(given[kind], "as given")
     if known.tolerance is not None:
         return Tolerance(known.tolerance, known.reason)
     if kind == "tip":
         return Tolerance(
-            COUNT * reach,
+            ENCODER_COUNT * reach,
             f"what one count of a 12-bit encoder moves it, at a reach of {reach:.2f} m",
         )
     if kind == "distance":
         farthest = float(np.max([left, right], initial=0.0))
-        share = _DISTANCE * farthest
-        if share >= _NEAR:
+        share = _DISTANCE_SHARE * farthest
+        if share >= _MIN_DISTANCE:
             return Tolerance(share, f"1 % of {rounded(farthest, 'm')}, which the base travels")
-        return Tolerance(_NEAR, "a millimetre")
+        return Tolerance(_MIN_DISTANCE, "a millimetre")
     if kind == "energy":
-        return _of_energy(max(_change(left), _change(right)), scale)
+        return _energy_tolerance(max(_change(left), _change(right)), scale)
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
-        return _of_force(max(_mean_acting(left), _mean_acting(right)), scale)
+        return _force_tolerance(max(_mean_acting(left), _mean_acting(right)), scale)
     return Tolerance(
         timestep * (1 + 1e-9),
         f"one timestep, {milliseconds(timestep, 3)}: an engine looks at contacts once in a step",
     )
 
 
-def _of_energy(change: float, scale: RobotScale | None) -> Tolerance:
+def _energy_tolerance(change: float, scale: RobotScale | None) -> Tolerance:
     """Return the tolerance of an energy that changes by so much in a run [J]."""
     share = Tolerance(
-        _ENERGY * change, f"1 % of {rounded(change, 'J')}, by which the energy changes in the run"
+        _ENERGY_SHARE * change,
+        f"1 % of {rounded(change, 'J')}, by which the energy changes in the run",
     )
-    return _not_below(energy_floor(scale), share, "times its size", scale)
+    return _at_least_floor(energy_floor(scale), share, "times its size", scale)
 
 
-def _of_force(acting: float, scale: RobotScale | None) -> Tolerance:
+def _force_tolerance(acting: float, scale: RobotScale | None) -> Tolerance:
     """Return the tolerance of a normal force that is so much on average while it acts [N]."""
-    share = Tolerance(_FORCE * acting, "5 % of the mean force while they touch")
-    return _not_below(force_floor(scale), share, "", scale)
+    share = Tolerance(_FORCE_SHARE * acting, "5 % of the mean force while they touch")
+    return _at_least_floor(force_floor(scale), share, "", scale)
 
 
-def _not_below(floor: float, share: Tolerance, times: str, scale: RobotScale | None) -> Tolerance:
+def _at_least_floor(
+    floor: float, share: Tolerance, times: str, scale: RobotScale | None
+) -> Tolerance:
     """Return a tolerance that is a share of a quantity, or the floor where that is higher.
 
     Args:
@@ -272,7 +278,7 @@ _SUFFIXES = (
 )
 
 
-def amount(text: str) -> tuple[float, str]:
+def parse_amount(text: str) -> tuple[float, str]:
     """Parse a size above zero like "0.5deg": value [SI] and SI unit; NaN for other words."""
     for suffix, factor, unit in _SUFFIXES:
         if text.endswith(suffix):
@@ -296,7 +302,7 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
         kind, _, text = word.partition("=")
         kind = kind.replace("-", " ")
         check_name("kind of quantity", kind, QUANTITIES)
-        value, unit = amount(text)
+        value, unit = parse_amount(text)
         if unit != QUANTITIES[kind].unit or np.isnan(value):
             units = [suffix for suffix, _, of in _SUFFIXES if of == QUANTITIES[kind].unit]
             raise BadInputError(
@@ -310,7 +316,7 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
 Readings = Mapping[str, "Array | Contacts"]
 
 
-def readings(data: Data, copied: bool = False) -> dict[str, Array | Contacts]:
+def derived_arrays(data: Data, copied: bool = False) -> dict[str, Array | Contacts]:
     """Return all derived arrays that the backend of a Data can compute, by name, and "contacts".
 
     Args:

@@ -23,12 +23,12 @@ def distances(left: Array, right: Array) -> Array:
     return np.linalg.norm(left - right, axis=-1)
 
 
-def farthest(left: Array, right: Array) -> Array:
+def largest_difference(left: Array, right: Array) -> Array:
     """Return the largest absolute difference (…) of k numbers (…, k)."""
     return np.abs(left - right).max(axis=-1, initial=0.0)
 
 
-def turns(left: Array, right: Array) -> Array:
+def rotation_angles(left: Array, right: Array) -> Array:
     """Return the angles (…) [rad] between unit quaternions (…, 4), in any order of components.
 
     By the chord, so that tiny angles keep their digits. q and -q are one rotation.

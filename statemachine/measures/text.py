@@ -11,18 +11,18 @@ from ..installed import ENGINES
 
 K = TypeVar("K")
 V = TypeVar("V")
-NONE = "–"  # where there is no number
-TINY = 1e-6  # what is less, in the unit that is read, is only called so
-_READ = {"rad": (180.0 / math.pi, "°"), "m": (1e3, "mm"), "s": (1e3, "ms")}
+NO_NUMBER = "–"  # where there is no number
+SHOWN_AS_TINY = 1e-6  # what is less, in the unit that is read, is only called so
+_DISPLAY_UNITS = {"rad": (180.0 / math.pi, "°"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 
 
-def reading(unit: str) -> tuple[float, str]:
+def display_unit(unit: str) -> tuple[float, str]:
     """Return the factor from an SI unit to the one that is read, and that unit behind a figure."""
-    factor, name = _READ.get(unit, (1.0, unit))
-    return factor, after(name)
+    factor, name = _DISPLAY_UNITS.get(unit, (1.0, unit))
+    return factor, unit_suffix(name)
 
 
-def after(unit: str) -> str:
+def unit_suffix(unit: str) -> str:
     """Return a unit as it follows a figure: " mm", "°"."""
     return unit if unit in ("", "°") else f" {unit}"
 
@@ -30,28 +30,32 @@ def after(unit: str) -> str:
 def quantity(value: float | None, unit: str) -> str:
     """Format a value [SI unit] with three significant digits, in the unit that is read."""
     if value is None:
-        return NONE
+        return NO_NUMBER
     if math.isnan(value):
         return "none"
-    factor, name = reading(unit)
+    factor, name = display_unit(unit)
     return f"{figure(value * factor)}{name}"
 
 
 def rounded(value: float, unit: str, digits: int = 3) -> str:
     """Format a value [SI unit] with some significant digits, without zeros at the end."""
-    factor, name = reading(unit)
+    factor, name = display_unit(unit)
     return f"{significant(value * factor, digits)}{name}"
 
 
 def distance(size: float, unit: str, digits: int = 3) -> str:
     """Format a size as `rounded` does; what is below a millionth is only called so."""
-    factor, name = reading(unit)
-    return rounded(size, unit, digits) if size * factor >= TINY else f"below {TINY:g}{name}"
+    factor, name = display_unit(unit)
+    return (
+        rounded(size, unit, digits)
+        if size * factor >= SHOWN_AS_TINY
+        else f"below {SHOWN_AS_TINY:g}{name}"
+    )
 
 
 def rough(value: float, unit: str = "") -> str:
     """Format a size [SI unit] with two digits, or its order of magnitude where it is tiny."""
-    factor, name = reading(unit)
+    factor, name = display_unit(unit)
     value *= factor
     if not math.isfinite(value):
         return f"beyond all{name}"
@@ -85,7 +89,7 @@ def fixed(value: float, decimals: int) -> str:
 def signed(value: float | None, decimals: int = 4) -> str:
     """Format a number with its sign; what rounds to zero has none."""
     if value is None:
-        return NONE
+        return NO_NUMBER
     text = f"{value:+.{decimals}f}"
     return text[1:] if float(text) == 0 else text
 
@@ -100,7 +104,7 @@ def numbers(values: Iterable[float]) -> str:
     return " ".join(f"{value:g}" for value in values)
 
 
-def apart(size: float, slide: bool) -> str:
+def joint_difference(size: float, slide: bool) -> str:
     """Format a difference of a joint's positions [rad; of a slide, m]."""
     return distance(size, "m" if slide else "rad", 2)
 
@@ -141,7 +145,7 @@ def duration(seconds: float) -> str:
 def percent(part: float | None) -> str:
     """Format a fraction of a whole as a percentage; of a small one only that it is small."""
     if part is None:
-        return NONE
+        return NO_NUMBER
     value = 100 * part
     if 0 < abs(value) < 0.05:
         return "< 0.1 %"
@@ -182,7 +186,7 @@ def few(words: Sequence[str], most: int = 3, between: str = ", ") -> str:
     return between.join(words[:most]) + more
 
 
-def on(label: str) -> str:
+def on_label(label: str) -> str:
     """Return where something is seen: "on " an engine or a file, with an option."""
     return f"{'with' if '=' in label else 'on'} {label}"
 

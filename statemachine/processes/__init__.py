@@ -161,13 +161,13 @@ class PipedChild:
         self, command: Sequence[str], environment: Mapping[str, str], **options: Any
     ) -> None:
         """Start it; `options` are of `subprocess.Popen`."""
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115  (as long as it lives)
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  (as long as it lives)
         self._process = subprocess.Popen(
             command,
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=self._said,
+            stderr=self._output,
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
             **options,
@@ -188,8 +188,8 @@ class PipedChild:
             return ""
         if code < 0:
             return f"ended by {signal_name(-code)}"
-        self._said.seek(0)
-        return last_line(self._said.read(), code)
+        self._output.seek(0)
+        return last_line(self._output.read(), code)
 
     def leave(self) -> None:
         """Close the pipes: at their end it ends."""
@@ -209,7 +209,7 @@ class PipedChild:
         except BaseException:  # a second Ctrl-C, too
             self.kill()
             self._process.wait()
-        self._said.close()
+        self._output.close()
 
 
 def signal_name(number: int) -> str:

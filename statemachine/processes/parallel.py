@@ -159,6 +159,10 @@ def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
     Args:
         at_once: Whether a signal raises wherever it comes; else where the function that is given
             is called, so that it never comes while the lock of a future is held.
+
+    Raises:
+        KeyboardInterrupt: SIGINT came.
+        SystemExit: SIGTERM or SIGHUP came.
     """
     came: list[int] = []
 

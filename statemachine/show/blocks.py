@@ -215,13 +215,21 @@ class Table:
 
     def narrow(self) -> Table:
         """Return the table without its wide columns."""
-        columns = [k for k in range(len(self.headers)) if k not in self.wide]
+        return self.with_columns([k for k in range(len(self.headers)) if k not in self.wide])
+
+    def with_columns(self, columns: Sequence[int]) -> Table:
+        """Return the table with some of its columns alone, by number.
+
+        Args:
+            columns: In their order.
+        """
         headers = [self.headers[k] for k in columns]
         rows: list[list[str]] = []
         for row in self.rows:
             rows.append([row[k] for k in columns])
         words = frozenset(columns.index(k) for k in self.words if k in columns)
-        return replace(self, headers=headers, rows=rows, words=words, wide=frozenset())
+        wide = frozenset(columns.index(k) for k in self.wide if k in columns)
+        return replace(self, headers=headers, rows=rows, words=words, wide=wide)
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ import numpy as np
 from ..installed import ENGINES
 from ..interface import Array
 from ..measures import largest
-from ..measures.text import apart, milliseconds, short_time
+from ..measures.text import joint_difference, milliseconds, short_time
 from ..release_names import engine_of
 from .blocks import Block, Heading, Items, Page, Question, Table, Text, Verdict
 
@@ -107,7 +107,7 @@ def page(
         slots: What its slots take, by engine. A slot with the name of an engine says whether the
             page is about it.
         blocks: What stands alone, by name.
-        prose: Whether to keep texts and questions, which are about the arm.
+        prose: Whether to keep texts, lists and questions, which are about the arm.
     """
     template = text_of(name)
     alone = {key: f"{{{key}}}" for key in blocks}
@@ -128,7 +128,8 @@ def page(
             elif not text.startswith("? ") or next(iter(texts)) in names:
                 page_blocks += blocks_of(text, blocks, prefix, always="{printed}" not in template)
     if not prose:
-        page_blocks = [block for block in page_blocks if not isinstance(block, (Text, Question))]
+        about_the_arm = (Text, Items, Question)
+        page_blocks = [block for block in page_blocks if not isinstance(block, about_the_arm)]
     return Page(title, origin(results), page_blocks)
 
 
@@ -227,7 +228,7 @@ class Words:
                 texts[name] = text
         return texts
 
-    def __call__(self, name: str, **slots: object) -> str:
+    def __call__(self, name: str, /, **slots: object) -> str:
         """Return the text of a name.
 
         Args:
@@ -304,7 +305,7 @@ def largest_gap(
         return "nothing touched"
     size, place = largest(gaps.ravel())
     row, joint = divmod(place, gaps.shape[1])
-    text = apart(size, slides[joint])
+    text = joint_difference(size, slides[joint])
     if text.startswith("below"):
         return text
     name = f"  {names[joint]}" if names[joint] else ""

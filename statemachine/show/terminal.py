@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 WIDTH_PIPED = 80
-UNDECIDED = "cannot be told on this machine now"  # of a question that the runs do not decide
+UNDECIDED = "it cannot be told on this machine now"  # of a question that the runs do not decide
 _WIDTH_MOST = 100
 
 
@@ -133,6 +133,9 @@ class Printer:
 
     def ask(self, question: Question) -> None:
         """Let the reader predict; without one, answer a question that is for everybody."""
+        if self._headings and (self._reader or question.always):
+            self.write(self._headings)
+            self._headings.clear()
         choice = self._reader.ask(question) if self._reader else None
         if choice is not None:
             self._predicted.append(judged(question, choice))
@@ -194,7 +197,7 @@ def lettered_answer(question: Question) -> str:
 def judged(question: Question, choice: int) -> Text:
     """What became of a prediction; the marks of a verdict are for what the run claims."""
     if question.undecided:
-        return Text(f"You predicted {LETTERS[choice]}; it {UNDECIDED}. {question.because}")
+        return Text(f"You predicted {LETTERS[choice]}; {UNDECIDED}. {question.because}")
     if choice == question.right:
         return Text(f"You predicted it: {LETTERS[choice]}. {question.because}")
     right = "none of them" if question.right is None else LETTERS[question.right]

@@ -130,15 +130,12 @@ def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[Ren
             letters = [f"{letter})" for letter in LETTERS[: len(choices)]]
             return ["", coded(text), "", *map(_hanging, letters, map(coded, choices))]
         case Code(lines):
-            typed = [as_called(line) for line in lines]
-            if not typed:
-                return []
-            return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in typed)]
+            typed = [f"    {_shown(as_called(line), plain)}" for line in lines]
+            return ["", *(RichText(line, "cyan") for line in typed)] if typed else []
         case Printed(by_engine):
             return _printed(by_engine, plain)
         case Table():
-            title = [RichText(_shown(block.title, plain), "italic")] if block.title else []
-            return ["", *title, _grid(block.narrow(), plain, width)]
+            return _titled_grids(block.narrow(), plain, width)
         case Verdict(text, holds):
             mark = RichText(_shown("✓" if holds else "✗", plain), "green" if holds else "red")
             return ["", _hanging(mark, coded(text))]
@@ -197,6 +194,22 @@ def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
     return [(names, text) for text, names in engines.items()]
 
 
+def _titled_grids(block: Table, plain: bool, width: int) -> list[RenderableType]:
+    """Return a table under its title, in as many parts as a narrow window needs."""
+    from rich.text import Text as RichText
+
+    lines: list[RenderableType] = [""]
+    if block.title:
+        lines.append(RichText(_shown(block.title, plain), "italic"))
+    if width >= _USUAL:
+        return [*lines, _grid(block, plain, width)]
+    from .narrow_tables import parts_of
+
+    for part in parts_of(block, least_widths([block.headers, *block.rows], block.words), width):
+        lines += [_grid(part, plain, width), ""]
+    return lines[:-1]
+
+
 def _grid(block: Table, plain: bool, width: int) -> RenderableType:
     from rich import box
     from rich.table import Table as Grid
@@ -240,21 +253,40 @@ def _broken(cell: str, width: int) -> str:
 
 def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> Sequence[int]:
     """Widths of columns, which break no number, and of names the longest, as far as they can."""
-    from rich.cells import cell_len
-
     columns = list(zip(*rows, strict=True))
-    # Words of a column may wrap; numbers must not.
-    parts = [" ".join(cells).split() if k in words else cells for k, cells in enumerate(columns)]
-    least = [max(1, *map(cell_len, cells)) for cells in parts]
-    free = width - sum(least) - 3 * (len(least) - 1)
+    least = least_widths(rows, words)
+    free = width - sum(least) - GAP * (len(least) - 1)
 
     for _ in range(min(-free, sum(least) - len(least))):  # names give way first, to a width
         name = [k in words and size > _NARROWEST for k, size in enumerate(least)]
         least[max(range(len(least)), key=lambda k: (name[k], least[k]))] -= 1
     free = max(free, 0)
-    wants = [max(map(cell_len, cells)) - size for cells, size in zip(columns, least, strict=True)]
+    wants = [max(map(_longest, cells)) - size for cells, size in zip(columns, least, strict=True)]
     shared, in_turn = (_widened(least, wants, free, share) for share in (True, False))
     return min((shared, in_turn), key=lambda widths: _height(rows, widths))
+
+
+def least_widths(rows: Sequence[Sequence[str]], words: Container[int]) -> list[int]:
+    """Return how wide columns are at least: words may wrap, those of headers too, and numbers not.
+
+    Args:
+        rows: Of the table, the headers first.
+        words: The columns of words, by number.
+    """
+    least: list[int] = []
+    for k, (header, *cells) in enumerate(zip(*rows, strict=True)):
+        parts = header.split()
+        for cell in cells:
+            parts += cell.split() if k in words else [cell]
+        least.append(max(map(_longest, parts), default=1) or 1)
+    return least
+
+
+def _longest(text: str) -> int:
+    """Return how wide the widest line of a text is."""
+    from rich.cells import cell_len
+
+    return max(map(cell_len, text.split("\n")))
 
 
 def _widened(
@@ -297,3 +329,5 @@ def _hanging(mark: str | RichText, text: RichText) -> RenderableType:
 
 
 _NARROWEST = 8  # characters of a column whose names are broken before numbers are
+GAP = 3  # characters between columns
+_USUAL = 80  # characters of a window that is not narrow

@@ -97,7 +97,7 @@ class LiveSession(Session, ExitStack):
     def reset(self, keyframe: int | str | None = None) -> None:
         for model, data in self._arms:
             reset(model, data, keyframe)
-        self._trouble, self.steps = "", 0
+        self._error, self.steps = "", 0
         self._resets += 1
 
     def frame(self) -> Frame:
@@ -123,14 +123,14 @@ class LiveSession(Session, ExitStack):
         )
 
     def _all_do(self, verb: Callable[[Model, Data], None]) -> bool:
-        """Call a verb on every engine; return whether there is no trouble, now or before."""
-        if self._trouble:
+        """Call a verb on every engine; return whether there is no error, now or before."""
+        if self._error:
             return False
         for model, data in self._arms:
             try:
                 verb(model, data)
             except StateMachineError as error:
                 self.running = False
-                if not self._trouble:
-                    self._trouble = f"{model.backend}: {error}"
-        return not self._trouble
+                if not self._error:
+                    self._error = f"{model.backend}: {error}"
+        return not self._error

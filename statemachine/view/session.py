@@ -66,7 +66,7 @@ class Frame:
         tips_apart: Between the fingertips of two engines [m]; None without two, or without a site.
         joint_apart: Of the hinge or slide that differs most, among hinges if there are any; None
             without two engines, or without such a joint.
-        trouble: Why it cannot go on, in a sentence; or "".
+        error: Why it cannot go on, in a sentence; or "".
     """
 
     time: float
@@ -77,7 +77,7 @@ class Frame:
     poses: tuple[EnginePose, ...]
     tips_apart: float | None
     joint_apart: Gap | None
-    trouble: str
+    error: str
 
 
 class Session(ABC):
@@ -124,7 +124,7 @@ class Session(ABC):
         self.steps = 0
         self._joints = joints
         self._site = site
-        self._trouble = ""
+        self._error = ""
         self._resets = 1
 
     def set_speed(self, speed: float) -> None:
@@ -136,8 +136,8 @@ class Session(ABC):
         self.speed = checked_speed(speed)
 
     def play(self) -> None:
-        """Let time go on, unless there is trouble."""
-        self.running = not self._trouble
+        """Let time go on, unless there was an error."""
+        self.running = not self._error
 
     def pause(self) -> None:
         """Stop the time."""
@@ -215,15 +215,18 @@ class Session(ABC):
             poses=poses,
             tips_apart=tips_apart,
             joint_apart=joint_apart,
-            trouble=self._trouble,
+            error=self._error,
         )
 
 
 def checked_speed(speed: float) -> float:
-    """Return a speed, or raise BadInputError if nothing can go at that.
+    """Return a speed as a float.
 
     Args:
         speed: Simulated seconds in a second of the clock.
+
+    Raises:
+        BadInputError: It is too slow or too fast, or not a number.
     """
     if not SLOWEST <= speed <= FASTEST:  # not a number fails this too
         raise BadInputError(f"speed must be from {SLOWEST:g} to {FASTEST:g}; got {speed:g}")

@@ -296,7 +296,7 @@ def _pace(frame: Frame, pace: Tempo) -> str:
 
 def warning(frame: Frame, note: str) -> str:
     """Return what is wrong, or ""."""
-    return f"{frame.trouble}. Reset to go on." if frame.trouble else note
+    return f"{frame.error}. Reset to go on." if frame.error else note
 
 
 def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:
@@ -304,14 +304,14 @@ def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:
         f"<tr><td style='{_DIM}'>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
         for name, value in rows
     )
-    trouble = ""
+    alert = ""
     if warning:
         style = "color:#b3261e;margin:.4em 0 0"
-        trouble = f"<p role='alert' style='{style}'>{html.escape(warning)}</p>"
+        alert = f"<p role='alert' style='{style}'>{html.escape(warning)}</p>"
     return (
         "<div style='padding:.5em .7em;font-size:.8em;line-height:1.5'>"
         f"<table style='font-variant-numeric:tabular-nums;border-spacing:0'>{cells}</table>"
-        f"{trouble}</div>"
+        f"{alert}</div>"
     )
 
 

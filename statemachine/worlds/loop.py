@@ -74,7 +74,7 @@ class LoopWorlds(Worlds):
             raise
 
     def _make(self, options: Mapping[str, Sequence[Any]]) -> None:
-        """Make all Data; what one takes tells what the rest will."""
+        """Make all Data; what one takes predicts what the rest will."""
         each = 0  # bytes: the most that one took, for it may be given what others gave back
         variants: dict[bytes, Model] = {}  # by the options that they differ in
         for world in range(self.n):

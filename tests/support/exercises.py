@@ -87,6 +87,10 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             "np.radians was called on what is in radians already",
             {ANGLE: "math.radians(data.qpos[place])"},
         ),
+        "seconds_typed_in": (
+            "servos on: you return 5 numbers; 4 are needed, one at each of 0 … 3 s, where 3 is the",
+            {"range(seconds)": "range(4)"},
+        ),
         "all_joints": (
             "servos on: you return 6 numbers for each second; one is needed",
             {ANGLE: "np.degrees(data.qpos)"},
@@ -169,7 +173,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             },
         ),
         "every_step": (
-            "servos on, one number at each of 0 … 4 s, must be an array of shape (5,)",
+            "servos on: you return 801 numbers; 5 are needed, one at each of 0 … 4 s",
             {
                 STEP: "sm.step(model, data)",
                 "range(seconds)": "range(seconds * round(1 / model.timestep))",
@@ -186,7 +190,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
         "radians": ("these are radians; np.degrees", {ANGLE: "float(data.qpos[place])"}),
         "degrees_twice": ("np.degrees was called twice", {ANGLE: f"math.degrees({ANGLE})"}),
         "weightless": (
-            "nothing moves in this run, as where there is no gravity",
+            "nothing moves in this run, as if there were no gravity",
             {"actuation=False": "gravity=(0, 0, 0)"},
         ),
         "swapped": (
@@ -292,15 +296,15 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {"slice(": "("},
         ),
         "keyframe_forgotten": (
-            "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data",
+            "should be 6 s, you return 0: that is the time of a new Data",
             {"    sm.reset(model, data, keyframe=0)\n": ""},
         ),
         "the_other_keyframe": (
-            "you return 59.522: that is keyframe 1",
+            "you return 59.522: that is the time of keyframe 1",
             {"keyframe=0": "keyframe=1"},
         ),
         "time_typed_in": (
-            "should be 2.5 s, you return 6: that is the course's own scene",
+            "should be 2.5 s, you return 6: that is the time in the course's own scene",
             {"data.time": "6.0"},
         ),
         "nv_taken_as_nq": ("six in qvel, not seven", {"kind.nv": "kind.nq"}),
@@ -393,7 +397,10 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             "reading 3, after the write: forward was called before it was read",
             _ordered("rfrwfrr"),
         ),
-        "forward_before_the_first": ("in a new Data nothing is derived yet", _ordered("frrwrfr")),
+        "forward_before_the_first": (
+            "forward was called before this reading: in a new Data",
+            _ordered("frrwrfr"),
+        ),
         "step_for_forward": ("0.005 s passed: step was called", {"sm.forward": "sm.step"}),
         "degrees_for_radians": ("that is the arm at 0.8 degrees", {"0.8": "np.radians(0.8)"}),
         "radians_for_degrees": ("that is the arm at 45.8 rad", {"0.8": "np.degrees(0.8)"}),
@@ -492,6 +499,10 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
         "command_into_a_copy": (
             "a copy of ctrl is no command. Write data.ctrl[:] = ctrl after the reset",
             {COMMAND: "data.ctrl.copy()[:] = ctrl"},
+        ),
+        "command_typed_in": (
+            "the command is [-0.2 -0.5 0.4 1.5 1.5 0.28], the argument ctrl",
+            {COMMAND: "data.ctrl[:] = [0.4, -0.8, 0.5, 1.6, 1.57, 0.28]"},
         ),
         "one_number_of_ctrl_forgotten": (
             "at its first step ctrl[5] (gripper) was 0; the command there is 0.28",
@@ -674,6 +685,7 @@ RIGHT_ONES: dict[str, dict[str, Changes]] = {
             f"data.qpos[{LIFT}]": 'data.joint("shoulder_lift").qpos',
         },
         "single_precision": {"return tips": "return np.array(tips, np.float32)"},
+        "command_written_too": {ACTS["w"]: f"{ACTS['w']}\n    data.ctrl[1] = 0.8"},
         "plain_lists": {"return tips": "return [tip.tolist() for tip in tips]"},
         "one_array": {"return tips": "return np.array(tips)"},
     },

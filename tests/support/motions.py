@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from statemachine.interface import Data, Model, forward, make_data, reset, step
-from statemachine.measures.quantities import readings
+from statemachine.measures.quantities import derived_arrays
 
 
 @contextmanager
@@ -65,6 +65,6 @@ def bits(data: Data) -> list[bytes]:
     """Return the bits of everything that a Data has."""
     return [
         np.array(part).tobytes()
-        for value in readings(data).values()
+        for value in derived_arrays(data).values()
         for part in ([value] if isinstance(value, np.ndarray) else vars(value).values())
     ]

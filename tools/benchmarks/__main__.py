@@ -22,8 +22,8 @@ import numpy as np
 import statemachine as sm
 from statemachine import __version__, releases
 from statemachine.lab.recordings import recorder
-from statemachine.lab.runs.drive import silent
-from statemachine.lab.runs.in_turns import in_turns
+from statemachine.lab.runs.drive import no_progress
+from statemachine.lab.runs.interleaved_timing import time_interleaved
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
 from statemachine.lab.why.causes import built
@@ -173,7 +173,11 @@ def recording(name: str, rounds: int) -> list[Ratio]:
 
     return interleaved(
         loop,
-        {f"recorded, {name}": lambda: recorder._run(model, watched, controller, _LONG, silent)},
+        {
+            f"recorded, {name}": lambda: recorder._run(
+                model, watched, controller, _LONG, no_progress
+            )
+        },
         rounds,
     )
 
@@ -463,7 +467,7 @@ def another_python(name: str, rounds: int) -> list[Ratio]:
         rounds // 3,
     )
     for steps in (1, STEPS):
-        times = in_turns({"": partial(sm.step, there, theirs, steps)}, 10 * rounds)[""]
+        times = time_interleaved({"": partial(sm.step, there, theirs, steps)}, 10 * rounds)[""]
         low, median, high = np.percentile(times, [10, 50, 90]) * 1e6
         ratios.append(Ratio(f"µs a call of {steps}, 10 to 90 %", median, low, high, len(times)))
     return ratios

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from statemachine.lab.runs.in_turns import Ratio, in_turns
+from statemachine.lab.runs.interleaved_timing import Ratio, time_interleaved
 
 NULL = "the baseline again (null)"
 
@@ -29,5 +29,5 @@ def interleaved(
     everyone = {"": baseline, NULL: baseline, **contestants}
     for call in everyone.values():
         call()
-    times = in_turns(everyone, rounds, seed=seed)
+    times = time_interleaved(everyone, rounds, seed=seed)
     return [Ratio.of(name, spent, times[""]) for name, spent in times.items() if name]

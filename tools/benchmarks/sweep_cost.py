@@ -26,9 +26,9 @@ from typing import Any
 import joblib
 
 import statemachine as sm
-from statemachine.lab.runs.robot import TARGET
-from statemachine.lab.sweep import Sweep, prepared
-from statemachine.lab.sweep.rows import CELLS, RowWriter, counted
+from statemachine.lab.runs.robot import ARM_TARGET
+from statemachine.lab.sweep import Sweep, prepare_sweep
+from statemachine.lab.sweep.rows import CELLS, RowWriter, iter_cell_outcomes
 from statemachine.lab.sweep.worker import Row, run_batch
 
 YEAR = 365.25 * 86400
@@ -43,7 +43,7 @@ def empty(number: int) -> int:
 
 def cells(what: str, backend: str, vary: tuple[str, ...], seeds: int) -> tuple[float, list[Row]]:
     """Return the processor time of a cell [s], and the rows, without the first ones, which load."""
-    ready = prepared(Sweep(what, vary, (backend,), seeds=seeds))
+    ready = prepare_sweep(Sweep(what, vary, (backend,), seeds=seeds))
     every = list(ready.cells(backend))
     run_batch(ready, every[:1], False)
     began = time.process_time()
@@ -53,7 +53,7 @@ def cells(what: str, backend: str, vary: tuple[str, ...], seeds: int) -> tuple[f
 
 def bytes_of(rows: list[Row], moments: int) -> tuple[float, float, float]:
     """Return the size of a row on disk [bytes], and the times to write and to read one [s]."""
-    ready = prepared(Sweep("hold", ("damping=0.5x,2x",), ("mujoco",), moments=moments))
+    ready = prepare_sweep(Sweep("hold", ("damping=0.5x,2x",), ("mujoco",), moments=moments))
     with tempfile.TemporaryDirectory() as folder:
         writer = RowWriter(Path(folder), ready.design.factors, {"request": {}})
         began = time.process_time()
@@ -61,15 +61,15 @@ def bytes_of(rows: list[Row], moments: int) -> tuple[float, float, float]:
         writer.flush()
         wrote = (time.process_time() - began) / len(rows)
         size = sum(part.stat().st_size for part in (Path(folder) / CELLS).rglob("*.parquet"))
-        sum(1 for _ in counted(Path(folder)))  # the first time imports more
+        sum(1 for _ in iter_cell_outcomes(Path(folder)))  # the first time imports more
         began = time.process_time()
-        found = sum(1 for _ in counted(Path(folder)))
+        found = sum(1 for _ in iter_cell_outcomes(Path(folder)))
         return size / len(rows), wrote, (time.process_time() - began) / found
 
 
 def ids() -> tuple[float, float]:
     """Return the processor time to name a cell [s], and the memory to remember it [bytes]."""
-    ready = prepared(Sweep("hold", ("damping=0.5x:2x:10000",), ("mujoco",)))
+    ready = prepare_sweep(Sweep("hold", ("damping=0.5x:2x:10000",), ("mujoco",)))
     began = time.process_time()
     number = sum(1 for _ in ready.cells("mujoco"))
     took = time.process_time() - began
@@ -84,7 +84,7 @@ def steps_alone(backend: str) -> float:
     """Return the processor time of the steps of `hold` [s], and of nothing else."""
     model = sm.load("so101/scene", backend=backend)
     with sm.make_data(model) as data:
-        data.ctrl[:] = TARGET
+        data.ctrl[:] = ARM_TARGET
         began = time.process_time()
         sm.step(model, data, 400)
         return time.process_time() - began

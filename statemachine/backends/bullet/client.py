@@ -89,16 +89,16 @@ def load_urdf(client: int, file: str, what: str, **options: Any) -> int:
     Raises:
         ModelError: PyBullet cannot read it; with what it has to say.
     """
-    with silence() as said:
+    with silence() as output:
         try:
             return pb.loadURDF(file, physicsClientId=client, **options)
         except pb.error as error:
             refused = str(error)
-    raise ModelError(f"PyBullet cannot read {what}: {'; '.join([*said, refused][-3:])}")
+    raise ModelError(f"PyBullet cannot read {what}: {'; '.join([*output, refused][-3:])}")
 
 
 def joint_infos(client: int, body: int) -> list[Any]:
-    """Return what getJointInfo tells of each joint of a body, fixed ones too."""
+    """Return what getJointInfo returns of each joint of a body, fixed ones too."""
     return [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
 
 

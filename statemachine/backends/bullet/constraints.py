@@ -1,6 +1,6 @@
-"""MuJoCo's soft constraints of one tree of joints, as rows that the law of the tree solves.
+"""MuJoCo's soft constraints of one tree of joints, as rows that its `JointDynamics` solve.
 
-Those of joints the law has itself. Here are tendons and equality constraints: of joints, of
+Those of joints are in `JointDynamics`. Here are tendons and equality constraints: of joints, of
 tendons, and of two places, one of which may be where no joint moves it [MuJoCo's manual, chapter
 Computation, section Constraint model].
 """
@@ -43,7 +43,7 @@ class Tendons:
 
     Attributes:
         ids: MuJoCo's numbers of them.
-        bent: Places of those that go through space.
+        spatial: Places of those that go through space.
         moments: By number, the moment (n,) of each.
         armature, damping: (t,), of those that are linear sums.
         lengths: (t,) at the positions of the last `take`.
@@ -61,20 +61,20 @@ class Tendons:
         ]
         self._moment = np.zeros((len(ids), len(tree.dofs)))
         self.moments = dict(zip(ids, self._moment, strict=True))
-        self.bent = list[int]()
+        self.spatial = list[int]()
         for place, (tendon, moment) in enumerate(self.moments.items()):
             joints, factors = linear_sum(raw, tendon)
             for dof, factor in zip(raw.jnt_dofadr[joints], factors, strict=True):
                 moment[tree.dofs == dof] += factor
             if not len(joints):
-                self.bent.append(place)
+                self.spatial.append(place)
         self._across = self._moment.T.copy()
         self.near = _related(raw, tree.dofs)
         self.armature = raw.tendon_armature[ids]
         self.damping = raw.tendon_damping[ids] * (not off["damper"])
-        self._bent_damping = np.zeros(len(ids))
-        self._bent_damping[self.bent] = self.damping[self.bent]
-        self.damping[self.bent] = 0
+        self._spatial_damping = np.zeros(len(ids))
+        self._spatial_damping[self.spatial] = self.damping[self.spatial]
+        self.damping[self.spatial] = 0
         self._stiffness = raw.tendon_stiffness[ids] * (not off["spring"])
         self._slack = raw.tendon_lengthspring[ids].T
         self.stiff = bool(self._stiffness.any())
@@ -98,19 +98,19 @@ class Tendons:
             What those damp that go through space (n, n); None if none does.
         """
         self.lengths = dense.times(self._moment, angles)
-        if not self.bent:
+        if not self.spatial:
             return None
         raw, data = self._raw, self._world.still
         data.qpos[self._tree.qpos] = q
         compute_tendons(raw, data)
-        for place in self.bent:
+        for place in self.spatial:
             start, count = raw.ten_J_rowadr[self.ids[place]], raw.ten_J_rownnz[self.ids[place]]
             row = np.zeros(raw.nv)
             row[raw.ten_J_colind[start : start + count]] = data.ten_J[start : start + count]
             self._moment[place] = row[self._tree.dofs]
             self.lengths[place] = data.ten_length[self.ids[place]]
         self._across = self._moment.T.copy()
-        return self.squared(self._bent_damping)
+        return self.squared(self._spatial_damping)
 
     def squared(self, weight: Array) -> Array:
         """Return Jᵀ·W·J (n, n) of weights (t,)."""

@@ -1,8 +1,8 @@
 """Contacts: MuJoCo's rules of what touches what, and how, in PyBullet's terms; and what touched.
 
 MuJoCo decides by pairs of geoms, and takes the larger friction or that of the geom with
-priority. PyBullet decides by pairs of links, and multiplies what each link has. It tells of
-contacts by links, too.
+priority. PyBullet decides by pairs of links, and multiplies what each link has. It
+reports contacts by links, too.
 """
 
 from __future__ import annotations
@@ -89,9 +89,9 @@ class Surfaces:
     Attributes:
         solids: All that can touch; planes first.
         touching: (ngeom,) which geoms may touch any other.
-        pairs: Of two solids, by their places, whether they meet.
-        meeting: The geoms that do, two by two.
-        slide, spin, roll: Each solid's friction.
+        pairs: Whether two solids may touch, by their places.
+        meeting: The pairs of geoms of solids that may touch.
+        slide, spin, roll: (nsolid,) sliding, torsional and rolling friction of each solid.
         differences: Where friction is not the model's, in words.
     """
 
@@ -102,10 +102,10 @@ class Surfaces:
         touching[[*raw.pair_geom1, *raw.pair_geom2]] = True
         self.touching = touching & (not raw.opt.disableflags & NO_CONTACT)
         self.solids = _solids(raw, meets, self.touching)
-        several: list[str] = []
+        inexact: list[str] = []
         self.pairs: dict[tuple[int, int], bool] = {}
         self.meeting: list[tuple[int, int]] = []
-        wanted: list[PairFriction] = []
+        pair_frictions: list[PairFriction] = []
         for (i, left), (j, right) in combinations(enumerate(self.solids), 2):
             meet = self.pairs[i, j] = bool(meets[left.geoms[0], right.geoms[0]])
             if meet:
@@ -113,14 +113,14 @@ class Surfaces:
                 self.meeting += meeting
                 frictions = np.array([_friction(raw, a, b) for a, b in meeting])
                 slide, spin, roll = frictions.max(axis=0)
-                wanted.append(PairFriction(i, j, slide, spin, roll))
+                pair_frictions.append(PairFriction(i, j, slide, spin, roll))
                 if np.ptp(frictions[:, 0]) > _CLOSE * frictions[:, 0].max():
-                    several.append(
+                    inexact.append(
                         f"friction of {self._label(i, j)} is {frictions[:, 0].max():.3g} for all "
                         f"their geoms, not {frictions[:, 0].min():.3g} for some"
                     )
-        self._solve(wanted)
-        self.differences += several
+        self._solve(pair_frictions)
+        self.differences += inexact
 
     def of_one_robot(self, whole: bool) -> list[tuple[int, int]]:
         """Give the pairs of solids that meet though both are of one robot.
@@ -144,26 +144,30 @@ class Surfaces:
 
         return f"{name(self.solids[i])} and {name(self.solids[j])}"
 
-    def _solve(self, wanted: list[PairFriction]) -> None:
-        """Find frictions of solids from those of pairs, as well as it goes."""
+    def _solve(self, pair_frictions: list[PairFriction]) -> None:
+        """Find frictions of solids from those of pairs, by least squares."""
         count = len(self.solids)
         rows, right = [], []
-        for pair in wanted:
+        for pair in pair_frictions:
             if pair.slide > 0:
                 both = np.isin(np.arange(count), (pair.left, pair.right))
                 rows.append(both.astype(np.float64))
                 right.append(math.log(pair.slide))
         self.slide = np.zeros(count)
-        if rows and np.ptp(right) == 0 and len(rows) == len(wanted):
+        if rows and np.ptp(right) == 0 and len(rows) == len(pair_frictions):
             self.slide += math.exp(right[0] / 2)  # one friction for all: no need to solve
         elif rows:
             logs = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
-            rubs = np.any(rows, axis=0)  # what meets nothing with friction has none
-            self.slide = np.where(rubs, [math.exp(x) for x in np.round(logs, 12)], 0.0)
-        self.spin = self._turning(wanted, [pair.spin for pair in wanted])
-        self.roll = self._turning(wanted, [pair.roll for pair in wanted])
+            has_friction = np.any(rows, axis=0)  # what meets nothing with friction has none
+            self.slide = np.where(has_friction, [math.exp(x) for x in np.round(logs, 12)], 0.0)
+        self.spin = self._frictions_of_solids(
+            pair_frictions, [pair.spin for pair in pair_frictions]
+        )
+        self.roll = self._frictions_of_solids(
+            pair_frictions, [pair.roll for pair in pair_frictions]
+        )
         self.differences: list[str] = []
-        for i, j, slide, spin, roll in wanted:
+        for i, j, slide, spin, roll in pair_frictions:
             sliding = min(self.slide[i] * self.slide[j], _MOST)
             spinning, rolling = self._combined(self.spin, i, j), self._combined(self.roll, i, j)
             self._compare("friction", i, j, sliding, slide)
@@ -171,19 +175,21 @@ class Surfaces:
             self._compare("rolling friction", i, j, rolling, roll)
 
     def _compare(self, what: str, i: int, j: int, ours: float, theirs: float) -> None:
-        """Note a friction of two solids that is not the model's."""
+        """Add a friction of two solids that differs from the model's to `differences`."""
         if abs(ours - theirs) > _CLOSE * max(theirs, 1e-6):
             pair = self._label(i, j)
             self.differences.append(f"{what} of {pair} is {ours:.3g}, not {theirs:.3g}")
 
-    def _combined(self, turning: Array, i: int, j: int) -> float:
+    def _combined(self, frictions: Array, i: int, j: int) -> float:
         """Return PyBullet's combination of the spinning or rolling friction of two geoms."""
-        return float(turning[i] * self.slide[j] + turning[j] * self.slide[i])
+        return float(frictions[i] * self.slide[j] + frictions[j] * self.slide[i])
 
-    def _turning(self, wanted: list[PairFriction], of_pairs: list[float]) -> Array:
+    def _frictions_of_solids(
+        self, pair_frictions: list[PairFriction], of_pairs: list[float]
+    ) -> Array:
         """Find the spinning or rolling friction of solids from that of each pair."""
-        matrix = np.zeros((len(wanted), len(self.solids)))
-        for row, (i, j, *_) in enumerate(wanted):
+        matrix = np.zeros((len(pair_frictions), len(self.solids)))
+        for row, (i, j, *_) in enumerate(pair_frictions):
             matrix[row, i], matrix[row, j] = self.slide[j], self.slide[i]
         right = np.array(of_pairs)
         if not right.any():
@@ -256,7 +262,7 @@ def contacts_of(
     raw: MjModel,
     points: Iterable[Any],
     geoms: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]],
-    turns_of_geoms: Mapping[int, Array],
+    geom_rotations: Mapping[int, Array],
     read: Callable[[str], Any],
 ) -> Contacts:
     """Return the contacts that a world found at the beginning of its last step.
@@ -266,25 +272,25 @@ def contacts_of(
 
     Args:
         raw: The compiled model.
-        points: As getContactPoints tells them; those that are apart and carry no force are left
+        points: As getContactPoints returns them; those that are apart and carry no force are left
             out.
         geoms: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
-        turns_of_geoms: By geom, the matrix (3, 3) from its body's axes into its own.
+        geom_rotations: By geom, the matrix (3, 3) from its body's axes into its own.
         read: Gives xpos and xquat of that moment by name; asked only where a link has several
             geoms.
     """
-    turns: dict[int, Array] = {}  # by body, into its own axes
+    rotations: dict[int, Array] = {}  # by body, into its own axes
 
     def geom_at(body: int, link: int, point: Array) -> int:
         b, candidates = geoms[body, link]
         if len(candidates) == 1:
             return candidates[0]
-        if b not in turns:
-            turns[b] = matrix_from_quat(read("xquat")[b]).T.copy()
-        local = dense.times(turns[b], point - read("xpos")[b])
-        return min(candidates, key=lambda g: abs(_distance(raw, g, turns_of_geoms[g], local)))
+        if b not in rotations:
+            rotations[b] = matrix_from_quat(read("xquat")[b]).T.copy()
+        local = dense.times(rotations[b], point - read("xpos")[b])
+        return min(candidates, key=lambda g: abs(_distance(raw, g, geom_rotations[g], local)))
 
-    touches: list[BulletContact] = []
+    contacts: list[BulletContact] = []
     for point in points:
         _, body_a, body_b, link_a, link_b, on_a, on_b, normal, dist, push = point[:10]
         if dist > 0 and not push:
@@ -298,20 +304,20 @@ def contacts_of(
         if pair[0] > pair[1]:
             pair, normal, force = (pair[1], pair[0]), -normal, -force
         frame = _axes(normal)
-        touches.append(
+        contacts.append(
             BulletContact(pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force))
         )
-    return _as_contacts(touches)
+    return _as_contacts(contacts)
 
 
-def _as_contacts(touches: list[BulletContact]) -> Contacts:
-    """Return n contacts as arrays; PyBullet tells of no torque."""
-    n = len(touches)
-    geoms = np.array([touch.geoms for touch in touches], dtype=np.int64)
-    distances = np.array([touch.distance for touch in touches], dtype=np.float64)
-    positions = np.array([touch.position for touch in touches], dtype=np.float64)
-    frames = np.array([touch.frame for touch in touches], dtype=np.float64)
-    forces = np.array([touch.force for touch in touches], dtype=np.float64)
+def _as_contacts(contacts: list[BulletContact]) -> Contacts:
+    """Return n contacts as arrays; PyBullet reports no torque."""
+    n = len(contacts)
+    geoms = np.array([contact.geoms for contact in contacts], dtype=np.int64)
+    distances = np.array([contact.distance for contact in contacts], dtype=np.float64)
+    positions = np.array([contact.position for contact in contacts], dtype=np.float64)
+    frames = np.array([contact.frame for contact in contacts], dtype=np.float64)
+    forces = np.array([contact.force for contact in contacts], dtype=np.float64)
     return Contacts(
         geom=geoms.reshape(n, 2),
         dist=distances,
@@ -324,8 +330,8 @@ def _as_contacts(touches: list[BulletContact]) -> Contacts:
 
 def _axes(normal: Array) -> Array:
     """Return the contact axes (3, 3) as rows, the first the normal."""
-    aside = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
-    first = aside - normal * dense.dot(normal, aside)
+    other_axis = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
+    first = other_axis - normal * dense.dot(normal, other_axis)
     first /= math.hypot(*first)
     return np.array([normal, first, np.cross(normal, first)])
 

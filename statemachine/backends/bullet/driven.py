@@ -30,7 +30,7 @@ from .world import Tree, World
 if TYPE_CHECKING:
     from ..compiled.types import MjModel
 
-_TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
+_AVAILABLE = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
 Act = Callable[[World], None]  # sets something in a world that was opened
 
 
@@ -61,7 +61,7 @@ class DrivenWorld(HiddenWorld):
         self._arms: list[Any]
         if kind == "engine":
             self._arms = [Motors(world, tree, raw) for tree in trees]
-            self.unavailable = frozenset(DERIVED) - {*POSES, *_TOLD}
+            self.unavailable = frozenset(DERIVED) - {*POSES, *_AVAILABLE}
         else:
             self._arms = [JointDynamics(raw, world, tree, ghost_of(plan)) for tree in trees]
             self.memory_layout = (("contact", self._nv), ("friction", self._nv))
@@ -94,7 +94,7 @@ class DrivenWorld(HiddenWorld):
 
     def command(self, ctrl: Array) -> None:
         """Command every arm, and place again what is fixed to a mocap body that moves."""
-        if len(ctrl) > self._nu and self.raw.lead(ctrl[self._nu :]) and self._placed:
+        if len(ctrl) > self._nu and self.raw.move_mocap(ctrl[self._nu :]) and self._placed:
             self.place(*self._placed)
         for arm in self._arms:
             arm.command(ctrl)
@@ -166,7 +166,7 @@ class DrivenWorld(HiddenWorld):
         return *memory[:2], self._plan.raw.key_act[key]
 
     def look(self, moment: Moment) -> None:
-        """Take one step from it, whose law is solved as if there had been none before."""
+        """Take one step from a moment, with joint dynamics solved as if no step preceded it."""
         self.place(moment.qpos, moment.qvel, moment.memory)
         self.command(moment.ctrl)
         self.step(afresh=True)
@@ -176,7 +176,7 @@ class DrivenWorld(HiddenWorld):
         """Return poses by the engine's own kinematics, in a world that is never stepped."""
         with HiddenWorld.lock:
             ghost = ghost_of(self._plan)
-            ghost.lead(moment.ctrl[self._nu :])
+            ghost.move_mocap(moment.ctrl[self._nu :])
             return ghost.poses(moment.qpos, name)
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
@@ -186,7 +186,9 @@ class DrivenWorld(HiddenWorld):
         world, raw = self.raw, self._plan.raw
         if name == "contacts":
             points = pb.getContactPoints(physicsClientId=world.client)
-            return {name: contacts_of(raw, points, world.geoms_of_links, world.geom_turns, read)}
+            return {
+                name: contacts_of(raw, points, world.geoms_of_links, world.geom_rotations, read)
+            }
         values = {name: np.zeros(raw.nv) for name in DERIVED if name not in POSES}
         for arm in self._arms:
             for part, array in arm.forces().items():

@@ -68,7 +68,7 @@ class Drives:
         tree: Tree,
         tendons: Tendons,
         off: Mapping[str, bool],
-        later: float,
+        implicit_time: float,
         inertia: Array,
     ) -> None:
         """Take the actuators of a tree.
@@ -78,7 +78,7 @@ class Drives:
             tree: The tree.
             tendons: Its tendons.
             off: What the model switches off.
-            later: The part of a step by which forces feel the velocity that comes of them [s].
+            implicit_time: How much of a step's change of velocity forces feel within it [s].
             inertia: (2, n, n) of the tree's joints: what constraints feel, and what moves.
         """
         joints = raw.dof_jntid[tree.dofs]
@@ -95,11 +95,11 @@ class Drives:
         self._across = self._gear.T.copy()
         # What has no slope where its joint is beyond its range: MuJoCo asks by joints.
         self._on_joints = np.abs(self._across) * ~on_tendon[ids, None]
-        self._tendons, self._later = tendons, later
+        self._tendons, self._implicit_time = tendons, implicit_time
         # Of what pulls on a path through space: its column, gear and tendon.
         self._paths: list[PathDrive] = []
         for column, a in enumerate(ids):
-            if on_tendon[a] and (tendon := tendons.ids.index(target[a])) in tendons.bent:
+            if on_tendon[a] and (tendon := tendons.ids.index(target[a])) in tendons.spatial:
                 gear = float(raw.actuator_gear[raw.actuator_outadr[a], 0])
                 self._paths.append(PathDrive(column, gear, tendon))
         affine = raw.actuator_biastype[ids] == BiasKind.AFFINE
@@ -108,7 +108,7 @@ class Drives:
         self._bias = bias
         feedback = [bias[:, k, None] * self._across for k in (1, 2)]
         self.feedback = np.column_stack([*feedback, bias[:, 0]])
-        self._slope, self._inertia = -later * self._gear * bias[:, 2], inertia
+        self._slope, self._inertia = -implicit_time * self._gear * bias[:, 2], inertia
         self._unsaturated = self._with_slope(np.ones(len(ids)))
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = bounds_of(raw.actuator_forcerange[ids], limited)
@@ -169,7 +169,7 @@ class Drives:
             self._gain[k], feedback[k] = muscle.gain(at, moving), muscle.bias(at)
             rise = muscle.gain(at, moving + _NUDGE) - muscle.gain(at, moving - _NUDGE)
             damping[k] = rise / (2 * _NUDGE) * acting[k]
-        self._slope = -self._later * self._gear * damping
+        self._slope = -self._implicit_time * self._gear * damping
         self._unsaturated = self._with_slope(np.ones(len(damping)))
         return feedback
 

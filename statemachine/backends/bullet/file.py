@@ -19,7 +19,7 @@ from ..file_text import urdf_text
 from .client import as_file, load_urdf
 
 # PyBullet has room for 128 numbers of a tree, and of a position for 7 of its base; from 122 joints
-# on what it tells is wrong, and from 127 links on it has no such tree.
+# on what it reports is wrong, and from 127 links on it has no such tree.
 MOST_LINKS = 120
 
 
@@ -30,7 +30,7 @@ class UrdfFile:
     Attributes:
         path: Where it is: PyBullet looks for meshes from there.
         content: Its bytes.
-        floats: Whether PyBullet floats its base, which is its default: where `load` was told
+        floats: Whether PyBullet floats its base, which is its default: where `load` was given
             base="free", or the file has a joint of type floating. Else it is fixed to the world, as
             MuJoCo's compiler does, by `useFixedBase`.
         may_float: Whether it would float in PyBullet, unless it is told to fix it: the first link

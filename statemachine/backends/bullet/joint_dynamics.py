@@ -1,7 +1,7 @@
 """MuJoCo's servos, armature, friction, limits and equality constraints on an engine without them.
 
-PyBullet knows no armature, and a servo law in plain torque diverges on a light arm.
-So the law is solved here, implicitly, for the true arm; the engine's own arm is made to
+PyBullet knows no armature, and a servo in plain torque diverges on a light arm.
+So the joint dynamics are solved here, implicitly, for the true arm; the engine's own arm is made to
 follow, and what contacts do to it is observed and put into the next solution.
 
 Let M, c be mass matrix and bias of the true arm (the "ghost"), A its armature, D its

@@ -34,7 +34,7 @@ class LoadedBodies:
         close: Gives the client back. Idempotent.
         trees: The trees of the model, the world's own geoms first.
         geoms_of_links: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
-        geom_turns: By geom that touches, the matrix (3, 3) from its body's axes into its own.
+        geom_rotations: By geom that touches, the matrix (3, 3) from its body's axes into its own.
     """
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
@@ -87,7 +87,7 @@ class LoadedBodies:
     def _base_of_file(self, tree: FileTree) -> tuple[Any, Any]:
         """Give the inertial frame of the base in the frame of the link that the free joint moves.
 
-        They are held together by fixed joints. PyBullet tells of centres of mass, in double
+        They are held together by fixed joints. PyBullet reports centres of mass, in double
         precision.
         """
         state = pb.getLinkState(
@@ -157,7 +157,7 @@ class LoadedBodies:
         self.geoms_of_links = {
             (body, link): (solid.body, solid.geoms) for body, link, solid in self.solids()
         }
-        self.geom_turns = {
+        self.geom_rotations = {
             g: matrix_from_quat(raw.geom_quat[g]).T.copy()
             for _, geoms in self.geoms_of_links.values()
             for g in geoms
@@ -170,7 +170,7 @@ class LoadedBodies:
             )
             self._take_surfaces()
         bodies = [tree.body for tree in self.trees] + list(self._planes.values())
-        self._homes = [(b, pb.getBasePositionAndOrientation(b, self.client)) for b in bodies]
+        self._base_poses = [(b, pb.getBasePositionAndOrientation(b, self.client)) for b in bodies]
 
     def _take_surfaces(self) -> None:
         """Take the softness and friction of links, and which of them meet."""

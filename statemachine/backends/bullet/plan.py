@@ -57,7 +57,7 @@ class Plan:
         names: What everything is called in a URDF.
         mechanism: (nbody,) the root of the mechanism that each body is of: see `mechanisms`.
         roots: The roots of the mechanisms, each of which PyBullet has as one body.
-        ghost: See `bullet_driven`; None until it is needed.
+        ghost: See `driven`; None until it is needed.
         described: Gives the text and the files of a mechanism; see `_describe`.
         file: The URDF that a world as it comes reads itself; None where one is written for it.
         weighed: Whether the links of a world as it comes get the inertias of `raw`, not those of
@@ -93,13 +93,13 @@ class Plan:
         bodies = self.bodies(root)
         if not urdf.floats(raw, root) or len(bodies) > 1:
             return urdf.floats(raw, root) or any(urdf.axes(raw, body) for body in bodies)
-        own = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
-        laws = raw.dof_armature, raw.dof_damping, raw.dof_frictionloss
+        dofs = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
+        emulated = raw.dof_armature, raw.dof_damping, raw.dof_frictionloss
         medium = raw.opt.density or raw.opt.viscosity or raw.body_gravcomp[root]
         ends = [b for eq in range(raw.neq) for b in ends_of(raw, eq)]
         ends += [b for tendon in range(raw.ntendon) for b in movers(raw, tendon)]
         tied = root in raw.body_rootid[ends]
-        return bool(medium or tied or any(law[own].any() for law in laws))
+        return bool(medium or tied or any(values[dofs].any() for values in emulated))
 
     @cached_property
     def padding(self) -> Array:
@@ -199,7 +199,7 @@ def _padding(raw: MjModel) -> Array:
     """Return as much of the armature as the observer of contacts bears.
 
     It converges while what contact meets, the padded arm, is less than twice what the
-    law reckons with, M + A: the largest eigenvalue of (M + A)⁻¹·(M + padding) is kept
+    joint dynamics are solved with, M + A: the largest eigenvalue of (M + A)⁻¹·(M + padding) is kept
     below `_BEARABLE` in a sample of poses.
     """
     share, data = _SHARE * raw.dof_armature, new_data(raw)
@@ -241,8 +241,8 @@ def _padding_at(raw: MjModel, data: MjData, share: Array) -> Array:
         moving, turning = jacobian(raw, data, body, data.xipos[body])
         slides = raw.jnt_type[j] == JointType.SLIDE
         shape = urdf.padding_shape(data.xaxis[j])
-        own = moving.T @ moving if slides else turning.T @ shape @ turning
-        total += share[dof] * own
+        unit = moving.T @ moving if slides else turning.T @ shape @ turning
+        total += share[dof] * unit
     return total
 
 
@@ -350,8 +350,8 @@ def _inset(vertices: Array, meeting: Sequence[Array], distance: float) -> Array:
     """
     most = max(map(len, meeting))
     normals, goal = np.zeros((len(vertices), most, 3)), np.zeros((len(vertices), most, 1))
-    for k, own in enumerate(meeting):
-        normals[k, : len(own)], goal[k, : len(own)] = own, -distance
+    for k, faces in enumerate(meeting):
+        normals[k, : len(faces)], goal[k, : len(faces)] = faces, -distance
     steps = (np.linalg.pinv(normals, rcond=1e-6) @ goal)[..., 0]
     far = np.linalg.norm(steps, axis=1, keepdims=True)
     return vertices + steps * np.minimum(1.0, 4 * distance / np.maximum(far, 1e-300))

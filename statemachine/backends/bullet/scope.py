@@ -46,7 +46,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     Args:
         plan: The compiled model and what can touch what in it.
         backend: For the message.
-        as_it_comes: Whether nothing is emulated: then the law of the tree is not there either.
+        as_it_comes: Whether nothing is emulated: then there are no joint dynamics either.
     """
     raw = plan.raw
     whole = {"flex": raw.nflex, "plugin": raw.nplugin}
@@ -54,7 +54,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     parts = list(_of_joints(raw))
     if not plan.file:  # else it reads the file itself, and what it knows nothing of has no effect
         if as_it_comes:
-            problems += _of_the_law(raw)
+            problems += _of_joint_dynamics(raw)
         problems += _between_robots(plan)
         for found in (_of_bodies(plan), _of_actuators(raw), _of_ties(raw), _of_geoms(plan)):
             parts += found
@@ -74,7 +74,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     )
 
 
-def _of_the_law(raw: MjModel) -> list[tuple[str, str]]:
+def _of_joint_dynamics(raw: MjModel) -> list[tuple[str, str]]:
     """Return what the adapter emulates, and the engine as it comes has nothing of."""
     dynamics_of_tendons = (
         raw.tendon_stiffness,

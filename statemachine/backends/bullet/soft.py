@@ -1,4 +1,4 @@
-"""MuJoCo's soft constraint: how it yields, what it aims at, and its row in the law of a tree.
+"""MuJoCo's soft constraint: how it yields, what it aims at, and its row in the joint dynamics.
 
 [MuJoCo's manual, chapter Computation, section Constraint model.]
 """

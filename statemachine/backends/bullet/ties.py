@@ -1,7 +1,7 @@
 """What ties bodies, tendons and equality constraints, and which trees are one mechanism by it.
 
 MuJoCo's compiler makes a palm that is fixed to the world a part of the world. The fingers of a
-gripper are then trees of their own, though its URDF is one robot. PyBullet's law of a tree solves
+gripper are then trees of their own, though its URDF is one robot. `JointDynamics` solve
 the constraints of one of the engine's bodies. So trees that stand on the world and are tied to one
 another are written as one robot: a mechanism.
 """

@@ -1,6 +1,6 @@
 """The kinematics and dynamics of the trees in a client of PyBullet's, by its own algorithms.
 
-Inverse dynamics, mass matrix and Jacobians, told in MuJoCo's coordinates: a floating base moves by
+Inverse dynamics, mass matrix and Jacobians, in MuJoCo's coordinates: a floating base moves by
 its origin in the world's axes, and turns in its own.
 """
 
@@ -31,7 +31,7 @@ class TreeDynamics(LoadedBodies):
     """Bodies in a client, and what the engine computes of the trees that they are.
 
     Attributes:
-        client, close, trees, geoms_of_links, geom_turns: As of LoadedBodies.
+        client, close, trees, geoms_of_links, geom_rotations: As of LoadedBodies.
     """
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
@@ -71,7 +71,7 @@ class TreeDynamics(LoadedBodies):
         """Return the generalised force (n,) that gives a tree an acceleration, by inverse dynamics.
 
         PyBullet takes the angles of a base in another order than it gives them. So a tree that
-        floats is told to it in the axes of its base, and gravity turned into them.
+        floats is passed to it in the axes of its base, and gravity turned into them.
 
         Args:
             tree: The tree.
@@ -157,7 +157,7 @@ class TreeDynamics(LoadedBodies):
         return self.frames(bodies, *self.centres(tree, links))
 
     def frames(self, bodies: Sequence[int], centres: Array, axes: Array) -> tuple[Array, Array]:
-        """Return the xpos (n, 3) and xquat (n, 4) of bodies, from what `centres` tells of their
+        """Return the xpos (n, 3) and xquat (n, 4) of bodies, from what `centres` returns of their
         links.
         """
         quats = quat_times(wxyz_from_xyzw(axes), self._inward[bodies])
@@ -187,14 +187,14 @@ class TreeDynamics(LoadedBodies):
             point: (3,) in the world.
         """
         where, turned = pose
-        # What the engine tells is of the origin of the link, where its last joint is.
+        # What the engine reports is of the origin of the link, where its last joint is.
         origin = where + dense.times(turned, urdf.anchor(self._raw, body))
         zeros, angles = [0.0] * len(tree.joints), q[7 * tree.free :]
         if tree.joints:
             rows = pb.calculateJacobian(
                 tree.body, tree.links[body], (0.0, 0.0, 0.0), angles, zeros, zeros, self.client
             )
-        else:  # of a body without joints it tells nothing
+        else:  # of a body without joints it reports nothing
             rows, origin = (np.eye(6)[3:], np.eye(6)[:3]), np.array(q[:3])
         moving, turning = (np.array(part) for part in rows)
         if tree.free:

@@ -23,7 +23,7 @@ class Tree:
         root: MuJoCo's id of its root, of several trees that of the first.
         body: PyBullet's id of it.
         free: Whether it floats: its first joint is then the root's free joint.
-        driven: Whether a law drives it, because it has joints, or more than gravity moves it.
+        driven: Whether `JointDynamics` drive it: it has joints, or more than gravity moves it.
         joints: PyBullet's indices of its joints, but for the free one.
         dofs: (n,) degrees of freedom: the six of a free joint, then those of the joints.
         base: How many of them are the free joint's.

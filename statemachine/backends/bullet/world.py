@@ -36,7 +36,7 @@ class World(TreeDynamics):
     """Bodies in a client of PyBullet's, and their state: set, followed and read.
 
     Attributes:
-        client, close, trees, geoms_of_links, geom_turns: As of LoadedBodies.
+        client, close, trees, geoms_of_links, geom_rotations: As of LoadedBodies.
     """
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
@@ -52,7 +52,7 @@ class World(TreeDynamics):
             ModelError: PyBullet cannot read what was written for it.
         """
         super().__init__(plan, kind)
-        self._led = b""  # what `lead` was told last
+        self._mocap_poses = b""  # what `move_mocap` was called with last
         # Where a base stands that PyBullet does not move, though it has a free joint.
         self._stands: Array | None = None
         self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
@@ -67,12 +67,12 @@ class World(TreeDynamics):
         """
         return self._plan.standing()
 
-    def lead(self, poses: Array) -> bool:
+    def move_mocap(self, poses: Array) -> bool:
         """Put the mocap bodies (7·n,) where `HiddenWorld.command` wants them; whether one moved."""
         raw, still = self._raw, self.still
-        if poses.tobytes() == self._led:
+        if poses.tobytes() == self._mocap_poses:
             return False
-        self._led = poses.tobytes()
+        self._mocap_poses = poses.tobytes()
         still.mocap_pos.flat, still.mocap_quat.flat = np.split(poses, [3 * raw.nmocap])
         compute_kinematics(raw, still)
         for number, tree in enumerate(self.trees):
@@ -81,7 +81,7 @@ class World(TreeDynamics):
                 turn = quat_times(still.xquat[tree.root], raw.body_quat[tree.root] * INVERSE)
                 shift = dense.times(matrix_from_quat(turn), raw.body_pos[tree.root])
                 pose = (still.xpos[tree.root] - shift).tolist(), xyzw_from_wxyz(turn).tolist()
-                self._homes[number] = tree.body, pose
+                self._base_poses[number] = tree.body, pose
                 pb.resetBasePositionAndOrientation(tree.body, *pose, self.client)
         return True
 
@@ -96,11 +96,11 @@ class World(TreeDynamics):
         self.put(qpos, qvel)
         # Links of one body cannot be taken apart: for a moment they do not meet.
         self.set_collision_groups(0, 0)
-        for i, (body, (_, quat)) in enumerate(self._homes, start=1):
+        for i, (body, (_, quat)) in enumerate(self._base_poses, start=1):
             pb.resetBasePositionAndOrientation(body, (0, 0, _AWAY * i), quat, self.client)
         pb.performCollisionDetection(self.client)
         self.set_collision_groups(1, -1)
-        for body, (pos, quat) in self._homes:
+        for body, (pos, quat) in self._base_poses:
             if body not in self._frames:
                 pb.resetBasePositionAndOrientation(body, pos, quat, self.client)
         self.put(qpos, qvel)
@@ -160,7 +160,7 @@ class World(TreeDynamics):
         """Return the pose of a base; of a quaternion and its negative the one nearer to the last.
 
         They are one rotation. The engine changes between them at will, MuJoCo never:
-        to be told after each step, so that a body that turns far keeps its sign.
+        to be passed after each step, so that a body that turns far keeps its sign.
         """
         where, quat = pb.getBasePositionAndOrientation(body, self.client)
         x, y, z, w = quat

@@ -333,7 +333,7 @@ def _names(m: mujoco.MjModel, kind: str, count: int) -> tuple[str, ...]:
 
 
 def _actuator_facts(m: mujoco.MjModel) -> dict[str, Any]:
-    """Return what a Model tells of its actuators."""
+    """Return the facts of a Model about its actuators."""
     owner, servo = servos(m)
     on_joint = (m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))[owner]
     gain, bias = m.actuator_gainprm[owner, 0], m.actuator_biasprm[owner]

@@ -36,7 +36,7 @@ def compile_with(path: Path, options: ReadOptions) -> tuple[mujoco.MjModel, list
 
     Args:
         path: An MJCF or URDF file.
-        options: As `load` was told.
+        options: As `load` was given.
 
     Returns:
         The compiled model, and what the options changed.
@@ -74,7 +74,7 @@ def prepare(spec: mujoco.MjSpec, options: ReadOptions) -> list[Repair]:
 
     Args:
         spec: The specification, which was not compiled yet.
-        options: As `load` was told.
+        options: As `load` was given.
 
     Returns:
         What they changed of what the file says: of the base it is nothing but its free joint, which
@@ -143,7 +143,7 @@ def effects(path: Path, options: ReadOptions, repairs: Iterable[Repair]) -> Iter
 
     Args:
         path: The file, which compiles with these options.
-        options: As `load` was told.
+        options: As `load` was given.
         repairs: As of `compile_with`.
     """
     changes = [_balanced(repair) for repair in repairs if repair.quantity == "inertia"]

@@ -104,7 +104,7 @@ class AlarmError(Exception):
         return f"{self.quantity}[{self.index}]{name}"
 
 
-def ended(model: Model, alarm: AlarmError, who: str) -> BadInputError | DivergedError:
+def end_error(model: Model, alarm: AlarmError, who: str) -> BadInputError | DivergedError:
     """Return the error for a Data or a world that has diverged, as `who` names it."""
     kind, happened = DivergedError, f"became NaN, infinite or huge at time {alarm.time:g} s"
     if alarm.quantity == "ctrl":
@@ -152,7 +152,7 @@ class Alarms:
         self._seen[:] = 0
         listen()
 
-    def attend(self) -> None:
+    def raise_pending(self) -> None:
         """Look at what MuJoCo warned of since the last time, and pass it on.
 
         Raises:

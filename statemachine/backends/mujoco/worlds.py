@@ -26,7 +26,7 @@ from .alarms import (
     FATAL,
     AlarmError,
     Alarms,
-    ended,
+    end_error,
     gave_up,
     listen,
     listen_for,
@@ -216,10 +216,10 @@ class MujocoWorlds(Worlds):
                     mujoco.mj_step(raw, data, count)
                 else:
                     mujoco.mj_forward(raw, data)
-                alarms.attend()
+                alarms.raise_pending()
                 raise AlarmError("qpos", 0, float(self.time[world]))  # it did not happen again
             except AlarmError as alarm:
-                errors[world] = ended(self.model, alarm, f"World {world}")
+                errors[world] = end_error(self.model, alarm, f"World {world}")
         return errors
 
     def _reset(self, ids: Ints, key: int | None) -> None:

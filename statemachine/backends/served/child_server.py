@@ -47,10 +47,10 @@ _PROTOCOL = 4  # of Python 3.9, and earlier
 SPIN, LONGEST, MORE, PAUSE = 50e-6, 1e-3, 10e-6, -500e-6
 
 
-def send(pipe, said, arrays) -> None:
-    """Send a message: what is said, and arrays of numbers by name."""
+def send(pipe, facts, arrays) -> None:
+    """Send a message: what is facts, and arrays of numbers by name."""
     packed = {name: (a.shape, a.dtype.str, a.tobytes()) for name, a in arrays.items()}
-    pickle.dump((said, packed), pipe, _PROTOCOL)
+    pickle.dump((facts, packed), pipe, _PROTOCOL)
     pipe.flush()
 
 
@@ -70,7 +70,7 @@ def receive(pipe, patience):
     while os.name != "nt" and calm and now < until and not select.select([pipe], [], [], 0)[0]:
         before, now = now, time.perf_counter()
         calm = now - before < SPIN
-    said, packed = pickle.load(pipe)
+    facts, packed = pickle.load(pipe)
     waited = time.perf_counter() - began
     if not calm or waited > LONGEST:
         patience = PAUSE
@@ -80,7 +80,7 @@ def receive(pipe, patience):
         name: np.frombuffer(buffer, kind).reshape(shape).copy()
         for name, (shape, kind, buffer) in packed.items()
     }
-    return said, arrays, patience
+    return facts, arrays, patience
 
 
 class Answerer:
@@ -95,28 +95,32 @@ class Answerer:
         return id(thing)
 
     def load(self, job, edits):
-        """Compile a file, and edit fields; the fields that were asked for, as the file has them."""
+        """Compile a file and edit fields; return the model's number, and the fields as in the file.
+
+        Raises:
+            ValueError: The file is another one than when it was loaded.
+        """
         names = job.get("fields", ())
-        told = {"read": job["read"]} if "read" in job else {}
-        model, said, fields = self.engine.load(job["file"], job["text"], names, **told)
+        options = {"read": job["read"]} if "read" in job else {}
+        model, facts, fields = self.engine.load(job["file"], job["text"], names, **options)
         read = (array.tobytes() for array in fields.values())
-        digest = hashlib.sha256(b"".join([repr(said).encode(), *read])).hexdigest()
+        digest = hashlib.sha256(b"".join([repr(facts).encode(), *read])).hexdigest()
         if job.get("digest", digest) != digest:
             raise ValueError(job["file"] + " is another file than when it was loaded")
         if edits or job.get("flags"):
             self.engine.edit(model, edits, job["flags"])
-        return {"model": self.keep(model), "digest": digest, **said}, fields
+        return {"model": self.keep(model), "digest": digest, **facts}, fields
 
     def written(self, job, _):
         """Return the MJCF that the engine writes of a file."""
-        told = {"read": job["read"]} if "read" in job else {}
-        return {"text": self.engine.written(job["file"], job["text"], **told)}, {}
+        options = {"read": job["read"]} if "read" in job else {}
+        return {"text": self.engine.written(job["file"], job["text"], **options)}, {}
 
     def make(self, job, _):
         """Make a world of a model."""
         world = self.engine.Simulation(self.things[job["model"]])
-        said = {name: getattr(world, name) for name in ("memory", "kept_memory", "unavailable")}
-        return {"world": self.keep(world), **said}, {}
+        facts = {name: getattr(world, name) for name in ("memory", "kept_memory", "unavailable")}
+        return {"world": self.keep(world), **facts}, {}
 
     def run(self, job, arrays):
         """Place a state if one is given, take a command and steps, and one more if it is asked."""

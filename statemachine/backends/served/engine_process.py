@@ -43,7 +43,7 @@ class ServedEngine(NamedTuple):
     title: str
 
     @property
-    def anew(self) -> str:
+    def remedy(self) -> str:
         """Return what to type to make the environment of a release anew."""
         return f"statemachine engines remove {self.name}, then add"
 
@@ -57,8 +57,8 @@ class LoadedModel:
         version: Of the engine.
         digest: Of what it read, by which a file that changed since then is seen.
         flags: Names of the flags that are set, by the names of their sets; empty where the engine
-            tells of none.
-        names: Names of the elements, by kind; empty where the engine tells of none.
+            reports none.
+        names: Names of the elements, by kind; empty where the engine reports none.
         fields: Numeric fields that were asked for, by name, as far as the engine has them.
     """
 
@@ -194,7 +194,7 @@ class Server:
         name, version = self._engine.name, loaded.version
         if is_release(name) and version != version_of(name):
             self.forgotten.append(loaded.number)
-            raise EngineError(f"the environment of {name} has {version}: {self._engine.anew}")
+            raise EngineError(f"the environment of {name} has {version}: {self._engine.remedy}")
         return loaded
 
     def written(self, text: str, file: str, **job: Any) -> str:

@@ -17,7 +17,7 @@ import mujoco
 
 from ...errors import EngineError, ModelError, one_line
 from ...interface.checks import unsupported_by
-from ...interface.read_options import told
+from ...interface.read_options import non_default_options
 from ...interface.records import AS_WRITTEN, ReadOptions
 from ...release_names import is_release
 from ..compiled.model import check_numbers, compiler_warnings
@@ -100,7 +100,7 @@ def source_of(engine: ServedEngine, path: Path, options: ReadOptions) -> EngineS
     if options == AS_WRITTEN:
         return EngineSource()
     if not is_release(engine.name):
-        wanted = next(iter(told(options)))
+        wanted = next(iter(non_default_options(options)))
         raise unsupported_by(engine.name, wanted, "it reads an MJCF as it is written")
     return EngineSource(read=asdict(options))
 
@@ -134,7 +134,7 @@ def read_by(engine: ServedEngine, installed: MujocoModel, source: EngineSource) 
     except AnswerError as error:
         raise ModelError(f"{title} cannot read {path}: {error}") from error
     except (LostError, OSError) as error:
-        anew = f"; to make it anew: {engine.anew}" if is_release(engine.name) else ""
+        anew = f"; to make it anew: {engine.remedy}" if is_release(engine.name) else ""
         raise EngineError(f"{title} cannot be run: {error}{anew}") from error
     server.forgotten.append(loaded.number)
     fields, raw, frames = loaded.fields, copy.copy(installed.raw), _frames(installed)

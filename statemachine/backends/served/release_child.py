@@ -22,7 +22,7 @@ def _beside(name):
 
 _parts = _beside("release_parts.py")
 PARTS, contact_arrays = _parts["PARTS"], _parts["contact_arrays"]
-constraint_part, held = _parts["constraint_part"], _parts["held"]
+constraint_part, owner_of_field = _parts["constraint_part"], _parts["owner_of_field"]
 
 HUGE = 1e10
 POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
@@ -117,13 +117,13 @@ def load(file, text, names, read=None):
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     fields = {}
     for name in names:
-        holder, field = held(model, name)
+        holder, field = owner_of_field(model, name)
         value = getattr(holder, field, None)
         if isinstance(value, (np.ndarray, int, float)):
             fields[name] = np.asarray(value, float)
     flags = {f"opt.{kind}flags": flags_of(model, kind) for kind in KINDS}
-    said = {"version": mujoco.__version__, "flags": flags, "names": names_of(model)}
-    return model, said, fields
+    facts = {"version": mujoco.__version__, "flags": flags, "names": names_of(model)}
+    return model, facts, fields
 
 
 def compiled(file, text, read=None):
@@ -167,9 +167,13 @@ def spec_with_options(file, read):
 
 
 def edit(model, edits, flags):
-    """Write other values into some fields of a model, and these flags."""
+    """Write other values into some fields of a model, and these flags.
+
+    Raises:
+        ValueError: The release has no such flag.
+    """
     for name, value in edits.items():
-        holder, field = held(model, name)
+        holder, field = owner_of_field(model, name)
         now = getattr(holder, field)
         if isinstance(now, np.ndarray):
             now[...] = value.reshape(now.shape)
@@ -181,7 +185,7 @@ def edit(model, edits, flags):
         model.stat.meaninertia = other.stat.meaninertia
         model.flexedge_invweight0[:] = other.flexedge_invweight0
     for name, wanted in flags.items():
-        holder, field = held(model, name)
+        holder, field = owner_of_field(model, name)
         kinds = KINDS[field[: -len("flags")]].__members__
         merged = {old for old, new in SPLIT.items() if old in kinds and set(new) <= set(wanted)}
         parts = {part for old in merged for part in SPLIT[old]}  # which are one flag here

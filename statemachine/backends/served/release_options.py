@@ -16,7 +16,11 @@ _LEAST = 1e-12
 
 
 def spec_with_options(file, balance_inertia, meshes, base, start, least_mass):
-    """Return the spec of a file that is read with options."""
+    """Return the spec of a file that is read with options.
+
+    Raises:
+        ValueError: The release is older than 3.2, and has no MjSpec.
+    """
     if not hasattr(mujoco, "MjSpec"):
         raise ValueError("before 3.2 MuJoCo has no MjSpec: it reads an MJCF as it is written")
     spec = mujoco.MjSpec.from_file(file)

@@ -43,7 +43,7 @@ def constraint_part(model, data, part):
     return total
 
 
-def held(model, name):
+def owner_of_field(model, name):
     """Return the owner of a field, and its name there: "opt.timestep", "body_mass"."""
     holder, _, field = name.rpartition(".")
     return (getattr(model, holder) if holder else model), field

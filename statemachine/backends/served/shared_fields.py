@@ -14,7 +14,7 @@ import numpy as np
 from ...interface.records import Arrays
 from ..edits import put
 from . import release_child as child
-from .release_parts import held
+from .release_parts import owner_of_field
 
 # Arrays that no motion depends on, and what each release computes of the others in its own way.
 _OWN = (
@@ -58,7 +58,7 @@ def take_over_flags(raw: mujoco.MjModel, name: str, set_there: list[str]) -> Non
         for own in child.SPLIT.get(flag, (flag,)):
             if own in kinds:
                 bits += int(kinds[own])
-    setattr(*held(raw, name), bits)
+    setattr(*owner_of_field(raw, name), bits)
 
 
 def field_names(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
@@ -75,4 +75,4 @@ def field_names(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iter
 
 
 def field_of(raw: mujoco.MjModel, name: str) -> Any:
-    return getattr(*held(raw, name))
+    return getattr(*owner_of_field(raw, name))

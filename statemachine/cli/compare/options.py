@@ -17,12 +17,12 @@ from ..common import (
     add_seconds,
     add_seed,
     add_timestep,
-    experiments,
     file_name,
     flag_of,
     is_given,
-    shorten_help,
 )
+from ..experiments import experiments
+from ..help_all import shorten_help
 
 PARTS = ("actuators", "floor")  # of a file, that another side can have, too
 
@@ -32,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Run something on two sides, or open recorded traces, and compare: each quantity\n"
         "with its tolerance and a verdict. An experiment alone, or with one FILE, runs on\n"
-        "both engines; the ctrl of one trace is played on the other engine.\n\n"
+        "both engines; the commands of one trace are played on the other engine.\n\n"
         "A side is FILE, FILE@ENGINE or FILE@ENGINE:engine (as the engine's own users\n"
         "meet it), and options behind it, such as timestep=0.002 contacts=off:\n"
         f"  {PROGRAM} compare hold A.xml\n"

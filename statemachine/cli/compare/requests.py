@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from ...errors import BadInputError
 from ...installed import PAIR
-from ..common import EXPERIMENTS, PROGRAM, pairs_of
+from ..common import PROGRAM
+from ..experiments import EXPERIMENTS
 from .options import PARTS, refuse_options
 
 if TYPE_CHECKING:
@@ -235,3 +236,22 @@ def _check_words_of_models(options: argparse.Namespace) -> None:
                 f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
                 f"{others}; to run something, type {PROGRAM} compare {run}"
             )
+
+
+def pairs_of(words: Iterable[str], option: str) -> dict[str, str]:
+    """Read names of the left and what the right calls them, from words A=B.
+
+    Args:
+        words: As typed.
+        option: The option, for the message.
+
+    Raises:
+        BadInputError: A word is not of that form.
+    """
+    names: dict[str, str] = {}
+    for text in words:
+        left, sign, right = text.partition("=")
+        if not (left and sign and right):
+            raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
+        names[left] = right
+    return names

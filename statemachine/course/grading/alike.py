@@ -42,11 +42,11 @@ class Nearest:
     """The submission that another one is most like.
 
     Attributes:
-        name: Of it.
+        student: Who handed it in, or the name of the file.
         likeness: How much they are alike, 0 to 1.
     """
 
-    name: str
+    student: str
     likeness: float
 
 
@@ -70,6 +70,7 @@ def compare_submissions(submitted: Sequence[Submission]) -> ClassLikeness:
     What is handed out does not count.
     """
     codes = {each.name: _code_of(each) for each in submitted}
+    labels = {each.name: each.label for each in submitted}
     pairs: dict[tuple[str, str], float] = {}
     nearest: dict[str, Nearest] = {}
     for left, right in itertools.combinations(codes, 2):
@@ -77,8 +78,7 @@ def compare_submissions(submitted: Sequence[Submission]) -> ClassLikeness:
         pairs[left, right] = share
         for one, other in ((left, right), (right, left)):
             if share > 0 and (one not in nearest or share > nearest[one].likeness):
-                nearest[one] = Nearest(other, share)
-    labels = {each.name: each.label for each in submitted}
+                nearest[one] = Nearest(labels[other], share)
     groups: list[AlikeGroup] = []
     for names in _groups_of(codes, pairs):
         shares = [pairs[pair] for pair in itertools.combinations(names, 2)]

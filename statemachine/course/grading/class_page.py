@@ -145,7 +145,7 @@ def class_table(entries: Sequence[ClassEntry]) -> Table:
         columns[_short(name)] = _marker_of(name)
     columns["tests"] = lambda entry: entry.tests.partition(";")[0]
     columns["predictions"] = lambda entry: entry.predictions
-    columns["most like"] = lambda entry: entry.alike.replace(" ", "\u00a0")
+    columns["most like"] = lambda entry: _unbroken(entry.alike)
     filled = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
     return Table.of(entries, filled, words=filled, wide={"predictions", "most like"})
 
@@ -162,14 +162,12 @@ def functions_table(functions: Sequence[FunctionCount]) -> Table:
 
 def mistakes_table(mistakes: Sequence[Mistake]) -> Table:
     """Make the table of the commonest mistakes, each of several students."""
-    columns: dict[str, Callable[[Mistake], str]] = {
-        "students": lambda mistake: str(mistake.count),
-        "function": _functions_of,
-        "mistake": lambda mistake: mistake.remark,
-        "who": lambda mistake: ", ".join(mistake.students),
-    }
-    common = [mistake for mistake in mistakes if mistake.count >= COMMON]
-    return Table.of(common[:_COMMONEST], columns, words=("function", "mistake", "who"))
+    rows: list[list[str]] = []
+    for mistake in mistakes[:_COMMONEST]:
+        if mistake.count >= COMMON:
+            students = ", ".join(map(_unbroken, mistake.students))
+            rows.append([str(mistake.count), _functions_of(mistake), mistake.remark, students])
+    return Table(("students", "function", "mistake", "who"), rows, words=frozenset(range(4)))
 
 
 def remarks_table(entries: Sequence[ClassEntry]) -> Table:
@@ -198,6 +196,11 @@ def _functions_of(mistake: Mistake) -> str:
 def _label(entry: ClassEntry) -> str:
     """Return who handed a submission in, or its name."""
     return entry.label
+
+
+def _unbroken(name: str) -> str:
+    """Return a name that stays on one line."""
+    return name.replace(" ", "\u00a0")
 
 
 def _right_of(entry: ClassEntry) -> str:

@@ -38,7 +38,8 @@ class ClassEntry:
         tests: How many faults the student's tests catch, and which they do not.
         predictions: How many were right.
         student: Who handed it in, by the roster.
-        nearest: The submission whose code is most like it; "" where none has any of it.
+        nearest: Whose submission is most like it, as `label` names them; "" where none has any
+            of its code.
         likeness: How much the two are alike, 0 to 1; see `likeness`.
     """
 

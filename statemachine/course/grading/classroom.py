@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...atomic_files import replace_csv
 from ...errors import BadInputError, StateMachineError
-from ...lab.runs.drive import Progress, silent
+from ...lab.runs.drive import Progress, no_progress
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel
 from . import judged_before, score
@@ -35,7 +35,7 @@ def judge_all(
     jobs: int | None = None,
     table: Path | None = None,
     tests: bool = False,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     comparison: ClassLikeness | None = None,
 ) -> list[ClassEntry]:
     """Judge every submission, several at once.
@@ -114,7 +114,7 @@ def _with_facts(entry: ClassEntry, submission: Submission, comparison: ClassLike
     predictions = submission.named(_PREDICTIONS)
     nearest = comparison.nearest.get(submission.name)
     if nearest is not None:
-        entry = replace(entry, nearest=nearest.name, likeness=nearest.likeness)
+        entry = replace(entry, nearest=nearest.student, likeness=nearest.likeness)
     return replace(
         entry,
         name=submission.name,

@@ -24,8 +24,8 @@ from ... import __version__, errors
 from ...backends import backend_engine
 from ...errors import BadInputError, EngineError
 from ...installed import DEFAULT, engine_version
-from ...lab.runs.drive import Progress, silent
-from ...models import AnyPath, what_is_there
+from ...lab.runs.drive import Progress, no_progress
+from ...models import AnyPath, kind_of_path
 from ...processes import sandbox
 from ...processes.parallel import in_parallel, unwinding
 from ...release_names import is_release
@@ -105,7 +105,7 @@ def run(
     file: AnyPath,
     backend: str = DEFAULT,
     time_limit: float = TIME_LIMIT,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     wall_limit: float = WALL_LIMIT,
     folder: Path | None = None,
 ) -> Grade:
@@ -186,7 +186,7 @@ class ExerciseJudge(ExitStack):
     def judge(
         self,
         file: AnyPath,
-        progress: Progress = silent,
+        progress: Progress = no_progress,
         own: Mapping[str, Path] | None = None,
     ) -> Grade:
         """Judge each function of a student's file.
@@ -323,7 +323,7 @@ def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Ju
 def _python_file(path: Path) -> Path:
     try:
         path = path.expanduser().resolve()
-        kind = what_is_there(path)
+        kind = kind_of_path(path)
     except (OSError, ValueError, RuntimeError) as error:
         raise BadInputError(f"no file can have this name: {error}") from None
     if kind == "a folder":

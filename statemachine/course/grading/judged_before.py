@@ -21,6 +21,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from ...atomic_files import replace_text
 from ...models import models_dir
 from ...processes import sandbox
 from .judges import JUDGES, Judgement
+
+T = TypeVar("T")
 
 _VARIABLE = "STATEMACHINE_JUDGED"
 _KIND = "statemachine verdicts 1"
@@ -112,7 +115,8 @@ class VerdictStore:
 def folder() -> Path | None:
     """Return where verdicts are kept: $STATEMACHINE_JUDGED, or a folder of the user's cache.
 
-    None where that variable is empty, and where a student's code is not shut in.
+    None where that variable is empty, where this user has no home, and where a student's code is
+    not shut in.
     """
     if not sandbox.shut_in():
         return None
@@ -120,7 +124,10 @@ def folder() -> Path | None:
     if named is not None:
         return Path(named) if named else None
     cache_folder = os.environ.get("XDG_CACHE_HOME")
-    base = Path(cache_folder) if cache_folder else Path.home() / ".cache"
+    try:
+        base = Path(cache_folder) if cache_folder else Path.home() / ".cache"
+    except RuntimeError:  # this user has no home
+        return None
     return base / "statemachine" / "judged"
 
 
@@ -146,22 +153,30 @@ def _software(root: Path) -> Iterable[Path]:
                 yield Path(place, name)
 
 
-def _judgement(facts: dict[str, str | bool | list[str]]) -> Judgement:
+def _judgement(facts: dict[str, Any]) -> Judgement:
     """Return a judgement as it was kept.
 
     Raises:
         LookupError, TypeError: It is none.
     """
-    function, remarks = facts["function"], facts["remarks"]
-    flags = [facts["written"], facts["passed"], facts["judged"]]
-    if not isinstance(function, str) or not isinstance(remarks, list):
+    texts = facts["remarks"]
+    if isinstance(texts, str):
         raise TypeError("no judgement")
-    if not all(isinstance(flag, bool) for flag in flags):
+    function = _typed(facts["function"], str)
+    remarks = tuple(_typed(text, str) for text in texts)
+    written, passed = _typed(facts["written"], bool), _typed(facts["passed"], bool)
+    return Judgement(function, written, passed, remarks, _typed(facts["judged"], bool))
+
+
+def _typed(value: Any, kind: type[T]) -> T:
+    """Return a value of a type.
+
+    Raises:
+        TypeError: It is of another one.
+    """
+    if not isinstance(value, kind):
         raise TypeError("no judgement")
-    if not all(isinstance(remark, str) for remark in remarks):
-        raise TypeError("no judgement")
-    written, passed, judged = (flag is True for flag in flags)
-    return Judgement(function, written, passed, tuple(remarks), judged)
+    return value
 
 
 def _remove_old(kept_in: Path) -> None:

@@ -86,6 +86,7 @@ FURTHER = Option("--further", "", "show what goes further, after the lesson")
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
 _JOINT = Option("--joint", "JOINT", "joint to write (default shoulder_lift, if there is one)")
 _VALUE = Option("--value", "X", "what to write [rad or m] (default 0.8, if in range)")
+_CTRL = Option("--ctrl", "X,X,…", "command, one number an actuator [rad for a servo]")
 _SITE = Option("--site", "SITE", "the fingertip (default gripperframe, or the last site)")
 
 _LESSONS = (
@@ -131,7 +132,7 @@ _LESSONS = (
         "so101/scene",
         (
             Option("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),
-            Option("--target", "X,X,…", "command, one number an actuator [rad for a servo]"),
+            _CTRL,
             FURTHER,
         ),
         plots=True,
@@ -164,7 +165,7 @@ _LESSONS = (
         "so101/scene_box",
         (
             Option("--steps", "N", "steps of each run (default 600)", {"default": 600}),
-            Option("--ctrl", "X,X,…", "command, one number an actuator [rad for a servo]"),
+            _CTRL,
             Option(
                 "--break",
                 "extra-step|late-ctrl",

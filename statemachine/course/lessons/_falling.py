@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from ...errors import UnsupportedError
 from ...interface import Array, Data, forward
-from ...lab.runs.drive import steps_in
-from ...lab.runs.robot import carried_by_joint, touching
-from ...measures.text import NONE, position
+from ...lab.runs.drive import number_of_steps
+from ...lab.runs.robot import carried_by_joint, contact_names
+from ...measures.text import NO_NUMBER, position
+from ...show.blocks import Table
 from ._robot import coordinate
 
 BALANCE = 1e-3  # N·m or N; a sum below it is zero
@@ -20,7 +21,7 @@ _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 _AT_REST = 1e-4  # the same; below it nothing of the model moves
 
-SERVO, EQUALITY = "servo", "equality"  # two of the parts, as a page calls them
+SERVO, CONTACT, EQUALITY = "servo", "contact", "equality"  # parts, as a page calls them
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Forces:
             SERVO: self.actuator,
             "springs, damping": self.passive,
             "dry friction": self.friction,
-            "contact": self.contact,
+            CONTACT: self.contact,
             "joint limit": self.limit,
             EQUALITY: self.equality,
         }
@@ -97,7 +98,7 @@ class Droop:
         most_acceleration: The largest of the whole model [rad/s² or m/s²].
         touches: When each contact of what the joint carries was first found [s]; the longer
             runs look at their end only.
-        touching: Those that are there at the end.
+        contact_names: Those that are there at the end.
         ctrl_untouched: Whether ctrl still is what it was at the start.
     """
 
@@ -111,13 +112,13 @@ class Droop:
     acceleration: float = np.nan
     most_acceleration: float = np.nan
     touches: dict[str, float] = field(default_factory=dict[str, float])
-    touching: Sequence[str] = ()
+    contact_names: Sequence[str] = ()
     ctrl_untouched: bool = True
 
     def at(self, row: int, slide: bool, decimals: int = 2) -> str:
         """Return a position of the joint as text; a slower engine's run may be shorter."""
         if row >= len(self.position):
-            return NONE
+            return NO_NUMBER
         value = float(self.position[row])
         return "diverged" if np.isnan(value) else position(value, slide, decimals)
 
@@ -143,7 +144,7 @@ class Droop:
         if self.moves:
             return "still moves"
         if load is None or self.forces.total is None:
-            return NONE
+            return NO_NUMBER
         if abs(load) < BALANCE:
             return "no load"
         against = {
@@ -174,7 +175,7 @@ def droop(
         diverged: When the engine gave up [s].
     """
     model, dof = data.model, coordinate(data.model, joint).dof
-    time = np.array(milestones(steps_in(model, seconds) * model.timestep))
+    time = np.array(milestones(number_of_steps(model, seconds) * model.timestep))
     rows = np.rint(time / model.timestep).astype(int)
     position = np.full(len(time), np.nan)
     position[rows < len(path)] = path[rows[rows < len(path)]]
@@ -182,7 +183,7 @@ def droop(
     if diverged is not None:
         return run
     forward(model, data)
-    pairs_at_end = touching(model, data.contacts, carried_by_joint(model, joint))
+    pairs_at_end = contact_names(model, data.contacts, carried_by_joint(model, joint))
     first: dict[str, float] = {}
     for moment, pairs in (*touches, (data.time, pairs_at_end)):
         for pair in pairs:
@@ -191,7 +192,7 @@ def droop(
         _with_dynamics(run, data, dof),
         qpos=data.qpos.copy(),
         touches=first,
-        touching=pairs_at_end,
+        contact_names=pairs_at_end,
         ctrl_untouched=np.array_equal(data.ctrl, ctrl),
     )
 
@@ -212,3 +213,16 @@ def milestones(seconds: float) -> list[float]:
     later = (part * 10.0**decade for decade in range(1, 8) for part in (1, 2, 3, 5))
     marks = (0.0, 1.0, 2.0, 3.0, 4.0, *later)
     return [mark for mark in marks if mark < seconds * (1 - 1e-9)] + [seconds]
+
+
+def course_table(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
+    """Show where the joint is at some moments of each run."""
+    times = max((run.time for run in runs.values()), key=len)
+    rows: list[tuple[str, ...]] = []
+    for k, time in enumerate(times):
+        cells = [
+            run.at(k, slide, decimals=3 if name.endswith("on") else 2) for name, run in runs.items()
+        ]
+        rows.append((f"{time:.2f} s", *cells))
+    headers = [name.replace(": ", "\n") for name in runs]
+    return Table(("time", *headers), rows, title=title)

@@ -10,7 +10,7 @@ from ...backends import load as load_model
 from ...engines import raw_engine_of
 from ...interface import Data, Model, make_data, reset, step
 from ...lab.runs.drive import Progress
-from ...lab.runs.in_turns import Ratio, in_turns
+from ...lab.runs.interleaved_timing import Ratio, time_interleaved
 from ...measures.text import count, duration
 from ...show.blocks import Block
 from ...show.lesson_template import UNDECIDED, Words, by_engine, differences
@@ -64,7 +64,7 @@ def measured(model: Model, steps: int, progress: Progress) -> LoopCost:
     ways: dict[str, Callable[[], None]] = {}
     for name, variant in models.items():
         ways[name] = _way(variant, _started(variant), rounds, bulk=name != _LOOP)
-    walls = in_turns(ways, len(rounds), progress)
+    walls = time_interleaved(ways, len(rounds), progress)
     seconds = {name: sum(times) for name, times in walls.items()}
     bulk_rounds = tuple(walls[_BULK])
     loop = Ratio.of(_LOOP, walls[_LOOP], bulk_rounds)
@@ -124,16 +124,14 @@ def _way(model: Model, data: Data, rounds: Sequence[int], bulk: bool) -> Callabl
 
 def loop_slots(cost: LoopCost) -> dict[str, Any]:
     """Return what the page's slots take of the cost of a loop."""
-    return {
-        "loop_right": _right(cost),
-        "told_apart": cost.told_apart,
-        "loop_steps": count(cost.nstep, "step"),
-        "step_cost": duration(cost.bulk / cost.nstep),
-        "loop_rounds": count(cost.loop.rounds, "round"),
-        "loop_cost": f"{cost.loop.median:.2f}",
-        "noise": f"{cost.null.median:.2f}",
-        "own_way": cost.as_it_comes is not None,
-    }
+    slots: dict[str, Any] = {"loop_right": _right(cost), "told_apart": cost.told_apart}
+    slots["loop_steps"] = count(cost.nstep, "step")
+    slots["step_cost"] = duration(cost.bulk / cost.nstep)
+    slots["loop_rounds"] = count(cost.loop.rounds, "round")
+    slots["loop_cost"] = f"{cost.loop.median:.2f}"
+    slots["noise"] = f"{cost.null.median:.2f}"
+    slots["own_way"] = cost.as_it_comes is not None
+    return slots
 
 
 def _right(cost: LoopCost) -> int | str:
@@ -168,11 +166,10 @@ def loop_tables(results: Mapping[str, LoopCost], say: Words) -> list[Block]:
 
 def _times(results: Mapping[str, LoopCost], say: Words) -> Block:
     """Return the wall time of each way by engine."""
-    rows: dict[str, Callable[[LoopCost], str]] = {
-        say("in_bulk"): lambda cost: _by_the_clock(cost, cost.bulk),
-        say("one_by_one"): lambda cost: _by_the_clock(cost, cost.one_by_one),
-        say("one_step"): lambda cost: f"{cost.bulk / cost.nstep * 1e6:.1f} µs",
-    }
+    rows: dict[str, Callable[[LoopCost], str]] = {}
+    rows[say("in_bulk")] = lambda cost: _by_the_clock(cost, cost.bulk)
+    rows[say("one_by_one")] = lambda cost: _by_the_clock(cost, cost.one_by_one)
+    rows[say("one_step")] = lambda cost: f"{cost.bulk / cost.nstep * 1e6:.1f} µs"
     if any(cost.as_it_comes is not None for cost in results.values()):
         rows[say("own_bulk")] = lambda cost: _as_it_comes(cost, say)
     return by_engine(results, rows, say("times"))

@@ -12,8 +12,8 @@ from typing import Any
 from ...interface import Data, Model, make_data
 from ...interface import reset as reset_data
 from ...interface import step as step_data
-from ...lab.runs.drive import Progress, part_of
-from ...lab.runs.in_turns import Ratio, in_turns
+from ...lab.runs.drive import Progress, progress_of_stage
+from ...lab.runs.interleaved_timing import Ratio, time_interleaved
 from ...measures.text import count, duration
 from ...processes import free_memory, resident_memory
 from ...show.blocks import Block, Table
@@ -57,14 +57,14 @@ class ManyWorlds:
         world_bytes: Memory of one of many worlds [bytes]; None where it cannot be measured.
         shared: Whether several Data share one compiled model.
         costs: What some numbers of worlds cost, from the smallest on.
-        limit: Why there are no more worlds; "" if nothing limits them here.
+        free_bytes: Memory that is free [bytes], if it is the reason for no more worlds.
     """
 
     data_bytes: float | None
     world_bytes: float | None
     shared: bool
     costs: tuple[WorldsCost, ...]
-    limit: str
+    free_bytes: float | None
 
 
 def measured(model: Model, most: int, progress: Progress) -> ManyWorlds:
@@ -87,13 +87,13 @@ def measured(model: Model, most: int, progress: Progress) -> ManyWorlds:
     data_bytes = _share(before, len(several))
     for data in several[1:]:
         data.close()
-    limit = ""
+    free_bytes = None
     if not shared:
         world_bytes = data_bytes
-        most, limit = _limit(most, data_bytes)
+        most, free_bytes = _limit(most, data_bytes)
     with several[0] as data:
         costs = _costs(model, data, most, progress)
-    return ManyWorlds(data_bytes, world_bytes, shared, tuple(costs), limit)
+    return ManyWorlds(data_bytes, world_bytes, shared, tuple(costs), free_bytes)
 
 
 def _costs(model: Model, data: Data, most: int, progress: Progress) -> list[WorldsCost]:
@@ -111,7 +111,7 @@ def _costs(model: Model, data: Data, most: int, progress: Progress) -> list[Worl
     sizes = [n for n in sizes if n <= most]
     costs = []
     for k, n in enumerate(sizes):
-        share = part_of(progress, k / len(sizes), 1 / len(sizes))
+        share = progress_of_stage(progress, k / len(sizes), 1 / len(sizes))
         costs.append(_cost(model, data, n, share))
     return costs
 
@@ -138,21 +138,20 @@ def _world_bytes(model: Model, most: int) -> float | None:
     return size
 
 
-def _limit(most: int, data_bytes: float | None) -> tuple[int, str]:
-    """Return how many worlds to make where each has an engine's own, and why not more.
+def _limit(most: int, data_bytes: float | None) -> tuple[int, float | None]:
+    """Return how many worlds to make where each has an engine's own.
 
     Args:
         most: How many are asked for.
         data_bytes: Memory of one Data [bytes]; None where it cannot be measured.
+
+    Returns:
+        Their number, and the memory that is free [bytes] if it allows no more, else None.
     """
     most, free = min(most, _MOST_APART), free_memory()
-    reason = "each has a world of the engine's own"
-    if data_bytes is not None:
-        reason += f", of about {_memory(data_bytes)}"
-        if free is not None and free < most * _CAUTION * data_bytes:
-            most = max(1, int(free / (_CAUTION * data_bytes)))
-            reason += f", and {_memory(free)} are free"
-    return most, reason
+    if data_bytes is None or free is None or free >= most * _CAUTION * data_bytes:
+        return most, None
+    return max(1, int(free / (_CAUTION * data_bytes))), free
 
 
 def _cost(model: Model, data: Data, n: int, progress: Progress) -> WorldsCost:
@@ -169,7 +168,7 @@ def _cost(model: Model, data: Data, n: int, progress: Progress) -> WorldsCost:
             "worlds": lambda: step(worlds, rows),
             "one": lambda: step_data(model, data, steps),
         }
-        walls = in_turns(ways, _ROUNDS, progress)
+        walls = time_interleaved(ways, _ROUNDS, progress)
         of_one_world = [wall / (n * rows) for wall in walls["worlds"]]
         of_one_data = [wall / steps for wall in walls["one"]]
         return WorldsCost(
@@ -183,22 +182,22 @@ def _cost(model: Model, data: Data, n: int, progress: Progress) -> WorldsCost:
 
 def _walls(call: Callable[[], object], times: int) -> list[float]:
     """Return the wall time of each of so many calls [s]."""
-    return in_turns({"": call}, times)[""]
+    return time_interleaved({"": call}, times)[""]
 
 
 def slots_of_worlds(worlds: ManyWorlds) -> dict[str, Any]:
     """Return what the page's slots take of many worlds."""
     gaining = _gaining(worlds.costs)
     best = max(gaining if gaining else worlds.costs, key=lambda cost: cost.faster.median)
-    return {
-        "limit": worlds.limit,
-        "most_worlds": count(worlds.costs[-1].n, "world"),
-        "gain": bool(gaining),
-        "gain_from": count(gaining[0].n if gaining else 0, "world"),
-        "best": count(best.n, "world"),
-        "best_step": duration(best.step),
-        "best_gain": f"{best.faster.median:.2f}",
-    }
+    slots: dict[str, Any] = {"apart": not worlds.shared, "gain": bool(gaining)}
+    slots["scarce"] = worlds.free_bytes is not None
+    slots["world_size"], slots["free_size"] = map(_memory, (worlds.data_bytes, worlds.free_bytes))
+    slots["most_worlds"] = count(worlds.costs[-1].n, "world")
+    slots["gain_from"] = count(gaining[0].n if gaining else 0, "world")
+    slots["best"] = count(best.n, "world")
+    slots["best_step"] = duration(best.step)
+    slots["best_gain"] = f"{best.faster.median:.2f}"
+    return slots
 
 
 def _gaining(costs: Sequence[WorldsCost]) -> Sequence[WorldsCost]:

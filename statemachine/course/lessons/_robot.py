@@ -9,11 +9,11 @@ from typing import Any
 from ...errors import BadInputError
 from ...interface import JointType, Model, make_data
 from ...lab.runs.robot import (
-    farther,
+    holding_force_size,
     is_servo,
-    load_at_start,
     scalar_joint,
     start_keyframe,
+    target_towards_farther_end,
 )
 from ...measures.text import command
 
@@ -76,13 +76,16 @@ def usual_joint(model: Model, servos: bool = False) -> str:
     driven = model.actuator_jntid[is_servo(model)] if servos else model.actuator_jntid
     named = [j for j, name in enumerate(names) if name and kinds[j] != JointType.BALL]
     if not named:
-        what = "names none of its joints" if model.njnt else "has no joints"
-        raise BadInputError(f"{model.path.name} {what}, and this lesson is about one")
+        if not model.njnt:
+            raise BadInputError(f"{model.path.name} has no joints, and this lesson is about one")
+        raise BadInputError(
+            f"{model.path.name} names none of its joints, and this lesson is about one"
+        )
     scalar = [j for j in named if kinds[j] != JointType.FREE]
     candidates = [j for j in scalar if j in driven]
     if not candidates:
         candidates = scalar if scalar else named
-    load = load_at_start(model)
+    load = holding_force_size(model)
     return names[max(candidates, key=lambda j: load[coordinate(model, names[j]).dof])]
 
 
@@ -98,7 +101,7 @@ def usual_value(model: Model, joint: str) -> float:
         start = float(data.qpos[at.place])
     value = start + _SHIFT
     if limited and low < high:
-        value = farther(start, (low, high))
+        value = target_towards_farther_end(start, (low, high))
     return float(f"{value:.3g}")
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -12,11 +14,13 @@ from ...interface import Array, Data, Model, get_state, make_data, reset, set_st
 from ...measures import largest
 from ...measures.text import millimetres
 from ...show.blocks import Block, Table
-from ...show.lesson_template import where
+from ...show.lesson_template import Words, where
 from ...show.pictures import Traces
 
 BREAKS = ("extra-step", "late-ctrl")
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
+_MUCH = 3  # times; a difference that is so much smaller has shrunk
+_WIDE, _NARROW = 14, 8  # signs of the longest bar, of one engine and of several
 _SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}
 
 
@@ -30,6 +34,7 @@ class BrokenRun:
         peak: The largest |qpos difference| on the way [rad, m or part of a quaternion].
         peak_step: After which step.
         end: The same at the end.
+        gap: (n+1,) the same after each step.
     """
 
     way: str
@@ -37,6 +42,12 @@ class BrokenRun:
     peak: float
     peak_step: int
     end: float
+    gap: Array = field(metadata={"json": False})
+
+    @property
+    def course(self) -> Literal["grows", "shrinks", "stays"]:
+        """What becomes of the difference by the end."""
+        return course_of(self.gap)
 
 
 def broken(way: str, first: Array, second: Array) -> BrokenRun:
@@ -50,25 +61,44 @@ def broken(way: str, first: Array, second: Array) -> BrokenRun:
     gap = np.abs(first - second).max(axis=1)
     peak, peak_step = largest(gap)
     close = bool(np.allclose(first[-1], second[-1]))
-    return BrokenRun(way, close, peak, peak_step, end=float(gap[-1]))
+    return BrokenRun(way, close, peak, peak_step, float(gap[-1]), gap)
 
 
-def broken_table(results: Mapping[str, Sequence[BrokenRun]]) -> list[Table]:
-    """Show what became of the second runs that were made to differ, by backend."""
-    rows: list[tuple[str, ...]] = []
-    for name, runs in results.items():
-        prefix = where(results, name)
-        rows += [_broken_row(prefix, run) for run in runs]
-    if not rows:
+def course_of(gap: Array) -> Literal["grows", "shrinks", "stays"]:
+    """Tell what becomes of a difference (n+1,) by the end: it is largest then, or much smaller."""
+    peak, step = largest(gap)
+    if gap[-1] < peak / _MUCH:
+        return "shrinks"
+    return "grows" if step == len(gap) - 1 else "stays"
+
+
+def broken_table(results: Mapping[str, Sequence[BrokenRun]], say: Words) -> list[Block]:
+    """Show what became of second runs that were made to differ: by the end, and step by step.
+
+    Args:
+        results: By backend.
+        say: The words of the lesson.
+    """
+    runs: dict[str, BrokenRun] = {}
+    for name, broken_runs in results.items():
+        for run in broken_runs:
+            runs[f"{where(results, name)}{_SHORT[run.way]}"] = run
+    if not runs:
         return []
-    headers = ("broken on purpose", "largest", "at the end", "allclose", "array_equal")
-    return [Table(headers, rows, "And if the second run is made to differ by one step")]
+    rows = [_broken_row(label, run) for label, run in runs.items()]
+    headers = (say("broken"), "largest", "at the end", "allclose", "array_equal")
+    curves = {label: (list(range(len(run.gap))), run.gap.tolist()) for label, run in runs.items()}
+    return [
+        *_growth_tables(runs, say),
+        Traces(say("grown"), "step", say("gap"), curves, log=True),
+        Table(headers, rows, say("ends")),
+    ]
 
 
-def _broken_row(prefix: str, run: BrokenRun) -> tuple[str, ...]:
+def _broken_row(label: str, run: BrokenRun) -> tuple[str, ...]:
     """Return the cells of a run."""
     return (
-        f"{prefix}{_SHORT[run.way]}",
+        label,
         f"{run.peak:.1e}, step {run.peak_step}",
         f"{run.end:.1e}",
         "equal" if run.close else "not equal",
@@ -76,27 +106,73 @@ def _broken_row(prefix: str, run: BrokenRun) -> tuple[str, ...]:
     )
 
 
-def growth(differences: Mapping[str, Array], bodies: Mapping[str, Array | None]) -> list[Block]:
+def _growth_tables(runs: Mapping[str, BrokenRun], say: Words) -> list[Table]:
+    """Show the differences of two runs after some of the steps, drawn by their powers of ten."""
+    tables: list[Table] = []
+    for pair in _pairs(runs):
+        steps = _steps_shown(len(next(iter(pair.values())).gap) - 1)
+        columns = {"after step": [str(step) for step in steps]}
+        for label, run in pair.items():
+            gaps = [float(run.gap[step]) for step in steps]
+            columns[label] = [f"{gap:.1e}" for gap in gaps]
+            columns[f"{label}, drawn"] = _drawn(gaps, _WIDE if len(runs) <= 2 else _NARROW)
+        rows = list(zip(*columns.values(), strict=True))
+        drawn = frozenset(range(2, len(columns), 2))
+        headers = [name if k not in drawn else "" for k, name in enumerate(columns)]
+        tables.append(Table(headers, rows, say("grown"), drawn))
+    return tables
+
+
+def _pairs(runs: Mapping[str, BrokenRun]) -> list[dict[str, BrokenRun]]:
+    """Return the runs two by two, as many as a table has room for."""
+    pairs: list[dict[str, BrokenRun]] = []
+    for label, run in runs.items():
+        if not pairs or len(pairs[-1]) == 2:
+            pairs.append({})
+        pairs[-1][label] = run
+    return pairs
+
+
+def _steps_shown(nstep: int) -> list[int]:
+    """Return the steps after which a table shows a difference."""
+    return [step for step in _STEPS if step < nstep] + [nstep]
+
+
+def _drawn(gaps: Sequence[float], width: int) -> list[str]:
+    """Draw each difference as a bar, the longest of some width, by its power of ten."""
+    powers = [math.log10(gap) for gap in gaps if gap > 0]
+    if not powers:
+        return [""] * len(gaps)
+    least, most = math.floor(min(powers)), max(powers)
+    span = max(most - least, 1.0)
+    lengths = [round(width * (math.log10(gap) - least) / span) if gap > 0 else 0 for gap in gaps]
+    return ["█" * max(length, int(gap > 0)) for length, gap in zip(lengths, gaps, strict=True)]
+
+
+def growth(
+    differences: Mapping[str, Array], bodies: Mapping[str, Array | None], say: Words
+) -> list[Block]:
     """Show the difference after some of the steps, and after all of them as curves.
 
     Args:
         differences: By backend, the largest |qpos difference| after each step (n+1,).
         bodies: By backend, the distance of the free body's positions (n+1,) [m], if there is one.
+        say: The words of the lesson.
     """
     nstep = len(next(iter(differences.values()))) - 1
-    steps = [step for step in _STEPS if step < nstep] + [nstep]
+    steps = _steps_shown(nstep)
     columns = {"after step": [str(step) for step in steps]}
     for name, difference in differences.items():
         prefix, distance = where(differences, name), bodies[name]
         columns[f"{prefix}|Δqpos|"] = [f"{difference[step]:.1e}" for step in steps]
         if distance is not None:
             columns[f"{prefix}free body"] = [millimetres(distance[step], 4) for step in steps]
-    title = "How far the two runs are apart"
+    title = say("grown")
     every_step = list(range(nstep + 1))
     curves = {name: (every_step, gap.tolist()) for name, gap in differences.items()}
     return [
         Table(tuple(columns), list(zip(*columns.values(), strict=True)), title),
-        Traces(title, "step", "largest |Δqpos|", curves, log=True),
+        Traces(title, "step", say("gap"), curves, log=True),
     ]
 
 
@@ -142,11 +218,11 @@ def restore_methods(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBac
             setattr(written, name, array)
         put_back = go_on(written)
     futures = {
-        "reset to the keyframe": (anew, first),
-        "a new Data, same keyframe": (again, first),
-        "set_state, against going on": (once, rest),
-        "set_state, done twice": (twice, once),
-        "qpos, qvel, ctrl put back": (put_back, rest),
+        "reset": (anew, first),
+        "new Data": (again, first),
+        "set_state": (once, rest),
+        "set_state twice": (twice, once),
+        "put back": (put_back, rest),
     }
     return tuple(
         WayBack(name, difference=float(np.abs(second - first).max(initial=0.0)))
@@ -154,31 +230,33 @@ def restore_methods(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBac
     )
 
 
-def through_us(results: Mapping[str, Sequence[WayBack]]) -> Table:
-    """Show what the ways of this interface lead to, by backend."""
+def through_us(results: Mapping[str, Sequence[WayBack]], say: Words) -> list[Table]:
+    """Show what the ways of this interface lead to, by backend, where they were tried."""
+    if not any(results.values()):
+        return []
     rows: list[tuple[str, ...]] = []
     for ways in zip(*results.values(), strict=True):
-        cells = [_exactly(way.difference) for way in ways]
-        rows.append((ways[0].name, *cells))
-    title = "Ways to go back to an earlier state. The next 100 steps are then …"
-    return Table(("", *results), rows, title)
+        cells = [_exactly(way.difference, say) for way in ways]
+        rows.append((say(ways[0].name), *cells))
+    return [Table(("", *results), rows, say("ways"))]
 
 
-def of_its_own(results: Mapping[str, Sequence[WayBack]]) -> list[Table]:
+def of_its_own(results: Mapping[str, Sequence[WayBack]], say: Words) -> list[Table]:
     """Show what the engines' own ways lead to, where they were tried."""
     return [
         Table.of(
             ways,
             {
                 f"{name} itself": lambda way: way.name,
-                "what follows is …": lambda way: _exactly(way.difference),
+                say("follows"): lambda way: _exactly(way.difference, say),
             },
-            f"The ways back that {name}'s own users have, tried on it alone",
+            say("own_ways", engine=name),
         )
         for name, ways in results.items()
         if ways
     ]
 
 
-def _exactly(difference: float) -> str:
-    return "the same, bit by bit" if difference == 0 else f"off by {difference:.1e}"
+def _exactly(difference: float, say: Words) -> str:
+    """Say whether a future is the same, or by how much it is not."""
+    return say("same") if difference == 0 else say("off", difference=f"{difference:.1e}")

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...interface import Array, Model
 from ...interface.checks import as_scalar
-from ...lab.runs.drive import Progress, steps_in
+from ...lab.runs.drive import Progress, number_of_steps
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import tips_of, usual_tip
 from ...measures import largest
@@ -60,6 +60,41 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class WrittenEntry:
+    """An entry of qpos right after it was written, as several names show it.
+
+    Attributes:
+        place: Its index.
+        view: What another name for `data.qpos` says [rad or m].
+        copy: What a copy of it says that was made before the write [rad or m].
+        in_engine: What the engine's own memory says [rad or m]; None where the engine keeps its
+            state elsewhere.
+    """
+
+    place: int
+    view: float
+    copy: float
+    in_engine: float | None
+
+
+@dataclass(frozen=True)
+class Further:
+    """What else is looked at after the four readings.
+
+    Attributes:
+        effects: What the next step makes of the write, and what is refused.
+        itself: What the engine does without us, where some of this is emulated.
+        changes: What each call changes.
+        lag: Of which moment derived values are after a step.
+    """
+
+    effects: WriteEffects
+    itself: tuple[OwnAnswer, ...]
+    changes: tuple[ArrayChange, ...]
+    lag: Lag
+
+
+@dataclass(frozen=True)
 class ForwardResult:
     """Four readings of the fingertip around a write, and what goes further.
 
@@ -72,16 +107,8 @@ class ForwardResult:
         moved: Distance that the write and the second `forward` moved it [m].
         contacts: How many were found after the second `forward`.
         deepest: How far the two surfaces of the worst of them are inside each other [m].
-        place: Index of the entry of qpos that was written.
-        view: What another name for `data.qpos` says right after the write [rad or m].
-        copy: What a copy of it says that was made before the write [rad or m].
-        in_engine: The entry as the engine's own memory shows it then [rad or m]; None where the
-            engine keeps its state elsewhere.
-        further: What follows from the write, and what is refused; None where what goes further
-            was not asked for.
-        itself: What the engine does without us, where some of this is emulated.
-        changes: What each call changes, if what goes further was asked for.
-        lag: Of which moment derived values are after a step, if it was.
+        written: The entry of qpos that was written.
+        further: What else was looked at; None where what goes further was not asked for.
         provenance: What it was computed with.
     """
 
@@ -93,14 +120,8 @@ class ForwardResult:
     moved: float
     contacts: int
     deepest: float
-    place: int
-    view: float
-    copy: float
-    in_engine: float | None
-    further: WriteEffects | None
-    itself: tuple[OwnAnswer, ...]
-    changes: tuple[ArrayChange, ...]
-    lag: Lag | None
+    written: WrittenEntry
+    further: Further | None
     provenance: Provenance
 
 
@@ -151,17 +172,11 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
         if source.startswith("print("):
             data = play.names["data"]
             readings.append(Reading(actions[len(readings)], tip.read(data), data.time))
+    written = WrittenEntry(at.place, float(view[at.place]), float(copy[at.place]), in_memory)
     contacts = play.names["data"].contacts
     deepest = max(0.0, -float(contacts.dist.min(initial=0.0)))
     moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
-    further = lag = None
-    itself: list[OwnAnswer] = []
-    changes: list[ArrayChange] = []
-    if options["further"]:
-        further = effects_of(model, at, value)
-        itself += [*own_answers(model, "write"), *own_answers(model, "step")]
-        changes += changes_by_call(model, at.place, value)
-        lag = lag_of_steps(model, tip, _steps(model, options), progress)
+    further = _further(model, options, progress) if options["further"] else None
     return ForwardResult(
         joint=joint,
         site=options["site"],
@@ -171,15 +186,21 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
         moved=moved,
         contacts=len(contacts),
         deepest=deepest,
-        place=at.place,
-        view=float(view[at.place]),
-        copy=float(copy[at.place]),
-        in_engine=in_memory,
+        written=written,
         further=further,
-        itself=tuple(itself),
-        changes=tuple(changes),
-        lag=lag,
         provenance=provenance(model),
+    )
+
+
+def _further(model: Model, options: Options, progress: Progress) -> Further:
+    """Look at what the next step makes of the write, at each array, and at the lag of a step."""
+    at, tip = coordinate(model, options["joint"]), tips_of(model, options["site"])[0]
+    itself = (*own_answers(model, "write"), *own_answers(model, "step"))
+    return Further(
+        effects=effects_of(model, at, options["value"]),
+        itself=itself,
+        changes=tuple(changes_by_call(model, at.place, options["value"])),
+        lag=lag_of_steps(model, tip, _steps(model, options), progress),
     )
 
 
@@ -195,7 +216,7 @@ def _equal_pairs(readings: Sequence[Reading]) -> _Pairs:
 def _steps(model: Model, options: Options) -> int:
     """Return over how many steps to look at the lag."""
     seconds = options["seconds"]
-    return steps_in(model, _SECONDS if seconds is None else seconds)
+    return number_of_steps(model, _SECONDS if seconds is None else seconds)
 
 
 def diagram(model: Model) -> Diagram:
@@ -209,9 +230,11 @@ def slots(result: ForwardResult) -> dict[str, Any]:
     slots["right"] = _CHOICES.get(result.equal)
     slots["zero_at_first"] = not result.readings[0].fingertip.any()
     slots["unchanged"] = (1, 2) in result.equal
-    slots["is_view"] = result.view == result.value != result.copy
-    slots["in_memory"] = result.in_engine is not None
-    slots["engine_agrees"] = result.in_engine == result.value
+    written = result.written
+    slots |= vars(written)
+    slots["is_view"] = written.view == result.value != written.copy
+    slots["in_memory"] = written.in_engine is not None
+    slots["engine_agrees"] = written.in_engine == result.value
     slots["moved"] = millimetres(result.moved, 1)
     slots["moves"] = result.moved > 0
     slots["no_time_passed"] = len({reading.time for reading in result.readings}) == 1
@@ -222,8 +245,10 @@ def slots(result: ForwardResult) -> dict[str, Any]:
         result, "zeros when fresh", "stale after a write", "stale after a step"
     )
     if result.further is not None:
-        slots |= write_slots(result.further)
-    return slots | _slots_of_changes(result.changes) | _slots_of_lag(result.lag)
+        slots |= write_slots(result.further.effects)
+        slots |= _slots_of_changes(result.further.changes)
+        slots |= _slots_of_lag(result.further.lag)
+    return slots
 
 
 def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
@@ -237,10 +262,8 @@ def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
     }
 
 
-def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
+def _slots_of_lag(lag: Lag) -> dict[str, Any]:
     """Fill the slots about what a step leaves behind."""
-    if lag is None:
-        return {}
     steps = len(lag.time)
     worst, step = largest(lag.distance)
     slots: dict[str, Any] = {}
@@ -255,21 +278,31 @@ def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
 
 def tables(results: Results[ForwardResult], first: ForwardResult) -> Blocks:
     """Show the four readings; then what goes further, if that was asked for."""
-    answers = {name: result.itself for name, result in results.items()}
-    changes = {name: result.changes for name, result in results.items()}
-    lags = {name: result.lag for name, result in results.items() if result.lag is not None}
     rows: dict[str, Callable[[ForwardResult, ForwardResult], str]] = {}
     for k in range(len(first.readings)):
         rows[_SAY("reading", site=first.site, number=k + 1)] = partial(_apart, k)
     blocks: dict[str, Table | Sequence[Block]] = {}
     blocks["readings"] = _readings(results, first)
     blocks["differences"] = differences(results, rows)
-    blocks["refused"] = refusals(first.further, _SAY) if first.further else []
-    blocks["changes"] = change_tables(changes, _SAY) if first.changes else []
-    blocks["own_write"] = own_tables(answers, "write", _SAY)
-    blocks["lag_tables"] = lag_tables(lags, _SAY) if lags else []
-    blocks["own_step"] = own_tables(answers, "step", _SAY)
-    return blocks
+    further = {name: result.further for name, result in results.items() if result.further}
+    return blocks | _further_tables(further)
+
+
+def _further_tables(results: Results[Further]) -> dict[str, Table | Sequence[Block]]:
+    """Show what goes further, by backend; nothing where that was not asked for."""
+    if not results:
+        return dict.fromkeys(("refused", "changes", "own_write", "lag_tables", "own_step"), ())
+    first = next(iter(results.values()))
+    answers = {name: further.itself for name, further in results.items()}
+    changes = {name: further.changes for name, further in results.items()}
+    lags = {name: further.lag for name, further in results.items()}
+    return {
+        "refused": refusals(first.effects, _SAY),
+        "changes": change_tables(changes, _SAY),
+        "own_write": own_tables(answers, "write", _SAY),
+        "lag_tables": lag_tables(lags, _SAY),
+        "own_step": own_tables(answers, "step", _SAY),
+    }
 
 
 def _readings(results: Results[ForwardResult], first: ForwardResult) -> Table:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,23 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...engines import raw_engine_of
-from ...errors import DivergedError, UnsupportedError
-from ...interface import Model, make_data, reset
-from ...lab.runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
+from ...interface import Model
+from ...lab.runs.drive import Progress, number_of_steps, progress_of_stage, wall_time_per_second
 from ...lab.runs.provenance import Provenance, provenance
-from ...lab.runs.robot import (
-    FREE_FALL,
-    UNACTUATED,
-    carried_by_joint,
-    is_the_arm,
-    start_keyframe,
-    touching,
-)
-from ...measures.text import NONE, apart, position, signed
+from ...lab.runs.robot import UNACTUATED, carried_by_joint, contact_names, is_so101
+from ...measures.text import NO_NUMBER, joint_difference, position, signed
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, differences, emulated, largest_gap, where
-from ...show.pictures import Traces
-from ._falling import BALANCE, EQUALITY, SERVO, Droop, Forces, droop, milestones
+from ...show.lesson_template import (
+    Blocks,
+    Results,
+    Words,
+    differences,
+    emulated,
+    largest_gap,
+    where,
+)
+from ._falling import CONTACT, EQUALITY, SERVO, Droop, Forces, course_table, droop, milestones
 from ._robot import check_servos, coordinate, start_line, with_joint
 from .session import CodeRun, Options, stepping_loop
 
@@ -38,8 +36,7 @@ _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "for
 # The first that is paid is taken; each is a row of the longer ones.
 _OPEN = {"seconds": (4.0, 2.0, 1.0), "longer": (100.0, 50.0, 20.0, 10.0, 4.0)}
 _PATIENCE = 15.0  # s by the clock
-_CREEP = 0.05  # of the way; a joint that goes on by more has not settled
-_FURTHER = 0.02  # rad or m; less is not worth a cause
+_SAY = Words("course/lessons/gravity")
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,10 @@ class GravityResult:
         unit: Of the forces on it: "N·m", or "N" of a slide.
         servos_on: The run with the servos.
         servos_off: The same run without them.
-        longer: The servos off for longer, with "contacts" and with "no contacts".
+        limit: What the servo can exert at most [N·m; of a slide, N].
+        further: Whether what goes further was asked for.
+        longer: The servos off for longer, with "contacts" and with "no contacts"; empty where that
+            was not asked for.
         alone: The joint on the engine as it comes, where that differs from the contract.
         provenance: What it was computed with.
     """
@@ -62,6 +62,8 @@ class GravityResult:
     unit: str
     servos_on: Droop
     servos_off: Droop
+    limit: float
+    further: bool
     longer: dict[str, Droop]
     alone: tuple[UncommandedJoint, ...]
     provenance: Provenance
@@ -72,8 +74,8 @@ def fit(model: Model, options: Options) -> dict[str, Any]:
     check_servos(model, "gravity", options["joint"])
     values = with_joint(model, options, servos=True)
     slow = 0.0
-    if None in (values["seconds"], values["longer"]) and not is_the_arm(model):
-        slow = cost_of_a_second(model)
+    if None in (values["seconds"], values["longer"]) and not is_so101(model):
+        slow = wall_time_per_second(model)
     for name, times in _OPEN.items():
         if values[name] is None:
             values[name] = _longest_paid(times, slow)
@@ -96,7 +98,8 @@ def _longest_paid(times: tuple[float, ...], slow: float) -> float:
 def code(model: Model, options: Options, load: str) -> str:
     """Write the same seconds with the servos on and off; ctrl is never written."""
     at = coordinate(model, options["joint"])
-    seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is not a time
+    steps = number_of_steps(model, options["seconds"])  # refuses what is not a time
+    seconds = steps * model.timestep
     loop, nstep = stepping_loop(model, milestones(seconds), options["seconds"])
     if at.slide:
         imports, shown = "", "(1000 * data.qpos[slot]).round(2)"
@@ -124,13 +127,11 @@ for variant in (model, limp):
 def run(play: CodeRun, options: Options, progress: Progress) -> GravityResult:
     """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
-    variants = _longer_variants(model, options["longer"])
-    total = 2 * seconds + len(variants) * options["longer"]
     at, bodies = coordinate(model, joint), carried_by_joint(model, joint)
     courses = play.follow(
-        lambda model, data: touching(model, data.contacts, bodies),
-        2 * steps_in(model, seconds),
-        part_of(progress, 0, 2 * seconds / total),
+        lambda model, data: contact_names(model, data.contacts, bodies),
+        2 * number_of_steps(model, seconds),
+        progress_of_stage(progress, 0, 0.3 if options["further"] else 1.0),
     )
     droops: list[Droop] = []
     for (_, data), course in zip(play.worlds, courses, strict=True):
@@ -139,53 +140,37 @@ def run(play: CodeRun, options: Options, progress: Progress) -> GravityResult:
         droops.append(droop(data, joint, seconds, course.ctrl, path, touches))
     servos_on, servos_off = droops
     longer: dict[str, Droop] = {}
-    for number, (name, variant) in enumerate(variants.items()):
-        start = 2 * seconds + number * options["longer"]
-        share = part_of(progress, start / total, options["longer"] / total)
-        longer[name] = _left_alone(variant, joint, options["longer"], share)
+    if options["further"]:
+        from ._longer_fall import longer_falls  # here, for most lessons end before it
+
+        later = progress_of_stage(progress, 0.3, 0.7)
+        longer = longer_falls(model, joint, options["longer"], later)
+    limit = _strongest(model, joint)
+    alone = raw_engine_of(model.backend).uncommanded_joint(model, seconds, model.joint_id(joint))
     return GravityResult(
         joint=joint,
         slide=at.slide,
         unit="N" if at.slide else "N·m",
         servos_on=servos_on,
         servos_off=servos_off,
+        limit=limit,
+        further=options["further"],
         longer=longer,
-        alone=raw_engine_of(model.backend).uncommanded_joint(model, seconds, model.joint_id(joint)),
+        alone=alone,
         provenance=provenance(model),
     )
 
 
-def _longer_variants(model: Model, seconds: float) -> dict[str, Model]:
-    """Return the Models of the longer runs, by what can touch in them; none for no time."""
-    if not seconds:
-        return {}
-    steps_in(model, seconds)  # says what is wrong with it
-    variants = {"contacts": model.replace(**UNACTUATED)}
-    with suppress(UnsupportedError):
-        variants["no contacts"] = model.replace(**FREE_FALL)
-    return variants
-
-
-def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
-    """Run a Model from its start without writing ctrl, and watch a joint."""
-    place, steps = coordinate(model, joint).place, steps_in(model, seconds)
-    with make_data(model) as data:
-        reset(model, data, start_keyframe(model))
-        ctrl, path, diverged = data.ctrl.copy(), list[float](), None
-        try:
-            for _ in drive(model, data, None, steps):
-                path.append(float(data.qpos[place]))
-                if len(path) % 1000 == 0:
-                    progress(len(path) / steps)
-        except DivergedError as error:
-            diverged = error.time
-        return droop(data, joint, seconds, ctrl, np.array(path), diverged=diverged)
+def _strongest(model: Model, joint: str) -> float:
+    """Return what the servo of a joint can exert at most [N·m; of a slide, N]."""
+    servo = int(np.flatnonzero(model.actuator_jntid == model.joint_id(joint))[0])
+    return float(np.abs(model.actuator_forcerange[servo] * model.actuator_gear[servo]).max())
 
 
 def slots(result: GravityResult) -> dict[str, Any]:
     """Fill the slots of the page."""
     on, off = result.servos_on, result.servos_off
-    slots: dict[str, Any] = {}
+    slots: dict[str, Any] = {"caught": False}
     slots["right"] = _right_choice(on)
     slots["seconds"] = f"{on.time[-1]:g} s"
     slots["ctrl_untouched"] = on.ctrl_untouched and off.ctrl_untouched
@@ -193,10 +178,20 @@ def slots(result: GravityResult) -> dict[str, Any]:
     slots["servo_holds"] = on.held_by == SERVO
     slots["servo_force"] = _size(on.forces.actuator, result.unit)
     slots["load_on"] = _size(on.forces.bias, result.unit)
+    slots["limited"] = on.forces.actuator is not None and 0 < result.limit < np.inf
+    if slots["limited"]:
+        slots["most"] = f"{result.limit:.3g} {result.unit}"
+        slots["used"] = f"{abs(on.forces.actuator or 0.0) / result.limit:.0%}"
     touches = [f"{pair} since {off.touches[pair]:.3f} s" for pair in off.touching]
     slots["touching"] = ", ".join(touches) if touches else "nothing"
+    slots["caught_now"] = off.held_by == CONTACT
     slots["emulated"] = emulated(result, *_OURS)
-    return slots | _slots_of_the_catch(result) | _slots_of_own_motors(result)
+    slots |= _slots_of_own_motors(result)
+    if result.longer:
+        from ._longer_fall import slots_of_the_catch  # here, for most lessons end before it
+
+        slots |= slots_of_the_catch(off, result.longer, result.slide)
+    return slots
 
 
 def _right_choice(servos_on: Droop) -> int:
@@ -210,27 +205,6 @@ def _right_choice(servos_on: Droop) -> int:
 def _size(force: float | None, unit: str) -> str:
     """Return the size of a force with its unit; of one that is not known, zero."""
     return f"{abs(force or 0.0):.4f} {unit}"
-
-
-def _slots_of_the_catch(result: GravityResult) -> dict[str, Any]:
-    """Fill the slots about the contact that catches the joint, and whether it stays there."""
-    slots: dict[str, Any] = {"caught": False}
-    runs = list(result.longer.values())
-    both = len(runs) == 2 and all(run.diverged is None for run in runs)
-    if not (both and result.servos_off.touching):
-        return slots
-    then = float(result.servos_off.position[-1])
-    end, free = (float(run.position[-1]) for run in runs)
-    further = free * np.sign(then) - abs(then)
-    slots["caught"] = further >= max(_FURTHER, abs(then) * _CREEP)
-    slots["free_end"] = position(free, result.slide)
-    slots["at_limit"] = abs(runs[1].forces.limit or 0.0) > BALANCE
-    slots["limit_force"] = _size(runs[1].forces.limit, result.unit)
-    slots["creeps"] = abs(end - then) > abs(then) * _CREEP
-    slots["caught_at"] = position(then, result.slide)
-    slots["long_end"] = position(end, result.slide)
-    slots["long_time"] = f"{runs[0].time[-1]:g} s"
-    return slots
 
 
 def _slots_of_own_motors(result: GravityResult) -> dict[str, Any]:
@@ -264,25 +238,12 @@ def tables(results: Results[GravityResult], first: GravityResult) -> Blocks:
             long_runs[f"{prefix}{label}"] = long_run
     alone = [_alone(name, result) for name, result in results.items() if result.alone]
     return {
-        "course": _course(runs, f"{first.joint} under gravity", first.slide),
+        "course": course_table(runs, _SAY("course", joint=first.joint), first.slide),
         "forces": _forces(runs, first),
         "long_course": _long_course(long_runs, first),
         "alone": alone,
         "differences": _differences(results, first),
     }
-
-
-def _course(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
-    """Show where the joint is at some moments of each run."""
-    times = max((run.time for run in runs.values()), key=len)
-    rows: list[tuple[str, ...]] = []
-    for k, time in enumerate(times):
-        cells = [
-            run.at(k, slide, decimals=3 if name.endswith("on") else 2) for name, run in runs.items()
-        ]
-        rows.append((f"{time:.2f} s", *cells))
-    headers = [name.replace(": ", "\n") for name in runs]
-    return Table(("time", *headers), rows, title=title)
 
 
 def _forces(runs: Mapping[str, Droop], first: GravityResult) -> Table:
@@ -297,7 +258,8 @@ def _forces(runs: Mapping[str, Droop], first: GravityResult) -> Table:
     rows.append(_force_row("sum", [each.total for each in forces]))
     rows.append(["held by", *(run.held_by for run in runs.values())])
     headers = [name.replace(": ", "\n") for name in runs]
-    title = f"Who holds {first.joint}, at {first.servos_on.time[-1]:g} s [{first.unit}]"
+    time = f"{first.servos_on.time[-1]:g} s"
+    title = _SAY("forces", joint=first.joint, time=time, unit=first.unit)
     return Table(("who", *headers), rows, title, emphasis=frozenset({sums}))
 
 
@@ -312,19 +274,12 @@ def _gravity(forces: Forces) -> float | None:
 
 
 def _long_course(runs: Mapping[str, Droop], first: GravityResult) -> list[Block]:
-    """Show the longer runs in a table, and every 20th step of them as curves."""
+    """Show the longer runs, if there are any."""
     if not runs:
         return []
-    scale, unit = (1.0, "m") if first.slide else (np.degrees(1.0), "angle [°]")
-    timestep = first.provenance.timestep
-    curves: dict[str, tuple[list[float], list[float]]] = {}
-    for name, run in runs.items():
-        time = np.arange(len(run.path)) * timestep
-        curves[name] = (time[::20].tolist(), (scale * run.path)[::20].tolist())
-    return [
-        _course(runs, f"{first.joint} for longer, servos off", first.slide),
-        Traces(f"{first.joint} with the servos off", "time [s]", unit, curves),
-    ]
+    from ._longer_fall import long_course  # here, for most lessons end before it
+
+    return long_course(runs, first.joint, first.slide, first.provenance.timestep, _SAY)
 
 
 def _alone(name: str, result: GravityResult) -> Table:
@@ -335,21 +290,22 @@ def _alone(name: str, result: GravityResult) -> Table:
         rows.append((alone.label, position(alone.position, result.slide), motor))
     time = result.alone[0].time
     return Table(
-        (f"{name} itself", result.joint, "its own motor"),
+        (_SAY("itself", engine=name), result.joint, _SAY("own_motor")),
         rows,
-        title=f"The same model as {name}'s own users load it, left alone, at {time:.3g} s",
+        title=_SAY("alone", engine=name, time=f"{time:.3g} s"),
     )
 
 
 def _differences(results: Results[GravityResult], first: GravityResult) -> list[Table]:
     """Compare the runs of each engine with those of the first."""
     rows: dict[str, Callable[[GravityResult, GravityResult], str]] = {
-        "servos on, worst": _apart_with_servos,
-        "servos off, until one touches": _apart_before_touch,
-        "servos off, after that": _apart_after_touch,
+        _SAY("apart_on"): _apart_with_servos,
+        _SAY("apart_off"): _apart_before_touch,
+        _SAY("apart_later"): _apart_after_touch,
     }
     for label, run in first.longer.items():
-        rows[f"servos off, {label}, at {run.time[-1]:g} s"] = partial(_ends_apart, label)
+        time = f"{run.time[-1]:g} s"
+        rows[_SAY("apart_long", label=label, time=time)] = partial(_ends_apart, label)
     return differences(results, rows)
 
 
@@ -386,10 +342,10 @@ def _apart(of: GravityResult, left: Droop, right: Droop, rows: slice) -> str:
 
 
 def _ends_apart(label: str, left: GravityResult, right: GravityResult) -> str:
-    """Return how far the ends of two longer runs are apart, as far as both go."""
+    """Return how far apart the ends of two longer runs are, as far as both go."""
     if label not in left.longer or label not in right.longer:
-        return NONE
+        return NO_NUMBER
     runs = left.longer[label], right.longer[label]
     row = min(len(run.position) for run in runs) - 1
     gap = abs(float(runs[0].position[row] - runs[1].position[row]))
-    return apart(gap, left.slide) if np.isfinite(gap) else "one diverged"
+    return joint_difference(gap, left.slide) if np.isfinite(gap) else "one diverged"

@@ -8,56 +8,46 @@ from typing import Any
 
 import numpy as np
 
-from ...backends import load
-from ...errors import DivergedError, StateMachineError, UnsupportedError
-from ...installed import DEFAULT
+from ...errors import DivergedError, UnsupportedError
 from ...interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
-from ...lab.recordings import record_scenario, shipped
-from ...lab.runs.drive import Progress, steps_in
-from ...lab.runs.provenance import Provenance, model_digest, provenance
+from ...lab.runs.drive import Progress, number_of_steps
+from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.robot import (
-    command,
+    actuated_trees,
+    checked_ctrl,
+    contact_names,
+    home_keyframe,
     is_servo,
-    start_keyframe,
-    touching,
-    trees_of_actuators,
 )
-from ...lab.runs.scenarios import SCENARIOS
 from ...lab.runs.usual_commands import hold_ctrl
 from ...measures import largest, together
 from ...measures.text import position, short_time
-from ...release_names import version_of
-from ...releases import is_here
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, differences, largest_gap, where
+from ...show.lesson_template import Blocks, Results, Words, differences, largest_gap, where
 from ...show.pictures import Traces
+from ._older_release import OlderRelease, on_older_release, slots_of_older
 from ._robot import check_servos, start_line
+from ._torques import Torques, exerted_by, torque_slots, torque_table, torques_of
 from .session import CodeRun, Options, stepping_loop
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
 _SHOWN = 12  # numbers of qpos that fit in a line
-_AT_GOAL = np.radians(0.1)  # rad, or m
-OLDER = "mujoco==3.3.7"  # its servos damp where their force is at its limit, too
+_AT_TARGET = np.radians(0.1)  # rad, or m
+_SAY = Words("course/lessons/hold")
 
 
 @dataclass(frozen=True)
-class OlderRelease:
-    """The run of the course on a release that is older than the installed one.
+class _Look:
+    """What is looked at after a step.
 
     Attributes:
-        version: Of that release.
-        gap: The largest distance between the same joint on the two [rad].
-        joint: Which joint it is.
-        at: When [s].
-        recorded: Whether it is the recorded run that comes with the package.
+        pairs: What of the robot touches what, or itself.
+        torque: (k,) what the servos exert [N·m; of a slide, N]; None where it is not told.
     """
 
-    version: str
-    gap: float
-    joint: str
-    at: float
-    recorded: bool
+    pairs: tuple[str, ...]
+    torque: Array | None
 
 
 @dataclass(frozen=True)
@@ -65,8 +55,8 @@ class HoldResult:
     """The way of the k joints that servos drive to a command, and what is in the way.
 
     Attributes:
-        target: (k,) what the servos are told [rad; of a slide, m].
-        goal: (k,) the same within ctrlrange, which is what the servos see.
+        command: (k,) what ctrl says [rad; of a slide, m].
+        target: (k,) the same within ctrlrange, which is what the servos aim at.
         time: (n+1,) [s].
         qpos: (n+1, k) the joints [rad; of a slide, m].
         pairs: (n+1,) what of the robot touches what, or itself, in each of the states.
@@ -76,12 +66,15 @@ class HoldResult:
         joints: (k,) their names.
         slides: (k,) which of them are slides.
         keyframe: Where the run starts, None for the default state.
-        older: The same run on an older release; None for another run than the course's.
+        torques: What the servos exert; None where the backend does not tell it.
+        further: Whether what goes further was asked for.
+        older: The same run on an older release; None where that was not asked for, and for another
+            run than the course's.
         provenance: What it was computed with.
     """
 
+    command: Array
     target: Array
-    goal: Array
     time: Array
     qpos: Array
     pairs: tuple[tuple[str, ...], ...] = field(metadata={"json": False})
@@ -90,12 +83,14 @@ class HoldResult:
     joints: tuple[str, ...]
     slides: tuple[bool, ...]
     keyframe: str | None
+    torques: Torques | None
+    further: bool
     older: OlderRelease | None
     provenance: Provenance
 
     @property
     def error(self) -> Array:
-        """(n+1,) the worst joint's distance to the goal [rad; of a slide, m]."""
+        """(n+1,) the worst joint's distance to the target [rad; of a slide, m]."""
         return self.distances().max(axis=1)
 
     @property
@@ -122,8 +117,8 @@ class HoldResult:
         return self.pairs[-1]
 
     def distances(self) -> Array:
-        """Return how far each joint is from its goal at each moment (n+1, k) [rad or m]."""
-        return np.abs(self.qpos - self.goal)
+        """Return how far each joint is from its target at each moment (n+1, k) [rad or m]."""
+        return np.abs(self.qpos - self.target)
 
     def ends_without_contacts(self) -> Array:
         """Return where the joints end if nothing can touch (k,), or where they end."""
@@ -133,8 +128,9 @@ class HoldResult:
 def code(model: Model, options: Options, load: str) -> str:
     """Write one command, and read where the robot is then."""
     check_servos(model, "hold")
-    target = options["target"]
-    ctrl = hold_ctrl(model) if target is None else command(model, target, "target")
+    ctrl = hold_ctrl(model)
+    if options["ctrl"] is not None:
+        ctrl = checked_ctrl(model, options["ctrl"])
     loop, nstep = stepping_loop(model, _PRINTED, options["seconds"])
     shown = "data.qpos" if model.nq <= _SHOWN else f"data.qpos[:{_SHOWN}]"
     return f"""\
@@ -154,36 +150,44 @@ def run(play: CodeRun, options: Options, progress: Progress) -> HoldResult:
     model = play.model
     servos = np.flatnonzero(is_servo(model))
     joints = model.actuator_jntid[servos]
-    places, total = model.jnt_qposadr[joints], steps_in(model, options["seconds"])
-    robot = trees_of_actuators(model)
+    places, total = model.jnt_qposadr[joints], number_of_steps(model, options["seconds"])
+    robot = actuated_trees(model)
 
     def touched(model: Model, data: Data) -> tuple[str, ...]:
-        return touching(model, data.contacts, robot, each_other=True)
+        return contact_names(model, data.contacts, robot, each_other=True)
 
-    (course,) = play.follow(touched, total, progress)
+    def look(model: Model, data: Data) -> _Look:
+        return _Look(touched(model, data), exerted_by(data, model.jnt_dofadr[joints]))
+
+    (course,) = play.follow(look, total, progress)
     _, data = play.worlds[0]
     forward(model, data)
-    pairs = (*course.looks, touched(model, data))
+    pairs = (*(each.pairs for each in course.looks), touched(model, data))
+    exerted = [each.torque for each in course.looks]
     ctrl, gear = data.ctrl.copy(), model.actuator_gear[servos]
-    target = ctrl[servos] / gear
-    goal = np.clip(ctrl, *model.actuator_ctrlrange.T)[servos] / gear
-    qpos = np.array(course.qpos)
+    target = np.clip(ctrl, *model.actuator_ctrlrange.T)[servos] / gear
+    qpos, time = np.array(course.qpos), np.array(course.time)
     path = qpos[:, places]
     slides = tuple((model.jnt_type[joints] == JointType.SLIDE).tolist())
     speed = data.qvel[model.jnt_dofadr[joints]].copy()
     freely = _freely(model, ctrl, total, places) if any(pairs) else None
-    older = _on_older_release(model, ctrl, qpos)
+    names = _names_of(model, joints)
+    torques = torques_of(model, servos, names, slides, exerted)
+    older = on_older_release(model, ctrl, qpos) if options["further"] else None
+    told = ctrl[servos] / gear
     return HoldResult(
+        command=told,
         target=target,
-        goal=goal,
-        time=np.array(course.time),
+        time=time,
         qpos=path,
         pairs=pairs,
         speed=speed,
         without_contacts=freely,
-        joints=_names_of(model, joints),
+        joints=names,
         slides=slides,
-        keyframe=start_keyframe(model),
+        keyframe=home_keyframe(model),
+        torques=torques,
+        further=options["further"],
         older=older,
         provenance=provenance(model),
     )
@@ -197,37 +201,12 @@ def _names_of(model: Model, joints: Ints) -> tuple[str, ...]:
     )
 
 
-def _on_older_release(model: Model, ctrl: Array, qpos: Array) -> OlderRelease | None:
-    """Compare the run (n, nq) of the course with that on a release older than the installed one."""
-    if model.backend != DEFAULT:
-        return None
-    known, here = shipped("hold", OLDER), is_here(OLDER)
-    same_file = known.header.provenance.model_sha256 == model_digest(model.path)
-    same_run = known.qpos.shape == qpos.shape and np.array_equal(known.ctrl[-1], ctrl)
-    if not (same_file and same_run):
-        return None
-    if here:
-        try:
-            known = record_scenario(SCENARIOS["hold"], load(model.path, OLDER))
-        except StateMachineError:  # it does not run any more
-            here = False
-    gap, place = largest(np.abs(known.qpos - qpos).ravel())
-    moment, joint = divmod(place, qpos.shape[1])
-    return OlderRelease(
-        version=version_of(OLDER),
-        gap=gap,
-        joint=model.joint_names[joint],
-        at=float(known.time[moment]),
-        recorded=not here,
-    )
-
-
 def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None:
     """Return where the joints end if nothing can touch anything; None if that cannot be run."""
     try:
         alone = model.replace(contacts=False)
         with make_data(alone) as data:
-            reset(alone, data, start_keyframe(model))
+            reset(alone, data, home_keyframe(model))
             data.ctrl = ctrl
             step(alone, data, steps)
             return data.qpos[places].copy()
@@ -238,21 +217,24 @@ def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None
 def slots(result: HoldResult) -> dict[str, Any]:
     """Fill the slots of the page."""
     gaps = result.distances()[-1]
-    away, worst = int((gaps > _AT_GOAL).sum()), largest(gaps)[1]
+    away, worst = int((gaps > _AT_TARGET).sum()), largest(gaps)[1]
     slots: dict[str, Any] = {}
     slots["right"] = _right_choice(away, len(gaps))
-    slots["within"] = position(_AT_GOAL, result.slides[worst])
+    slots["within"] = position(_AT_TARGET, result.slides[worst])
     slots["seconds"] = f"{result.time[-1]:g} s"
     slots["away"] = f"{away} of {len(gaps)}"
     slots["worst"] = _farthest(result, gaps)
     slots["free"] = result.without_contacts is not None
-    slots["free_worst"] = _farthest(result, np.abs(result.ends_without_contacts() - result.goal))
+    slots["free_worst"] = _farthest(result, np.abs(result.ends_without_contacts() - result.target))
     slots["installed"] = result.provenance.versions[result.provenance.backend]
-    return slots | _slots_of_touches(result) | _slots_of_older(result.older)
+    slots["older"] = result.older is not None
+    if result.older is not None:
+        slots |= slots_of_older(result.older)
+    return slots | _slots_of_touches(result) | torque_slots(result.torques)
 
 
 def _right_choice(away: int, joints: int) -> int:
-    """Return the number of the right choice: all, some or none of the joints are at their goals."""
+    """Return the number of the right choice: all, some or none of the joints are at the target."""
     if away == 0:
         return 0
     return 2 if away == joints else 1
@@ -270,29 +252,8 @@ def _slots_of_touches(result: HoldResult) -> dict[str, Any]:
     return slots
 
 
-def _slots_of_older(older: OlderRelease | None) -> dict[str, Any]:
-    """Fill the slots about the older release."""
-    if older is None:
-        texts = ("older_version", "older_joint", "older_at", "older_gap")
-        return dict.fromkeys(texts, "") | {
-            "older": False,
-            "older_right": None,
-            "older_recorded": False,
-        }
-    limits = np.radians(1e-3), np.radians(1)  # of the choices
-    return {
-        "older": True,
-        "older_right": sum(older.gap > limit for limit in limits),
-        "older_version": older.version,
-        "older_joint": older.joint,
-        "older_at": short_time(older.at),
-        "older_gap": position(older.gap, False),
-        "older_recorded": older.recorded,
-    }
-
-
 def _farthest(result: HoldResult, gaps: Array) -> str:
-    """Say which joint is farthest from its goal, and by how much."""
+    """Say which joint is farthest from its target, and by how much."""
     gap, joint = largest(gaps)
     return f"{result.joints[joint]}, by {position(gap, result.slides[joint])}"
 
@@ -300,32 +261,34 @@ def _farthest(result: HoldResult, gaps: Array) -> str:
 def tables(results: Results[HoldResult], first: HoldResult) -> Blocks:
     """Show the worst joint over time, the pose at the end, and the way of each joint."""
     rows: dict[str, Callable[[HoldResult, HoldResult], str]] = {
-        "any joint, until one touches": _apart_before_touch,
-        "any joint, after that": _apart_after_touch,
-        "any joint, at the end": _apart_at_end,
-        "at the end, contacts left out": _apart_freely,
+        _SAY("apart_before"): _apart_before_touch,
+        _SAY("apart_after"): _apart_after_touch,
+        _SAY("apart_end"): _apart_at_end,
+        _SAY("apart_freely"): _apart_freely,
     }
+    torques = {name: result.torques for name, result in results.items()}
+    curves = [*_curves(results, False), *_curves(results, True)]
     return {
         "way": _way(results, end=float(first.time[-1])),
         "pose": _pose(results, first),
-        "curves": [*_curves(results, False), *_curves(results, True)],
+        "torque": torque_table(torques, _SAY),
+        "curves": curves,
         "differences": differences(results, rows),
     }
 
 
 def _way(results: Results[HoldResult], end: float) -> Table:
-    """Show how far the worst joint is from its goal at some times."""
+    """Show how far the worst joint is from its target at some times."""
     times = [time for time in _TIMES if time < end - 1e-6] + [end]
     rows: list[tuple[str, ...]] = []
     for time in times:
         cells = [_worst_at(result, time) for result in results.values()]
         rows.append((f"{time:.3f} s", *cells))
-    title = "The worst joint on the way: how far from its goal"
-    return Table(("time", *results), rows, title)
+    return Table(("time", *results), rows, _SAY("way"))
 
 
 def _worst_at(result: HoldResult, time: float) -> str:
-    """Say which joint is farthest from its goal at a time, and by how much."""
+    """Say which joint is farthest from its target at a time, and by how much."""
     moment = int(np.argmin(np.abs(result.time - time)))
     gap, joint = largest(result.distances()[moment])
     return f"{position(gap, result.slides[joint], 3)}  {result.joints[joint]}"
@@ -333,31 +296,31 @@ def _worst_at(result: HoldResult, time: float) -> str:
 
 def _pose(results: Results[HoldResult], first: HoldResult) -> Table:
     """Show where the joints are to be, and where they are at the end."""
-    poses = {"goal": first.goal}
-    if not np.array_equal(first.target, first.goal):
-        poses = {"asked for": first.target, **poses}
+    poses = {"target": first.target}
+    if not np.array_equal(first.command, first.target):
+        poses = {"command": first.command, **poses}
     for name, result in results.items():
         poses[name] = result.qpos[-1]
     rows: list[tuple[str, ...]] = []
     for k, joint in enumerate(first.joints):
         cells = [position(float(pose[k]), first.slides[k]) for pose in poses.values()]
         rows.append((joint, *cells))
-    return Table(("joint", *poses), rows, title=f"Where it is at {first.time[-1]:g} s")
+    return Table(("joint", *poses), rows, _SAY("pose", time=f"{first.time[-1]:g} s"))
 
 
 def _curves(results: Results[HoldResult], slide: bool) -> list[Block]:
-    """Draw how far each slide, or each other joint, is from its goal."""
+    """Draw how far each slide, or each other joint, is from its target."""
     scale, unit = (1e3, "mm") if slide else (np.degrees(1.0), "°")
     curves: dict[str, tuple[list[float], list[float]]] = {}
     for name, result in results.items():
         prefix = where(results, name)
-        distances = scale * (result.qpos - result.goal)
+        distances = scale * (result.qpos - result.target)
         for k, joint in enumerate(result.joints):
             if result.slides[k] is slide:
                 curves[f"{prefix}{joint}"] = (result.time.tolist(), distances[:, k].tolist())
     if not curves:
         return []
-    return [Traces("The way to the goal", "time [s]", f"distance to the goal [{unit}]", curves)]
+    return [Traces(_SAY("curves"), "time [s]", _SAY("distance", unit=unit), curves)]
 
 
 def _after_touch(left: HoldResult, right: HoldResult) -> int:

@@ -105,6 +105,8 @@ def run(play: CodeRun, options: Options, progress: Progress) -> NowhereResult:
     data = play.names["data"]
     forward(model, data)
     first, second = readings
+    is_empty = not any(any(content) for content in derived[_MADE].values())
+    repeats = read_derived(data) == derived[_COMPUTED]
     witness = None
     if options["further"]:
         witness = _witnessed(model, tip, data.qpos, second)
@@ -112,9 +114,9 @@ def run(play: CodeRun, options: Options, progress: Progress) -> NowhereResult:
         site=options["site"],
         first=first,
         second=second,
-        empty=not any(any(content) for content in derived[_MADE].values()),
+        empty=is_empty,
         stored=stored[_MADE] == stored[_COMPUTED],
-        repeats=read_derived(data) == derived[_COMPUTED],
+        repeats=repeats,
         time=data.time,
         further=options["further"],
         witness=witness,

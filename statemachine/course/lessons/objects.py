@@ -14,8 +14,8 @@ from ...backends import load
 from ...errors import BadInputError
 from ...interface import Array, Data, Model, make_data, step
 from ...interface.checks import as_count
-from ...lab.runs.drive import Progress, part_of
-from ...lab.runs.in_turns import in_turns
+from ...lab.runs.drive import Progress, progress_of_stage
+from ...lab.runs.interleaved_timing import time_interleaved
 from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import count, duration, milliseconds
 from ...show.blocks import Table
@@ -44,7 +44,6 @@ model = {load}
 data = sm.make_data(model)
 other = sm.make_data(model)
 sm.step(model, data, 100)
-print(model)
 print(round(data.time, 6), round(other.time, 6))
 """
 
@@ -103,17 +102,19 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ObjectsResult:
         "make": lambda: extra.append(make_data(model)),
         "step": lambda: step(model, data, _STEPS),
     }
-    walls = in_turns(ways, _TIMES, part_of(progress, 0.0, 0.5))
+    walls = time_interleaved(ways, _TIMES, progress_of_stage(progress, 0.0, 0.5))
     loading, making, bulk = (statistics.median(times) for times in walls.values())
     shared = all(_names_model(world, model) for world in (data, other, *extra))
     for world in extra:
         world.close()
     singly = []
     for k in range(worlds):
-        share = part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds)
+        share = progress_of_stage(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds)
         singly += _in_turn(model, [k], worlds, share)
-    together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
+    together = _in_turn(model, range(worlds), worlds, progress_of_stage(progress, 0.75, 0.25))
     different = len({end.tobytes() for end in together})
+    is_alone, is_constant = _all_equal(singly, together), before == _arrays(model)
+    meshes, triangles = (int(getattr(model.compiled, name, 0)) for name in ("nmesh", "nmeshface"))
     many = None
     if options["further"]:
         many = measured(model, as_count(options["most"], "most"), progress)
@@ -123,13 +124,13 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ObjectsResult:
         stepping=bulk / _STEPS,
         worlds=worlds,
         nstep=_STEPS,
-        alone=_all_equal(singly, together),
+        alone=is_alone,
         different=different,
         arrays=len(before),
-        constant=before == _arrays(model),
+        constant=is_constant,
         shared=shared,
-        meshes=int(getattr(model.compiled, "nmesh", 0)),
-        triangles=int(getattr(model.compiled, "nmeshface", 0)),
+        meshes=meshes,
+        triangles=triangles,
         further=many,
         provenance=provenance(model),
     )
@@ -189,18 +190,14 @@ def diagram(model: Model) -> Diagram:
 
 def slots(result: ObjectsResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
-    slots: dict[str, Any] = {
-        "right": 0 if result.alone else 1,
-        "stepped": f"{100 * result.provenance.timestep:g} s",
-        "timestep": milliseconds(result.provenance.timestep),
-        "steps": count(result.nstep, "step"),
-        "load_steps": f"{result.ratio:,.0f}",
-        "load": duration(result.loading),
-        "step": duration(result.stepping),
-        "make": duration(result.making),
-        "triangles": f"{result.triangles:,}",
-        "cheap": result.making < result.loading / _CHEAP,
-    }
+    slots: dict[str, Any] = {"right": 0 if result.alone else 1}
+    slots["stepped"] = f"{100 * result.provenance.timestep:g} s"
+    slots["timestep"] = milliseconds(result.provenance.timestep)
+    slots["steps"] = count(result.nstep, "step")
+    slots["load_steps"] = f"{result.ratio:,.0f}"
+    slots["make"] = duration(result.making)
+    slots["triangle_count"] = f"{result.triangles:,}"
+    slots["cheap"] = result.making < result.loading / _CHEAP
     if result.further is not None:
         slots |= slots_of_worlds(result.further)
     return slots
@@ -218,25 +215,21 @@ def tables(results: Results[ObjectsResult], _first: ObjectsResult) -> Blocks:
 
 def _costs(results: Results[ObjectsResult]) -> Table:
     """Return the wall time of each part by engine."""
-    rows: dict[str, Callable[[ObjectsResult], str]] = {
-        _SAY("load_cost"): lambda r: duration(r.loading),
-        _SAY("data_cost"): lambda r: duration(r.making),
-        _SAY("step_cost"): lambda r: duration(r.stepping),
-        _SAY("load_in_steps"): lambda r: f"{r.ratio:,.0f} steps",
-    }
+    rows: dict[str, Callable[[ObjectsResult], str]] = {}
+    rows[_SAY("load_cost")] = lambda result: duration(result.loading)
+    rows[_SAY("data_cost")] = lambda result: duration(result.making)
+    rows[_SAY("step_cost")] = lambda result: duration(result.stepping)
+    rows[_SAY("load_in_steps")] = lambda result: f"{result.ratio:,.0f} steps"
     return by_engine(results, rows, _SAY("costs"))
 
 
 def _differences(results: Results[ObjectsResult]) -> Sequence[Table]:
     """Return how much longer each part takes on another engine than on the first."""
-    return differences(
-        results,
-        {
-            _SAY("load_takes"): lambda a, b: _times(a.loading, b.loading),
-            _SAY("data_takes"): lambda a, b: _times(a.making, b.making),
-            _SAY("step_takes"): lambda a, b: _times(a.stepping, b.stepping),
-        },
-    )
+    rows: dict[str, Callable[[ObjectsResult, ObjectsResult], str]] = {}
+    rows[_SAY("load_takes")] = lambda a, b: _times(a.loading, b.loading)
+    rows[_SAY("data_takes")] = lambda a, b: _times(a.making, b.making)
+    rows[_SAY("step_takes")] = lambda a, b: _times(a.stepping, b.stepping)
+    return differences(results, rows)
 
 
 def _times(first: float, other: float) -> str:

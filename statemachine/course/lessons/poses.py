@@ -12,7 +12,7 @@ import numpy as np
 
 from ...backends import load
 from ...interface import Array, make_data, reset, step
-from ...lab.runs.robot import TARGET, UNACTUATED
+from ...lab.runs.robot import ARM_TARGET, UNACTUATED
 from ._robot import ARM, BOX
 
 _EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later
@@ -66,14 +66,14 @@ def at_the_start() -> Poses:
 
 def towards_the_goal() -> Poses:
     """Return the arm on its way to the goal, and where it starts."""
-    run = _poses(ARM, 16, ctrl=TARGET, every=_SLOW)
+    run = _poses(ARM, 16, ctrl=ARM_TARGET, every=_SLOW)
     return run, np.tile(run[0], (len(run), 1))
 
 
 def short_of_the_goal() -> Poses:
     """Return the arm on its way to the goal, and the goal."""
-    run = _poses(ARM, 16, ctrl=TARGET, every=_SLOW)
-    return run, np.tile(TARGET, (len(run), 1))
+    run = _poses(ARM, 16, ctrl=ARM_TARGET, every=_SLOW)
+    return run, np.tile(ARM_TARGET, (len(run), 1))
 
 
 def box_held() -> Poses:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ...errors import BadInputError
 from ...interface import Model
-from ...lab.runs.drive import Progress, part_of
+from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.provenance import Provenance, provenance
-from ...lab.runs.robot import is_the_arm
+from ...lab.runs.robot import is_so101
 from ...measures.text import degrees, duration
 from . import LESSONS, forward, gravity, objects, replay, state, time
 from ._falling import SERVO
@@ -65,7 +65,7 @@ class QuestionsResult:
 
 def code(model: Model, options: Options, load: str) -> str:
     """Return no code: that of the lessons has been shown."""
-    if not is_the_arm(model):
+    if not is_so101(model):
         raise BadInputError(
             f"these questions are about the SO-101, and {model.path.name} is another robot"
         )
@@ -78,7 +78,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> QuestionsResult:
     model, names = play.model, list(ASKED)
 
     def measured(lesson: LessonModule[R], name: str) -> R:
-        share = part_of(progress, names.index(name) / len(names), 1 / len(names))
+        share = progress_of_stage(progress, names.index(name) / len(names), 1 / len(names))
         return _result_of(lesson, name, model, share)
 
     answers = Answers(

@@ -15,24 +15,28 @@ from ...engines.records import WayBack
 from ...errors import BadInputError, UnsupportedError, check_name
 from ...interface import Array, Ints, JointType, Model, get_state
 from ...interface.checks import as_count
-from ...lab.runs.drive import Progress, part_of
+from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.provenance import Provenance, provenance
-from ...lab.runs.robot import body_pairs, command, is_the_arm
+from ...lab.runs.robot import checked_ctrl, contact_counts, is_so101
 from ...measures import largest
 from ...measures.text import count, degrees, millimetres
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, by_engine, differences
+from ...show.lesson_template import Blocks, Results, Words, by_engine, differences
 from ._two_runs import (
     BREAKS,
     BrokenRun,
     broken,
     broken_table,
+    course_of,
     growth,
     of_its_own,
     restore_methods,
     through_us,
 )
 from .session import CodeRun, Options
+
+_SAY = Words("course/lessons/replay")
+_COURSES = ("grows", "shrinks", "stays")  # of a difference, in the order of the choices
 
 
 @dataclass(frozen=True)
@@ -66,8 +70,9 @@ class ReplayResult:
         pairs: For each pair of bodies, in how many steps it touched.
         keyframe: Name of the keyframe, its time was set to zero; None for the default state.
         state: What a State of this engine holds.
-        ways: Ways to go back through this interface, tried.
+        ways: Ways to go back through this interface, tried; none where that was not asked for.
         own_ways: The engine's own ways, tried on the raw engine where that differs.
+        further: Whether what goes further was asked for.
         provenance: What it was computed with.
         breaks: Second runs that were made to differ, if this one was not.
         finer: The same with half the timestep; None where the backend cannot set it, and of a
@@ -86,6 +91,7 @@ class ReplayResult:
     state: tuple[str, ...]
     ways: tuple[WayBack, ...]
     own_ways: tuple[WayBack, ...]
+    further: bool
     provenance: Provenance
     breaks: tuple[BrokenRun, ...] = ()
     finer: FinerRuns | None = None
@@ -153,7 +159,7 @@ def code(model: Model, options: Options, load: str) -> str:
             "    sm.step(model, data)",
         ]
     else:
-        comment = "  # pan and lift" if options["ctrl"] is None and is_the_arm(model) else ""
+        comment = "  # pan and lift" if options["ctrl"] is None and is_so101(model) else ""
         nstep = f"{steps} + broken" if options["break"] == "extra-step" else str(steps)
         lines = [
             f"{_command_line(model, options['ctrl'])}{comment}",
@@ -182,7 +188,7 @@ print(np.array_equal(first, second), abs(first - second).max())
 def _command_line(model: Model, ctrl: Sequence[float] | None) -> str:
     """Write the line that gives a command, which is one of any robot where none is asked for."""
     if ctrl is not None:
-        return f"data.ctrl[:] = {command(model, ctrl).tolist()}"
+        return f"data.ctrl[:] = {checked_ctrl(model, ctrl).tolist()}"
     return "data.ctrl[:2] += (0.4, -0.2)" if model.nu > 1 else "data.ctrl += 0.4"
 
 
@@ -191,7 +197,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ReplayResult:
     model, nstep = play.model, options["steps"]
     if options["break"] is not None:
         return _compared(play, options, progress)
-    thirds = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
+    thirds = [progress_of_stage(progress, k / 3, 1 / 3) for k in range(3)]
     result = _compared(play, options, thirds[0])
     breaks: list[BrokenRun] = []
     for way, third in zip(BREAKS, thirds[1:], strict=True):
@@ -205,29 +211,36 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ReplayResult:
 def _compared(play: CodeRun, options: Options, progress: Progress) -> ReplayResult:
     """Watch both runs, and try the ways back."""
     model, nstep, way = play.model, options["steps"], options["break"]
-    courses = play.follow(lambda model, data: body_pairs(model, data.contacts), 2 * nstep, progress)
+    courses = play.follow(
+        lambda model, data: contact_counts(model, data.contacts), 2 * nstep, progress
+    )
     first_run, second_run = (_counted(course.qpos, nstep) for course in courses)
     touches = courses[0].looks
     contacts = np.array([pairs.total() for pairs in touches], dtype=np.int64)
     steps_of_pair = Counter(pair for pairs in touches for pair in pairs)
     _, data = play.worlds[0]
-    ctrl = data.ctrl.copy()
+    ctrl, hinges, free = data.ctrl.copy(), _hinges(model), _free_position(model)
     state = [name for name, size in get_state(model, data).layout if size]
     keyframe = model.keyframes[0].name if model.keyframes else None
-    own_ways = raw_engine_of(model.backend).restore_methods(model)
+    ways: tuple[WayBack, ...] = ()
+    own_ways: tuple[WayBack, ...] = ()
+    if options["further"]:
+        ways = restore_methods(model, ctrl)
+        own_ways = raw_engine_of(model.backend).restore_methods(model)
     return ReplayResult(
         ctrl=ctrl,
         broken_by=way,
         first_run=first_run,
         second_run=second_run,
-        hinges=_hinges(model),
-        free=_free_position(model),
+        hinges=hinges,
+        free=free,
         contacts=contacts,
         pairs=steps_of_pair,
         keyframe=keyframe,
         state=tuple(state),
-        ways=restore_methods(model, ctrl),
+        ways=ways,
         own_ways=own_ways,
+        further=options["further"],
         provenance=provenance(model),
     )
 
@@ -285,8 +298,11 @@ def slots(result: ReplayResult) -> dict[str, Any]:
     slots["peak"] = f"{peak:.1e}"
     slots["peak_step"] = row
     slots["end"] = f"{end:.1e}"
-    slots["shrinks"] = end < peak / 10
+    slots["shrinks"] = course_of(result.difference) == "shrinks"
     slots["held_in_state"] = ", ".join(result.state)
+    slots["fewest"] = count(int(result.contacts.min()), "contact")
+    slots["touch"] = bool(result.contacts.all())
+    slots |= _slots_of_breaks(result.breaks)
     slots["truth"] = False
     if result.finer is not None:
         slots["truth"] = result.finer.identical and result.finer.difference > 0
@@ -295,18 +311,30 @@ def slots(result: ReplayResult) -> dict[str, Any]:
     return slots
 
 
+def _slots_of_breaks(breaks: Sequence[BrokenRun]) -> dict[str, Any]:
+    """Fill the slots about second runs that were made to differ."""
+    slots: dict[str, Any] = {"broken": False, "fooled": False, "shrinks_all": False}
+    if not breaks:
+        return slots
+    first, fooled = breaks[0], [run.close and run.end > 0 for run in breaks]
+    slots |= {"broken": True, "fooled": any(fooled), "fools": sum(fooled), "breaks": len(breaks)}
+    slots["gap_right"] = _COURSES.index(first.course)
+    slots["gap_peak"] = f"{first.peak:.1e}"
+    slots["gap_peak_step"] = first.peak_step
+    slots["gap_end"] = f"{first.end:.1e}"
+    slots["notices"] = all(run.end > 0 for run in breaks)
+    slots["shrinks_all"] = all(run.course == "shrinks" for run in breaks)
+    return slots
+
+
 def _right_choice(result: ReplayResult) -> int | None:
     """Return the number of the right choice, None if no choice is right.
 
-    The choices of a second run that was made to differ: its difference grew to the end, shrank,
-    or stayed near its peak.
+    The choices of a second run that was made to differ are `_COURSES`.
     """
     if result.broken_by is None:
         return 0 if result.identical else None
-    peak, row = largest(result.difference)
-    if result.difference[-1] < peak / 3:
-        return 1
-    return 0 if row == len(result.contacts) else 2
+    return _COURSES.index(course_of(result.difference))
 
 
 def tables(results: Results[ReplayResult], first: ReplayResult) -> Blocks:
@@ -318,11 +346,17 @@ def tables(results: Results[ReplayResult], first: ReplayResult) -> Blocks:
     if first.broken_by:
         gaps = {name: result.difference for name, result in results.items()}
         bodies = {name: result.apart for name, result in results.items()}
-        blocks["growth"] = growth(gaps, bodies)
-    blocks["ways"] = through_us({name: result.ways for name, result in results.items()})
-    blocks["own"] = of_its_own({name: result.own_ways for name, result in results.items()})
-    blocks["breaks"] = broken_table({name: result.breaks for name, result in results.items()})
-    blocks["differences"] = differences(results, _DIFFERENCES)
+        blocks["growth"] = growth(gaps, bodies, _SAY)
+    blocks["ways"] = through_us({name: result.ways for name, result in results.items()}, _SAY)
+    blocks["own"] = of_its_own({name: result.own_ways for name, result in results.items()}, _SAY)
+    breaks = {name: result.breaks for name, result in results.items()}
+    blocks["broken_runs"] = broken_table(breaks, _SAY)
+    rows: dict[str, Callable[[ReplayResult, ReplayResult], str]] = {
+        _SAY("hinges_apart"): _hinges_apart,
+        _SAY("bodies_apart"): _bodies_apart,
+        _SAY("contacts_apart"): _contacts_apart,
+    }
+    blocks["differences"] = differences(results, rows)
     return blocks
 
 
@@ -331,22 +365,22 @@ def _outcome(results: Results[ReplayResult]) -> Table:
     rows: dict[str, Callable[[ReplayResult], str]] = {}
     rows["np.array_equal"] = lambda result: str(result.identical)
     rows["np.allclose"] = lambda result: str(result.close)
-    rows["difference at the end"] = lambda result: f"{result.difference[-1]:.1e}"
-    rows["largest on the way"] = lambda result: f"{result.difference.max():.1e}"
-    rows["largest turn of a hinge"] = lambda result: degrees(result.travel, 1)
-    return by_engine(results, rows, "Two runs compared")
+    rows[_SAY("at_end")] = lambda result: f"{result.difference[-1]:.1e}"
+    rows[_SAY("on_the_way")] = lambda result: f"{result.difference.max():.1e}"
+    rows[_SAY("turn")] = lambda result: degrees(result.travel, 1)
+    return by_engine(results, rows, _SAY("outcome"))
 
 
 def _touched(results: Results[ReplayResult]) -> Table:
     """Show how many contacts the steps of the first run found, and which pairs touched."""
     rows: dict[str, Callable[[ReplayResult], str]] = {}
-    rows["fewest contacts in a step"] = lambda result: str(result.contacts.min())
+    rows[_SAY("fewest")] = lambda result: str(result.contacts.min())
     rows["most"] = lambda result: str(result.contacts.max())
     rows["on average"] = lambda result: f"{result.contacts.mean():.1f}"
     for result in results.values():
         for pair in result.pairs:
             rows[pair] = partial(_steps_of_pair, pair)
-    return by_engine(results, rows, "What touched, in the first run")
+    return by_engine(results, rows, _SAY("touched"))
 
 
 def _steps_of_pair(pair: str, result: ReplayResult) -> str:
@@ -370,10 +404,3 @@ def _bodies_apart(left: ReplayResult, right: ReplayResult) -> str:
 def _contacts_apart(left: ReplayResult, right: ReplayResult) -> str:
     """Compare the average number of contacts in a step."""
     return f"{right.contacts.mean():.1f} instead of {left.contacts.mean():.1f}"
-
-
-_DIFFERENCES: dict[str, Callable[[ReplayResult, ReplayResult], str]] = {
-    "hinges at the end, worst": _hinges_apart,
-    "free body at the end": _bodies_apart,
-    "contacts a step, on average": _contacts_apart,
-}

@@ -13,14 +13,15 @@ from ...interface import INPUTS, Data, JointType, Model, forward, make_data, res
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import read_derived, read_stored
-from ...lab.runs.robot import body_pairs, carried_by, moved_by_actuators
+from ...lab.runs.robot import actuated_bodies, carried_by, contact_counts
 from ...measures.text import count, millimetres
 from ...show.blocks import Block, Table
-from ...show.lesson_template import differences, emulated
+from ...show.lesson_template import Words, differences, emulated
 from .session import CodeRun, Options
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
+_SAY = Words("course/lessons/reset")
 
 # Lines of the code after which the Data is looked at.
 _MADE = "data = sm.make_data(model)"
@@ -95,7 +96,8 @@ class ResetResult:
         same_future: Whether the next `steps` are bit for bit those of a fresh Data.
         steps: Steps before the reset, and after it.
         simulated: Simulated time of these steps [s].
-        scenes: The scene of each keyframe.
+        further: Whether what goes further was asked for.
+        scenes: The scene of each keyframe; where what goes further was not asked for, of the first.
         provenance: What it was computed with.
     """
 
@@ -104,6 +106,7 @@ class ResetResult:
     same_future: bool
     steps: int
     simulated: float
+    further: bool
     scenes: tuple[KeyframeScene, ...]
     provenance: Provenance
 
@@ -119,10 +122,11 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ResetResult:
             derived[source] = read_derived(play.names["data"])
     _, data = play.worlds[0]
     scenes = []
-    for key in range(len(model.keyframes)):
+    shown = len(model.keyframes) if options["further"] else min(1, len(model.keyframes))
+    for key in range(shown):
         reset(model, data, keyframe=key)
         scenes.append(_scene(model, data, key))
-        progress((key + 1) / len(model.keyframes))
+        progress((key + 1) / shown)
     restored = _restored(stored[_MADE], stored[_STEPPED], stored[_RESET])
     is_empty = derived[_RESET] == derived[_MADE] and _is_zero(derived[_MADE])
     return ResetResult(
@@ -131,6 +135,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ResetResult:
         same_future=_has_future_of_fresh(model, data),
         steps=_STEPS,
         simulated=_STEPS * model.timestep,
+        further=options["further"],
         scenes=tuple(scenes),
         provenance=provenance(model),
     )
@@ -170,7 +175,7 @@ def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
     body = _free_body(model)
     start = _height(model, data)
     forward(model, data)
-    contacts = body_pairs(model, data.contacts)
+    contacts = contact_counts(model, data.contacts)
     on_robot, on_world = _touches(model, data, body)
     robot_steps = world_steps = 0
     for _ in range(_WATCHED):
@@ -222,7 +227,7 @@ def _height(model: Model, data: Data) -> float:
 
 def _touches(model: Model, data: Data, body: int | None) -> tuple[int, int]:
     """Return how many contacts a body has with the robot, and how many with what does not move."""
-    robot, moving = moved_by_actuators(model), carried_by(model, set(model.jnt_bodyid.tolist()))
+    robot, moving = actuated_bodies(model), carried_by(model, set(model.jnt_bodyid.tolist()))
     pairs = [set(pair) for pair in model.geom_bodyid[data.contacts.geom].tolist()]
     others = [pair - {body} for pair in pairs if body in pair]
     return sum(bool(pair & robot) for pair in others), sum(not pair <= moving for pair in others)
@@ -231,7 +236,7 @@ def _touches(model: Model, data: Data, body: int | None) -> tuple[int, int]:
 def slots(result: ResetResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
     restores_all = set(result.restored) == {*INPUTS, "time"}
-    held = [scene.name for scene in result.scenes if scene.held]
+    held = [scene.name for scene in result.scenes[:1] if scene.held]
     return {
         "simulated": f"{result.simulated:g} s",
         "steps": count(result.steps, "step"),
@@ -259,11 +264,13 @@ def _keyframe_slots(result: ResetResult) -> dict[str, Any]:
         return _NO_KEYFRAME
     scene = result.scenes[0]
     is_public = result.provenance.model_file.startswith("robotstudio_so101")
+    several = len(result.scenes) > 1
     return {
         "asks": scene.time != 0,
         "right": 2 if "time" in scene.exact else 0,
         "frame": scene.name,
         "frame_time": f"{scene.time:g} s",
+        "several": several,
         "body": scene.body,
         "public": is_public and scene.on_robot == 0,
     }
@@ -278,8 +285,12 @@ def tables(
     for number, scene in enumerate(first.scenes):
         keyframes.append(_keyframe(number, results))
         if scene.body:
-            rises[f"rise of the {scene.body}, {scene.name}"] = partial(_rises, number)
-    return {"keyframes": keyframes, "differences": differences(results, rises)}
+            rises[_SAY("rise", body=scene.body, keyframe=scene.name)] = partial(_rises, number)
+    return {
+        "keyframe": keyframes[:1],
+        "others": keyframes[1:],
+        "differences": differences(results, rises),
+    }
 
 
 def _rises(number: int, left: ResetResult, right: ResetResult) -> str:
@@ -297,8 +308,8 @@ def _keyframe(number: int, results: Mapping[str, ResetResult]) -> Table:
         rows += _later_rows(first.body, scenes)
     if not rows:
         rows = [("nothing", *("" for _ in scenes))]
-    title = f"Keyframe {number} ({first.name!r}, time {first.time:g} s), after forward"
-    return Table(("what touches", *results), rows, title)
+    title = _SAY("keyframe", number=number, name=first.name, time=f"{first.time:g} s")
+    return Table((_SAY("touches"), *results), rows, title)
 
 
 def _contact_rows(scenes: Sequence[KeyframeScene]) -> list[tuple[str, ...]]:
@@ -316,9 +327,9 @@ def _later_rows(body: str, scenes: Sequence[KeyframeScene]) -> list[tuple[str, .
     by_robot = [str(scene.robot_steps) for scene in scenes]
     by_world = [str(scene.world_steps) for scene in scenes]
     rises = [millimetres(scene.rise) for scene in scenes]
-    after = f"of the next {scenes[0].nstep} steps, those in which"
+    steps = scenes[0].nstep
     return [
-        (f"{after} the robot touches the {body}", *by_robot),
-        (f"{after} a fixed body touches it", *by_world),
-        ("how far it rises in all of them", *rises),
+        (_SAY("robot_steps", steps=steps, body=body), *by_robot),
+        (_SAY("world_steps", steps=steps, body=body), *by_world),
+        (_SAY("rises", steps=steps, body=body), *rises),
     ]

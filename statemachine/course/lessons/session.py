@@ -18,8 +18,8 @@ import statemachine
 from ...backends import backend_engine
 from ...interface import Array, Data, Model, make_data, step
 from ...lab.probes.code_statements import statements
-from ...lab.runs.drive import Progress, silent, steps_in
-from ...lab.runs.robot import is_the_arm, warn_of_start
+from ...lab.runs.drive import Progress, no_progress, number_of_steps
+from ...lab.runs.robot import is_so101, warn_of_start
 from ...show import lesson_template as template
 from ...show.blocks import Block, Code, Page, Printed
 from . import Lesson, module
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ...show.lesson_template import HasProvenance
     from ...show.pictures import Diagram
 
+_SAY = template.Words("course/lessons/session")
 Options = Mapping[str, Any]  # of a lesson, by key
 L = TypeVar("L")  # what is looked at after a step
 R_co = TypeVar("R_co", covariant=True)  # the result of a lesson
@@ -214,7 +215,7 @@ def take(
     options: Options | None = None,
     name: str | None = None,
     menagerie: str | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     calls: bool = False,
 ) -> LessonRun:
     """Run the code of a lesson, and what else the lesson looks at.
@@ -238,7 +239,7 @@ def take(
     recording = _recorded(code, backend) if calls else None
     draw = getattr(lesson_module, "diagram", None)
     diagram = draw(model) if draw else None
-    return LessonRun(result, code, play.printed, is_the_arm(model), recording, diagram)
+    return LessonRun(result, code, play.printed, is_so101(model), recording, diagram)
 
 
 def _recorded(code: str, backend: str) -> Recording | None:
@@ -277,9 +278,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
     if hasattr(lesson_module, "tables"):
         blocks |= lesson_module.tables(results, first.result)
     page = template.page(f"course/lessons/{lesson.name}", results, slots, blocks, prose=first.arm)
-    heading = "code and figures; its text is about the SO-101"
-    if first.arm:
-        heading = lesson.question
+    heading = lesson.question if first.arm else _SAY("other_robot")
     return replace(page, title=f"{lesson.name}: {heading}")
 
 
@@ -312,7 +311,7 @@ def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple
         marks: Times at which the loop stops [s].
         seconds: The last of these times [s].
     """
-    total = steps_in(model, seconds)
+    total = number_of_steps(model, seconds)
     ends = {0, total}
     for time in marks:
         end = round(time / model.timestep)

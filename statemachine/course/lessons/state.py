@@ -12,11 +12,12 @@ from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import grouped, listed
 from ...show.blocks import Block, Table
-from ...show.lesson_template import differences
+from ...show.lesson_template import Words, differences
 from ...show.pictures import Diagram
 from .diagrams.joint_slots import joint_slots
 from .session import CodeRun, Options
 
+_SAY = Words("course/lessons/state")
 NO_NAME = "(no name)"
 _SIZES = ("nq", "nv", "nu", "nbody")
 
@@ -175,7 +176,7 @@ def tables(
         "sizes": _sizes(results),
         "owners": _owners(results),
         "terms": [_terms_table(name, result) for name, result in results.items() if result.terms],
-        "differences": differences(results, {"names, sizes and slots": _compared}),
+        "differences": differences(results, {_SAY("layout"): _compared}),
     }
 
 
@@ -185,8 +186,7 @@ def _sizes(results: Mapping[str, StateResult]) -> Table:
         (name, str(result.nq), str(result.nv), str(result.nu), str(result.nbody))
         for name, result in results.items()
     ]
-    title = "Lengths of qpos, qvel and ctrl; number of bodies, the world included"
-    return Table(("", *_SIZES), rows, title)
+    return Table(("", *_SIZES), rows, _SAY("sizes"))
 
 
 def _owners(results: Mapping[str, StateResult]) -> list[Table]:
@@ -197,7 +197,7 @@ def _owners(results: Mapping[str, StateResult]) -> list[Table]:
 
 def _slots_table(joints: Sequence[JointSlots], engines: Sequence[str]) -> Table:
     """Return the slots of each joint on some engines."""
-    title = f"Which slots are whose, on {listed(engines)}"
+    title = _SAY("slots", engines=listed(engines))
     return Table.of(
         joints,
         {
@@ -213,7 +213,7 @@ def _slots_table(joints: Sequence[JointSlots], engines: Sequence[str]) -> Table:
 
 def _terms_table(engine: str, result: StateResult) -> Table:
     """Return what an engine itself calls what we have a name for."""
-    theirs = f"in {engine} itself"
+    theirs = _SAY("theirs", engine=engine)
     return Table.of(
         result.terms,
         {
@@ -221,7 +221,7 @@ def _terms_table(engine: str, result: StateResult) -> Table:
             "here": lambda term: term.ours,
             theirs: lambda term: term.engine,
         },
-        title=f"What {engine} calls it",
+        title=_SAY("terms", engine=engine),
         words=("here", theirs),
     )
 
@@ -231,7 +231,7 @@ def _compared(left: StateResult, right: StateResult) -> str:
     same_sizes = all(getattr(left, size) == getattr(right, size) for size in _SIZES)
     if same_sizes and left.joints == right.joints:
         return "none"
-    return "they differ: see above"
+    return _SAY("differ")
 
 
 def _interval(start: int, stop: int) -> str:

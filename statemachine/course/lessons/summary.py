@@ -11,7 +11,7 @@ from ...interface import Array, Model
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import tips_of, usual_tip
-from ...measures.text import count, degrees, vector
+from ...measures.text import count, position, vector
 from ._robot import coordinate, usual_joint, usual_value
 from .session import CodeRun, Options
 
@@ -74,7 +74,6 @@ class SummaryResult:
         value: What was written into its place in qpos [rad; of a slide, m].
         sagged: Its position under an untouched ctrl [rad; of a slide, m].
         slide: Whether it is a slide.
-        commanded: (nu,) the command that both runs of the replay were given.
         same: Whether the two ended in the same bits.
         restart: `data.time` after the reset [s].
         rate: Simulated time over wall time in the last line.
@@ -115,19 +114,22 @@ def run(play: CodeRun, options: Options, progress: Progress) -> SummaryResult:
         second()
     again = _by_lesson(second.printed)
     names = play.names
+    changed = tuple(name for name in lines if lines[name] != again[name])
+    is_same = bool(np.array_equal(names["first"], names["second"]))
+    value, rate = usual_value(model, joint), 1000 * model.timestep / names["wall"]
     return SummaryResult(
         lines=lines,
-        changed=tuple(name for name in lines if lines[name] != again[name]),
+        changed=changed,
         fingertip=fingertip,
         nq=model.nq,
         nv=model.nv,
         joint=joint,
-        value=usual_value(model, joint),
+        value=value,
         sagged=sagged,
         slide=at.slide,
-        same=bool(np.array_equal(names["first"], names["second"])),
+        same=is_same,
         restart=restart,
-        rate=1000 * model.timestep / names["wall"],
+        rate=rate,
         provenance=provenance(model),
     )
 
@@ -144,12 +146,9 @@ def _by_lesson(printed: str) -> dict[str, str]:
 def slots(result: SummaryResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
     repeats = set(result.changed) <= {_LAST}
-    slots: dict[str, Any] = {
-        "right": 1 if repeats else None,
-        "repeats": repeats,
-        "place": vector(result.fingertip),
-        "count": count(len(result.lines), "line"),
-        "sag": degrees(result.sagged, 3),
-        "times": f"{result.rate:.0f}",
-    }
+    slots: dict[str, Any] = {"right": 1 if repeats else None, "repeats": repeats}
+    slots["place"] = vector(result.fingertip)
+    slots["count"] = count(len(result.lines), "line")
+    slots["sag"] = position(abs(result.sagged), result.slide, 3)
+    slots["times"] = f"{result.rate:.0f}"
     return slots

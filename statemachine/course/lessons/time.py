@@ -12,8 +12,8 @@ import numpy as np
 from ...errors import BadInputError
 from ...interface import Array, Data, Model, make_data, step
 from ...interface.checks import as_count
-from ...lab.runs.drive import Progress, part_of, steps_in
-from ...lab.runs.in_turns import FEWEST, Ratio
+from ...lab.runs.drive import Progress, number_of_steps, progress_of_stage
+from ...lab.runs.interleaved_timing import MIN_ROUNDS, Ratio
 from ...lab.runs.provenance import Provenance, provenance
 from ...measures.text import count, duration
 from ...show.blocks import Block, Table
@@ -42,7 +42,7 @@ def _paced_steps(model: Model, options: Options) -> int:
         raise BadInputError("--seconds goes with --realtime")
     if seconds is None:
         seconds = _WATCHED if options["realtime"] else _BRIEF
-    return steps_in(model, seconds)
+    return number_of_steps(model, seconds)
 
 
 def _free(model: Model, steps: int, load: str) -> str:
@@ -183,13 +183,13 @@ def run(play: CodeRun, options: Options, progress: Progress) -> TimeResult:
     with CodeRun(also, model) as second:
         free_code, paced_code = (second, play) if realtime else (play, second)
         stepped, slept = _run_free(free_code)
-        paced = _run_paced(paced_code, paced_steps, part_of(progress, 0.0, 0.4))
+        paced = _run_paced(paced_code, paced_steps, progress_of_stage(progress, 0.0, 0.4))
         (_, data), (_, other) = free_code.worlds[0], paced_code.worlds[0]
         free, unpaced = _without_waiting(model, paced_steps)
         rate = _rate(model, data, steps)
         further = None
         if options["further"]:
-            further = measured(model, steps, part_of(progress, 0.5, 0.5))
+            further = measured(model, steps, progress_of_stage(progress, 0.5, 0.5))
         return TimeResult(
             nstep=steps,
             wall=free_code.names["wall"],
@@ -287,19 +287,15 @@ def _sum_of_steps(model: Model, steps: int) -> float:
 def slots(result: TimeResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
     still = is_still(result)
-    slots: dict[str, Any] = {
-        "right": 0 if still else 1,
-        "speed_right": _speed_choice(result.rate),
-        "nap": f"{result.nap:.2f} s",
-        "still": still,
-        "steps": count(result.nstep, "step"),
-        "timestep": f"{result.provenance.timestep:g}",
-        "rounds": count(result.rate.rounds, "round"),
-        "rate": f"{result.rate.median:.0f}",
-        "wait": f"{result.waited / result.paced:.0%}",
-        "paced_time": f"{result.simulated:g} s",
-        **_clock_slots(result),
-    }
+    slots: dict[str, Any] = {"right": 0 if still else 1, "still": still}
+    slots["speed_right"] = _speed_choice(result.rate)
+    slots["nap"] = f"{result.nap:.2f} s"
+    slots["steps"] = count(result.nstep, "step")
+    slots["timestep"] = f"{result.provenance.timestep:g}"
+    slots["rounds"] = count(result.rate.rounds, "round")
+    slots["rate"] = f"{result.rate.median:.0f}"
+    slots["paced_time"] = f"{result.simulated:g} s"
+    slots |= _clock_slots(result)
     if result.further is not None:
         slots |= loop_slots(result.further)
     return slots
@@ -313,7 +309,7 @@ def is_still(result: TimeResult) -> bool:
 def _speed_choice(rate: Ratio) -> int | str:
     """Return the number of the right choice, how many times real time; or `UNDECIDED`."""
     straddles = any(rate.low <= bound <= rate.high for bound in _BOUNDS)
-    if rate.rounds < FEWEST or straddles:
+    if rate.rounds < MIN_ROUNDS or straddles:
         return UNDECIDED
     return sum(rate.median > bound for bound in _BOUNDS)
 

@@ -1,6 +1,6 @@
 """A description of a robot of which places and Jacobians can be computed.
 
-What a witness has read tells of itself through forward kinematics alone: bodies that the same
+What a witness has read shows through forward kinematics alone: bodies that the same
 joints move are one rigid part, and the Jacobian of a body says where each of these joints is and
 along what. So files of all formats are described in one way. There are no masses and no shapes.
 """

@@ -45,9 +45,9 @@ class ModelReading:
         visuals: What is only drawn; empty for what an engine made of a file.
         lines: Where the elements of the file stand; None for what an engine made of it.
         declared: What the source says in words of its own, of what it has no word for much: a URDF,
-            or what an engine tells. None of an MJCF, which has a word for everything.
+            or what an engine reports. None of an MJCF, which has a word for everything.
         floats: Whether its base was given a free joint, of which the file says nothing.
-        settings: Names of the options that the source tells of; None where it tells of all.
+        settings: Names of the options that the source states; None where it states all.
         notes: What a reader should know, in sentences.
         mended: As `model`, but with the masses and inertias that a run has; None where none was
             mended.

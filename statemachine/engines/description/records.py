@@ -32,7 +32,7 @@ class Inertial:
     com: Array
     tensor: Array
 
-    def seen_from(self, place: Placement) -> Inertial:
+    def in_frame(self, place: Placement) -> Inertial:
         """Return the same body in the frame in which its link is at `place`."""
         return Inertial(self.mass, place.of(self.com), place.mat @ self.tensor @ place.mat.T)
 
@@ -191,7 +191,7 @@ class Robot:
         return {part.name for part in (*self.joints, *self.links, *self.frames)}
 
 
-def moved(joint: RobotJoint | None, amount: float) -> Placement:
+def joint_transform(joint: RobotJoint | None, amount: float) -> Placement:
     """Return the link's frame at a position of its joint, in the frame that the link has at
     zero.
     """

@@ -45,7 +45,7 @@ def bounds_of(shape: CollisionShape) -> Array:
     return np.concatenate((shape.corners.min(axis=0), shape.corners.max(axis=0)))
 
 
-def likest(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> dict[int, int]:
+def most_alike(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> dict[int, int]:
     """Return which shape of a part is which of another, both in one frame: by name, then by
     likeness.
     """

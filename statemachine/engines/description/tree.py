@@ -15,7 +15,7 @@ import numpy as np
 
 from ...interface import Array
 from ...rotations import HERE, Placement
-from .records import SCALAR, CollisionShape, Inertial, Link, Robot, RobotJoint, moved
+from .records import SCALAR, CollisionShape, Inertial, Link, Robot, RobotJoint, joint_transform
 
 GRAVITY = 9.81  # [m/s²]
 
@@ -58,8 +58,8 @@ class Group:
     @cached_property
     def inertial(self) -> Inertial:
         """Return the inertial properties of all of its links together, in the group's frame."""
-        return together(
-            [link.inertial.seen_from(place) for link, place in self.links if link.inertial]
+        return composite(
+            [link.inertial.in_frame(place) for link, place in self.links if link.inertial]
         )
 
     @cached_property
@@ -72,7 +72,7 @@ class Group:
         )
 
 
-def together(parts: list[Inertial]) -> Inertial:
+def composite(parts: list[Inertial]) -> Inertial:
     """Return the composite of rigid parts in one frame: the parallel axis theorem."""
     if len(parts) == 1:
         return parts[0]
@@ -145,7 +145,7 @@ class GroupTree:
         for group in self.groups:
             above = poses[group.parent] if group.parent >= 0 else HERE
             amount = (positions or {}).get(group.joint.name, 0.0) if group.joint else 0.0
-            poses.append(above @ group.place @ moved(group.joint, amount))
+            poses.append(above @ group.place @ joint_transform(group.joint, amount))
         return poses
 
     @cached_property
@@ -164,11 +164,11 @@ class GroupTree:
         carried = [group.inertial for group in self.groups]
         for group in reversed(self.groups):  # children before parents
             if group.parent >= 0:
-                body = carried[group.number].seen_from(group.place)
-                carried[group.parent] = together([carried[group.parent], body])
+                body = carried[group.number].in_frame(group.place)
+                carried[group.parent] = composite([carried[group.parent], body])
         return carried
 
-    def felt(self, number: int) -> tuple[float, float]:
+    def inertia_and_load(self, number: int) -> tuple[float, float]:
         """Return the inertia about the joint of each group of all that it carries, at zero; NaN
         without a joint.
 

@@ -150,7 +150,7 @@ def _declared(root: Element) -> Declared:
 def _friction(name: str, link: Element) -> tuple[float, float, float] | None:
     """Return the lateral, spinning and rolling friction of a `<contact>`; None if it says none."""
     values = [
-        _said(link, f"contact/{kind}_friction", "value", f"link {name!r}")
+        _attribute_value(link, f"contact/{kind}_friction", "value", f"link {name!r}")
         for kind in ("lateral", "spinning", "rolling")
     ]
     if values[0] is None:
@@ -248,12 +248,12 @@ def _joint(name: str, element: Element) -> DeclaredJoint | None:
         if element.find("limit") is None:
             raise ModelError(f"{where} is {kind} and has no <limit>")
         for end in ("lower", "upper"):
-            _said(element, "limit", end, where)
+            _attribute_value(element, "limit", end, where)
     return DeclaredJoint(
-        velocity=_said(element, "limit", "velocity", where),
-        effort=_said(element, "limit", "effort", where),
-        damping=_said(element, "dynamics", "damping", where),
-        friction=_said(element, "dynamics", "friction", where),
+        velocity=_attribute_value(element, "limit", "velocity", where),
+        effort=_attribute_value(element, "limit", "effort", where),
+        damping=_attribute_value(element, "dynamics", "damping", where),
+        friction=_attribute_value(element, "dynamics", "friction", where),
     )
 
 
@@ -281,7 +281,7 @@ def _number_or_none(text: str) -> float | None:
         return None
 
 
-def _said(element: Element, path: str, attribute: str, where: str) -> float | None:
+def _attribute_value(element: Element, path: str, attribute: str, where: str) -> float | None:
     """Return the number of an attribute of an element below; None where the file gives none."""
     numbers = _numbers(element, path, attribute, 1, where, ())
     return float(numbers[0]) if len(numbers) else None

@@ -144,7 +144,11 @@ class MujocoEngine(RawEngine):
         return energies
 
     def opengl(self) -> str:
-        """Return the MUJOCO_GL that it draws with here."""
+        """Return the value of MUJOCO_GL with which the engine draws here.
+
+        Raises:
+            MissingEngineError: It finds no OpenGL to draw with.
+        """
         from .rendering import offscreen_opengl, opengl_remedy
 
         require("mujoco")
@@ -156,7 +160,7 @@ class MujocoEngine(RawEngine):
         return opengl
 
     def drawn_by(self, opengl: str) -> str:
-        """Return the engine's name, with the OpenGL that it was told."""
+        """Return the engine's name, with the OpenGL that it draws with."""
         return f"MuJoCo (MUJOCO_GL={opengl})" if opengl else "MuJoCo"
 
     def watched_data(self) -> type[Data]:

@@ -96,9 +96,9 @@ def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         together = _OF_A_FILTER
     of_law = [row for row in rows if row.subject in together]
     values = list(dynamics(sides.left, a, sides.right, b))
-    told = {value.quantity for value in values}
+    known = {value.quantity for value in values}
     for row in of_law:
-        values += [value for value in row.values if value.quantity not in told]
+        values += [value for value in row.values if value.quantity not in known]
     subject = "filter" if filters else "law"
     if ours.size == theirs.size:
         edits = list(copies(_STATE_ARRAYS, sides.left, a, b))

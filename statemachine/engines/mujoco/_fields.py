@@ -279,7 +279,7 @@ FATES = {
         "flex_node0 flex_nodenum flex_stiffness flex_bending flex_elem flex_elemnum flex_edge "
         "flex_edgenum flexedge_rigid"
     ),
-    # Compared whole: a model that has any can be compared, but is not brought to another.
+    # Compared whole: a model that has any can be compared, but is not equalized with another.
     "whole": (
         "plugin plugin_attr plugin_attradr body_plugin geom_plugin actuator_plugin "
         "sensor_plugin actuator_history"

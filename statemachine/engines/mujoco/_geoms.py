@@ -13,7 +13,7 @@ from ...interface import Array
 from ...measures.text import few
 from ...rotations import Placement
 from ..description.records import CollisionShape
-from ..description.shapes import LaidShape, laid_on, likest
+from ..description.shapes import LaidShape, laid_on, most_alike
 from ..records import DifferingQuantity, Edit, ModelDifference
 from . import _shapes as shapes
 from ._quantities import quantity_of, same
@@ -57,7 +57,7 @@ class Geoms:
                 ours[g] = replace(shape, place=pair.align @ shape.place)
             self._shapes[0].update(ours)
             self._shapes[1].update(theirs)
-            for k, i in likest([*ours.values()], [*theirs.values()]).items():
+            for k, i in most_alike([*ours.values()], [*theirs.values()]).items():
                 yield [*ours][k], [*theirs][i]
 
     def _on(self, side: int, head: int) -> dict[int, CollisionShape]:

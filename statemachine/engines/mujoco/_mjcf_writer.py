@@ -215,7 +215,11 @@ class ElementWriter:
                 self.texts.append(AttributeText(element, attribute, text))
 
     def shape(self, raw: Any, names: set[str]) -> None:
-        """Write type, size and place of a geom."""
+        """Write type, size and place of a geom.
+
+        Raises:
+            NotWrittenError: Its shape stands in its asset.
+        """
         kind = word_in("mjtGeom", int(self._target.value("geom_type", self._number)))
         position, turn = self._value("geom_pos"), self._value("geom_quat")
         if self._target.is_changed("geom_type", self._number):
@@ -283,7 +287,11 @@ class ElementWriter:
             self.texts.append(AttributeText(self._element, attribute, text, child=("inertial",)))
 
     def gains(self) -> None:
-        """Write the gains of an actuator in the words of its shortcut."""
+        """Write the gains of an actuator in the words of its shortcut.
+
+        Raises:
+            NotWrittenError: An actuator of that shortcut cannot have these gains.
+        """
         gain, bias = self._value("actuator_gainprm"), self._value("actuator_biasprm")
         words = [
             word_in(enumeration, int(self._value(array)[0]))

@@ -36,7 +36,7 @@ _WEIGHS = {
     "centre of mass": ("body_ipos",),
     "inertia": ("body_inertia", "body_iquat"),
 }
-# Why something cannot be brought over, and what to do.
+# Why something cannot be equalized, and what to do.
 _OTHER_OWNER = "it is on another part: put the site on the same body in both files"
 _OTHER_JOINTS = (
     "it has other joints: write the same ones into both files, or pair two by --map LEFT=RIGHT"
@@ -56,7 +56,7 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
         if not (pair.left and pair.right) or sides.left.body_mocapid[pair.left] >= 0:
             continue  # what no force moves has no weight
         here, there = ours.massive(pair.left), theirs.massive(pair.right)
-        composite = ours.inertial(*here).seen_from(pair.align)
+        composite = ours.inertial(*here).in_frame(pair.align)
         if not (here or there):
             continue
         if not _differing(composite, theirs.inertial(*there)):
@@ -65,7 +65,7 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
             continue
         if len(there) == 1:
             yield from _of_body(sides, pair, there[0], composite, here)
-        elif pair.align is HERE and _made_alike(sides, here, there):
+        elif pair.align is HERE and _same_structure(sides, here, there):
             for a, b in zip(here, there, strict=True):
                 yield from _of_body(sides, replace(pair, left=a), b, ours.inertial(a), [a])
         else:
@@ -141,7 +141,7 @@ def _as_ellipsoid(tensor: Array) -> CollisionShape:
     return CollisionShape("ellipsoid", place, tuple(moments.tolist()))
 
 
-def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:
+def _same_structure(sides: Sides, here: list[int], there: list[int]) -> bool:
     """Tell whether the bodies of a part are the same ones in the same places."""
     if len(here) != len(there):
         return False

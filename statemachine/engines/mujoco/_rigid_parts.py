@@ -14,7 +14,7 @@ from ...installed import require
 from ...interface import Array
 from ...rotations import HERE, Placement, matrix_from_quat
 from ..description.records import Inertial
-from ..description.tree import together
+from ..description.tree import composite
 
 
 def placed(pos: Array, quat: Array) -> Placement:
@@ -99,4 +99,4 @@ class Solids:
 
     def inertial(self, *bodies: int) -> Inertial:
         """Return the mass properties of the bodies of a rigid part together, in its frame."""
-        return together([inertial_of(self.raw, b).seen_from(self.place(b)) for b in bodies])
+        return composite([inertial_of(self.raw, b).in_frame(self.place(b)) for b in bodies])

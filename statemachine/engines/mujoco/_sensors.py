@@ -25,7 +25,7 @@ def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]
         right: Another; its sensors of the same name are the counterparts.
         pairs: What of one is what of the other.
     """
-    why = "a sensor is built by the compiler"  # so only a cutoff can be brought over
+    why = "a sensor is built by the compiler"  # so only a cutoff can be equalized
     rows: list[ModelDifference] = []
     for row in _sensors(Sides(left, right, pairs)):
         able = row.subject in ("cutoff", ORDER_OF_SENSORS)

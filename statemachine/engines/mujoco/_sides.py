@@ -155,7 +155,7 @@ class Sides:
             pairs: Ids, or other places in these arrays.
             table: Of `fields.ROWS`; else that of the kind.
             name: What they are called; else each by its own name.
-            back: Whether it is the first that can be brought to the second.
+            back: Whether it is the first that can be equalized with the second.
         """
         for a, b in pairs:
             for row in fields.ROWS[table or kind]:

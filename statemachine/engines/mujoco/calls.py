@@ -9,7 +9,7 @@ import numpy as np
 
 from ...backends import mujoco_backend
 from ...interface import DERIVED, INPUTS, Data, Model
-from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named
+from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named_values
 
 _OURS = ("time", *INPUTS, *DERIVED)
 # What comes before the rest in a list of what changed.
@@ -128,7 +128,7 @@ class MujocoWatch(CallWatch):
         return known
 
     def name(self, namespace: Mapping[str, Any]) -> None:
-        for label, value in named(namespace):
+        for label, value in named_values(namespace):
             leads = [(label, value, True)]
             if isinstance(value, (Model, Data)):
                 model = value if isinstance(value, Model) else value.model
@@ -139,13 +139,13 @@ class MujocoWatch(CallWatch):
                 ]
             if isinstance(value, Data):  # of a closed one there is none
                 leads.append((label, getattr(value, "_raw", None), False))
-            for said, thing, raw in leads:
+            for text, thing, raw in leads:
                 if isinstance(thing, self._kinds):
                     watched = self._watched(thing)
                     watched.raw = watched.raw if watched.named else raw
-                    watched.lead(said)
+                    watched.note_variable(text)
 
-    def living(self) -> Sequence[WatchedObject]:
+    def live_objects(self) -> Sequence[WatchedObject]:
         self._known = {key: known for key, known in self._known.items() if known.thing is not None}
         return list(self._known.values())
 

@@ -18,7 +18,7 @@ from ..description.records import (
     Robot,
     RobotFrame,
     RobotJoint,
-    moved,
+    joint_transform,
 )
 from . import _shapes as shapes
 from ._gains import kind_of_gains
@@ -84,7 +84,7 @@ def _links(raw: Any, body: int, above: str, actuators: tuple[Actuator, ...]) -> 
     first, count = int(raw.body_jntadr[body]), int(raw.body_jntnum[body])
     for joint in range(first, first + count):
         moves = _joint(raw, joint, actuators)
-        start = place @ moved(moves, -float(raw.qpos0[raw.jnt_qposadr[joint]]))
+        start = place @ joint_transform(moves, -float(raw.qpos0[raw.jnt_qposadr[joint]]))
         last = joint == first + count - 1
         label = name if last else f"{name}, above {raw.joint(joint + 1).name or joint + 1}"
         links.append(Link(label, above, start, moves, None, body=body))
@@ -109,7 +109,7 @@ def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
         limits=_limited(raw.jnt_range[joint], raw.jnt_limited[joint]),
         number=joint,
     )
-    told = replace(
+    described = replace(
         plain,
         armature=float(raw.dof_armature[dof]),
         damping=float(raw.dof_damping[dof]),
@@ -117,8 +117,8 @@ def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
         stiffness=float(raw.jnt_stiffness[joint]),
     )
     if not scalar:
-        return told
-    return replace(told, effort=_effort(raw, joint, actuators))
+        return described
+    return replace(described, effort=_effort(raw, joint, actuators))
 
 
 def _notes(raw: Any, actuators: tuple[Actuator, ...]) -> list[str]:
@@ -141,8 +141,8 @@ def _notes(raw: Any, actuators: tuple[Actuator, ...]) -> list[str]:
         ),
         (freed, "body freed of weight (gravcomp)", "bodies freed of weight (gravcomp)"),
     )
-    said = [f"{count} {one if count == 1 else several}" for count, one, several in counted if count]
-    notes = [f"it has {', '.join(said)}"] if said else []
+    words = [f"{count} {one if count == 1 else plural}" for count, one, plural in counted if count]
+    notes = [f"it has {', '.join(words)}"] if words else []
     return notes + [text for i, drive in enumerate(actuators) if (text := _beyond(raw, i, drive))]
 
 

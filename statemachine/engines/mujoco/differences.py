@@ -101,9 +101,9 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
 
 def _read(raw: Any, edit: Edit) -> Any:
     """Return the value at the place of an edit."""
-    from ...backends.edits import held
+    from ...backends.edits import owner_of_field
 
-    holder, field = held(raw, edit[0])
+    holder, field = owner_of_field(raw, edit[0])
     now = getattr(holder, field)
     if np.ndim(now):
         return np.array(now[edit[1]])

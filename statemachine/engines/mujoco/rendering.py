@@ -54,7 +54,7 @@ class MujocoDrawer:
         self._near, self._far = camera.near, camera.far
         self._turn = matrix_from_quat(raw.geom_quat)
         self._data = mj.MjData(raw)
-        mj.mj_forward(raw, self._data)  # lights, and all that no trace tells
+        mj.mj_forward(raw, self._data)  # lights, and all that no trace has
         self._pen = mj.MjrContext(raw, mj.mjtFontScale.mjFONTSCALE_100)
         mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._pen)
         self._pen.readDepthMap = mj.mjtDepthMap.mjDEPTH_ZEROFAR

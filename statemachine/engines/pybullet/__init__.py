@@ -39,7 +39,11 @@ class PybulletEngine(RawEngine):
     drawer = function_of(".pybullet.rendering:PybulletDrawer")
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
-        """Return the dials of a Model with `defaults="engine"`."""
+        """Return the dials of a Model with `defaults="engine"`, None for any other.
+
+        Raises:
+            UnsupportedError: PyBullet fixes the floating base of the model.
+        """
         from ...backends import pybullet_backend as backend
         from .dials import PybulletDials
 

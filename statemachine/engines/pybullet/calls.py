@@ -16,7 +16,7 @@ from ...backends.hidden_data import HiddenData, Machine
 from ...backends.pybullet_backend import PybulletModel
 from ...installed import require
 from ...interface import DERIVED, INPUTS
-from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named
+from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named_values
 
 # How many arguments come before `physicsClientId` where it is given by its place, which the
 # engine's functions do not tell. It is the last one in all of these.
@@ -72,7 +72,7 @@ class _World(WatchedObject):
         self._pb, self._client, self._open = engine, client, True
 
     @property
-    def gone(self) -> bool:
+    def is_gone(self) -> bool:
         # Once gone for good: the engine gives the number to another world.
         self._open = self._open and bool(self._pb.isConnected(self._client))
         return not self._open
@@ -137,7 +137,7 @@ class _Arrays(WatchedObject):
         # What was never read is what a fresh Data says: zeros.
         return [name for name, new in now.items() if before.get(name, bytes(len(new))) != new]
 
-    def due(self) -> bool:
+    def is_outdated(self) -> bool:
         machine = self.thing
         if machine is None or machine.moment is self._moment:
             return False
@@ -198,7 +198,7 @@ class PybulletWatch(CallWatch):
 
     def name(self, namespace: Mapping[str, Any]) -> None:
         arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
-        for label, value in named(namespace):
+        for label, value in named_values(namespace):
             if isinstance(value, PybulletModel):
                 self._name_model(label, value)
             elif isinstance(value, HiddenData) and isinstance(value.model, PybulletModel):
@@ -206,7 +206,7 @@ class PybulletWatch(CallWatch):
                 machine = value._machine
                 self._label(machine.world.raw, f"the world of {label}")
                 watched = self._arrays.get(machine) or _Arrays(machine)
-                arrays.setdefault(machine, watched).lead(label)
+                arrays.setdefault(machine, watched).note_variable(label)
         self._arrays = arrays  # the others no variable leads to
 
     def _name_model(self, label: str, model: PybulletModel) -> None:
@@ -217,10 +217,10 @@ class PybulletWatch(CallWatch):
         # Of one that is closed the number may be another's by now.
         known = None if world.closed else self._worlds.get(world.client)
         if known is not None:
-            known.lead(label)
+            known.note_variable(label)
 
-    def living(self) -> Sequence[WatchedObject]:
-        self._worlds = {c: world for c, world in self._worlds.items() if not world.gone}
+    def live_objects(self) -> Sequence[WatchedObject]:
+        self._worlds = {c: world for c, world in self._worlds.items() if not world.is_gone}
         return [*self._worlds.values(), *self._arrays.values()]
 
 

@@ -96,7 +96,7 @@ class PybulletDials(Dials):
         }
         if plan:
             del acts["inertia"]
-        return _dialled(model, [act for name, act in acts.items() if name in dials], plan)
+        return _with_settings(model, [act for name, act in acts.items() if name in dials], plan)
 
     def _with_law(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         own, fresh = cast("PybulletModel", self.emulated), self.model.compiled
@@ -124,7 +124,7 @@ class PybulletDials(Dials):
         if "equality" not in dials and self._whole and raw.neq:
             raw = copy.copy(raw)
             raw.eq_active0[:] = False
-        return _dialled(model, acts, Plan(raw) if raw is not model.compiled else None)
+        return _with_settings(model, acts, Plan(raw) if raw is not model.compiled else None)
 
     def _weighed_by_the_engine(self, compiled: Any) -> Any:
         """Make a compiled model whose bodies weigh what the engine gives them of its own."""
@@ -160,7 +160,7 @@ class PybulletDials(Dials):
         return np.array(frictions)
 
 
-def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
+def _with_settings(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
     """Return a Model whose worlds are given some settings; what `forward` computes knows nothing
     of it.
     """

@@ -17,11 +17,11 @@ from ...interface import Array, Model, make_data
 
 
 class DrivenClient:
-    """A world whose motors go to commands.
+    """A PyBullet client whose position motors follow the commands.
 
     Attributes:
         world: The bodies and their ids.
-        client: Its number.
+        client: PyBullet's number of it.
     """
 
     def __init__(self, model: Model, world: World) -> None:
@@ -39,7 +39,7 @@ class DrivenClient:
         self.command(ctrl)
 
     def command(self, ctrl: Array) -> None:
-        """Let the engine's own motors go to ctrl (nu,) [rad or m]."""
+        """Set the targets of the engine's own motors to ctrl (nu,) [rad or m], within its range."""
         targets = np.clip(ctrl, *self._range)
         for body, index, dof in self.world.joints():
             if dof in self._servos:
@@ -52,7 +52,7 @@ class DrivenClient:
                 )
 
     def advance(self, steps: int) -> None:
-        """Take so many of the engine's steps."""
+        """Take `steps` of the engine's own steps."""
         for _ in range(steps):
             pb.stepSimulation(self.client)
 
@@ -68,7 +68,7 @@ class DrivenClient:
         return np.array(places)
 
     def positions_along(self, steps: int) -> Array:
-        """Take so many steps; return the positions (steps, k) after each."""
+        """Advance by `steps`; return the positions (steps, k), as of `positions`, after each."""
         rows = []
         for _ in range(steps):
             self.advance(1)
@@ -76,7 +76,7 @@ class DrivenClient:
         return np.array(rows)
 
     def contacts(self) -> int:
-        """Return how many contacts there are."""
+        """Return the number of contacts at which surfaces touch."""
         points = pb.getContactPoints(physicsClientId=self.client)
         return sum(point[8] <= 0 for point in points)
 
@@ -85,8 +85,8 @@ class DrivenClient:
 def stepper(
     model: Model, qpos: Array, qvel: Array, ctrl: Array
 ) -> Iterator[Callable[[int], object]]:
-    """Yield what takes so many steps, from this start under this command."""
+    """Yield a function that takes so many steps, from this start under this command."""
     with make_data(model) as data:  # its bodies; none of its verbs is called
-        machine = DrivenClient(model, data.raw)
-        machine.start(qpos, qvel, ctrl)
-        yield machine.advance
+        driven = DrivenClient(model, data.raw)
+        driven.start(qpos, qvel, ctrl)
+        yield driven.advance

@@ -88,7 +88,7 @@ class _Body:
     Attributes:
         base: Its name.
         still: Whether it stands.
-        infos: What the engine tells of each joint.
+        infos: What the engine reports of each joint.
         places: Where the frames of its links are, by number.
     """
 
@@ -138,11 +138,11 @@ class _Body:
             if kind == "mesh":  # whose vertices are told in the frame of the centre of mass
                 shape = replace(shape, place=inner, points=self._vertices(index, number))
             shapes.append(shape)
-        inertial = Inertial(dynamics[0], np.zeros(3), np.diag(dynamics[2])).seen_from(inner)
+        inertial = Inertial(dynamics[0], np.zeros(3), np.diag(dynamics[2])).in_frame(inner)
         return Link(name, parent, place, joint, inertial, tuple(shapes))
 
     def _vertices(self, index: int, number: int) -> Array | None:
-        """Return the vertices (n, 3) [m] of a mesh; None where the engine tells none.
+        """Return the vertices (n, 3) [m] of a mesh; None where the engine reports none.
 
         Args:
             index: Of the link.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
 
 from ...errors import BadInputError, shown
 from ...installed import DEFAULT, PAIR
@@ -39,7 +39,8 @@ class RunArguments:
         seconds: Simulated time [s].
         timestep: Length of a step, on both sides [s].
         seed: Of what an experiment draws.
-        names: Joints, bodies, sites and actuators of the left that have other names on the right.
+        names: Joints, bodies, sites and actuators of the left that have other names on the right;
+            None for none.
         actuators: The side whose actuators both have.
         floor: The side whose floor both have.
         every: Steps for which what a function returned holds.
@@ -54,11 +55,26 @@ class RunArguments:
     seconds: float | None = None
     timestep: float | None = None
     seed: int = 0
-    names: Mapping[str, str] = field(default_factory=dict[str, str])
+    names: Mapping[str, str] | None = None
     actuators: Which | None = None
     floor: Which | None = None
     every: int = 1
     keyframe: str | None = None
+
+    @classmethod
+    def of(cls, arguments: Mapping[str, Any]) -> RunArguments:
+        """Return what is run, of all that a function was called with.
+
+        Args:
+            arguments: By name, as `locals()` has them; those that are no field are left out.
+        """
+        names = [each.name for each in fields(cls) if each.name in arguments]
+        return cls(**{name: arguments[name] for name in names})
+
+    @property
+    def pairs_of_names(self) -> Mapping[str, str]:
+        """Names of the left by those of the right, where any are given."""
+        return {} if self.names is None else self.names
 
     def request(self) -> Request:
         """Return the Request.
@@ -125,7 +141,7 @@ class RunArguments:
             seconds=self.seconds,
             seed=self.seed,
             options=options,
-            names=self.names,
+            names=self.pairs_of_names,
             every=self.every,
             keyframe=self.keyframe,
         )
@@ -149,8 +165,8 @@ class RunArguments:
                 raise BadInputError(f'{name} must be "left" or "right"; got {shown(which)}')
         of_left = [name for name, which in parts.items() if which == "left"]
         of_right = [name for name, which in parts.items() if which == "right"]
-        back = {right_name: left_name for left_name, right_name in self.names.items()}
-        return left.taking(of_right, right, back), right.taking(of_left, left, self.names)
+        back = {right_name: left_name for left_name, right_name in self.pairs_of_names.items()}
+        return left.taking(of_right, right, back), right.taking(of_left, left, self.pairs_of_names)
 
 
 def side_of(side: AnySide, menagerie: AnyPath | None = None) -> Side:

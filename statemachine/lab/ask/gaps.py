@@ -84,24 +84,11 @@ def compare(
             (model, data).
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
+    arguments = locals()
     if isinstance(left, CompareRequest):
-        check_alone(compare, locals())
+        check_alone(compare, arguments)
         return gap.answer(left, reporter)
-    run = RunArguments(
-        left=left,
-        right=right,
-        what=what,
-        backends=backends,
-        menagerie=menagerie,
-        seconds=seconds,
-        timestep=timestep,
-        seed=seed,
-        names={} if names is None else names,
-        actuators=actuators,
-        floor=floor,
-        every=every,
-        keyframe=keyframe,
-    ).request()
+    run = RunArguments.of(arguments).request()
     return gap.answer(
         CompareRequest(run, tolerances_of(tolerances), uncertainty_of(uncertainty, chaos)), reporter
     )
@@ -137,26 +124,19 @@ def why(
         lab.why("a.xml", "b.xml", what="hold", quantity="elbow").to_dict()["share"]
 
     Args:
-        left: The left side: "FILE", "FILE@ENGINE" or "FILE@ENGINE:engine" with options behind it,
-            as in "a.xml@pybullet timestep=0.001"; a path; a loaded Model; or a Side. Without a
-            right side a name or path of a model, which runs on both backends; None for the
-            experiment's own. Or a Request of what is run, such as `result.request.run`; or a
-            ExplainRequest, which says all of it.
-        right: The right side.
-        what: The name of an experiment; a function f(model, data) that returns ctrl (nu,) or None
-            to leave it, or "FILE.py:FUNCTION"; or one or two traces, or their files.
-        backends: Where no sides are given: "mujoco", "pybullet", "pybullet:engine" or a release,
-            "mujoco==3.3.7".
-        menagerie: A menagerie folder to look names up in; None for $MENAGERIE.
-        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function.
-        timestep: Length of a step on both sides [s]; None for each file's own.
-        seed: Of what an experiment draws.
-        names: Joints, bodies, sites and actuators of the left by the names that the right has.
-        actuators: "left" or "right": both sides have the actuators of that one.
-        floor: "left" or "right": both sides have the floor of that one.
-        every: Steps for which what a function returned holds.
-        keyframe: Where it starts, on both sides; None for the experiment's own, and for the default
-            state of a function.
+        left: As of `compare`; or an ExplainRequest, which says all that is asked.
+        right: As of `compare`.
+        what: As of `compare`.
+        backends: As of `compare`.
+        menagerie: As of `compare`.
+        seconds: As of `compare`.
+        timestep: As of `compare`.
+        seed: As of `compare`.
+        names: As of `compare`.
+        actuators: As of `compare`.
+        floor: As of `compare`.
+        every: As of `compare`.
+        keyframe: As of `compare`.
         quantity: What the gap is measured in: "joints", one joint, a body, a site; None for what
             fits the run.
         measure: Which figure of the gap is explained: "worst" at any moment, at the "end", or the
@@ -178,24 +158,11 @@ def why(
             (model, data).
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
+    arguments = locals()
     if isinstance(left, ExplainRequest):
-        check_alone(why, locals())
+        check_alone(why, arguments)
         return causes.answer(left, reporter)
-    run = RunArguments(
-        left=left,
-        right=right,
-        what=what,
-        backends=backends,
-        menagerie=menagerie,
-        seconds=seconds,
-        timestep=timestep,
-        seed=seed,
-        names={} if names is None else names,
-        actuators=actuators,
-        floor=floor,
-        every=every,
-        keyframe=keyframe,
-    ).request()
+    run = RunArguments.of(arguments).request()
     return causes.answer(
         ExplainRequest(
             run,

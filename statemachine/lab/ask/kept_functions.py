@@ -10,7 +10,7 @@ from pathlib import Path
 from ...atomic_files import replace_text
 from ...installed import require_extra
 from ...models import AnyPath
-from ..runs.controllers import Function, check_is_controller, function_place
+from ..runs.controllers import Function, check_is_controller, file_and_name_of
 
 _NAME = "controller"
 _TEXT = '''"""A function of a sweep, kept by value, for the same version of Python."""
@@ -35,7 +35,7 @@ def file_of_function(function: Function, folder: AnyPath) -> str:
         OSError: The file cannot be written.
     """
     check_is_controller(function)
-    path, name = function_place(function)
+    path, name = file_and_name_of(function)
     module = sys.modules.get(getattr(function, "__module__", ""))
     is_of_file = module is not None and module.__name__ != "__main__" and path.is_file()
     if is_of_file and inspect.isfunction(function) and getattr(module, name, None) is function:

@@ -57,23 +57,15 @@ def versions(
         EngineError: A release cannot be installed.
         StateMachineError: The model cannot be loaded, or cannot do what was asked.
     """
+    arguments = locals()
     if isinstance(model, VersionsRequest):
-        check_alone(versions, locals())
+        check_alone(versions, arguments)
         return answer(model, reporter)
     if not releases:
         raise BadInputError('name releases of MuJoCo, as in releases=("3.1.6", "3.3.7")')
-    arguments = RunArguments(
-        left=_to_be_loaded(model),
-        what=what,
-        menagerie=menagerie,
-        seconds=seconds,
-        timestep=timestep,
-        seed=seed,
-        every=every,
-        keyframe=keyframe,
-    )
+    run = RunArguments.of(arguments | {"left": _to_be_loaded(model)}).request()
     typed = releases if isinstance(releases, str) else ",".join(releases)
-    request = VersionsRequest(arguments.request(), typed, bisect, tolerances_of(tolerances))
+    request = VersionsRequest(run, typed, bisect, tolerances_of(tolerances))
     return answer(request, reporter)
 
 

@@ -37,26 +37,19 @@ def one_step(
         lab.one_step("a.xml", "b.xml", what="hold").first
 
     Args:
-        left: The left side: "FILE", "FILE@ENGINE" or "FILE@ENGINE:engine" with options behind it,
-            as in "a.xml@pybullet timestep=0.001"; a path; a loaded Model; or a Side. Without a
-            right side a name or path of a model, which runs on both backends; None for the
-            experiment's own. Or a Request of what is run, such as `result.request.run`; or a
-            OneStepRequest, which says all of it.
-        right: The right side.
-        what: The name of an experiment; a function f(model, data) that returns ctrl (nu,) or None
-            to leave it, or "FILE.py:FUNCTION"; or one or two traces, or their files.
-        backends: Where no sides are given: "mujoco", "pybullet", "pybullet:engine" or a release,
-            "mujoco==3.3.7".
-        menagerie: A menagerie folder to look names up in; None for $MENAGERIE.
-        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function.
-        timestep: Length of a step on both sides [s]; None for each file's own.
-        seed: Of what an experiment draws.
-        names: Joints, bodies, sites and actuators of the left by the names that the right has.
-        actuators: "left" or "right": both sides have the actuators of that one.
-        floor: "left" or "right": both sides have the floor of that one.
-        every: Steps for which what a function returned holds.
-        keyframe: Where it starts, on both sides; None for the experiment's own, and for the default
-            state of a function.
+        left: As of `compare`; or a OneStepRequest, which says all that is asked.
+        right: As of `compare`.
+        what: As of `compare`.
+        backends: As of `compare`.
+        menagerie: As of `compare`.
+        seconds: As of `compare`.
+        timestep: As of `compare`.
+        seed: As of `compare`.
+        names: As of `compare`.
+        actuators: As of `compare`.
+        floor: As of `compare`.
+        every: As of `compare`.
+        keyframe: As of `compare`.
         reporter: Told how it gets on; by default no one, and notes are warnings.
 
     Raises:
@@ -64,24 +57,11 @@ def one_step(
             (model, data).
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
+    arguments = locals()
     if isinstance(left, OneStepRequest):
-        check_alone(one_step, locals())
+        check_alone(one_step, arguments)
         return steps.answer(left, reporter)
-    run = RunArguments(
-        left=left,
-        right=right,
-        what=what,
-        backends=backends,
-        menagerie=menagerie,
-        seconds=seconds,
-        timestep=timestep,
-        seed=seed,
-        names={} if names is None else names,
-        actuators=actuators,
-        floor=floor,
-        every=every,
-        keyframe=keyframe,
-    ).request()
+    run = RunArguments.of(arguments).request()
     return steps.answer(OneStepRequest(run), reporter)
 
 
@@ -107,26 +87,19 @@ def converge(
         lab.converge("a.xml@mujoco", "a.xml@pybullet", what="fall").vanishes
 
     Args:
-        left: The left side: "FILE", "FILE@ENGINE" or "FILE@ENGINE:engine" with options behind it,
-            as in "a.xml@pybullet timestep=0.001"; a path; a loaded Model; or a Side. Without a
-            right side a name or path of a model, which runs on both backends; None for the
-            experiment's own. Or a Request of what is run, such as `result.request.run`; or a
-            ConvergeRequest, which says all of it.
-        right: The right side.
-        what: The name of an experiment; a function f(model, data) that returns ctrl (nu,) or None
-            to leave it, or "FILE.py:FUNCTION"; or one or two traces, or their files.
-        backends: Where no sides are given: "mujoco", "pybullet", "pybullet:engine" or a release,
-            "mujoco==3.3.7".
-        menagerie: A menagerie folder to look names up in; None for $MENAGERIE.
-        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function.
-        timestep: Length of a step on both sides [s]; None for each file's own.
-        seed: Of what an experiment draws.
-        names: Joints, bodies, sites and actuators of the left by the names that the right has.
-        actuators: "left" or "right": both sides have the actuators of that one.
-        floor: "left" or "right": both sides have the floor of that one.
-        every: Steps for which what a function returned holds.
-        keyframe: Where it starts, on both sides; None for the experiment's own, and for the default
-            state of a function.
+        left: As of `compare`; or a ConvergeRequest, which says all that is asked.
+        right: As of `compare`.
+        what: As of `compare`.
+        backends: As of `compare`.
+        menagerie: As of `compare`.
+        seconds: As of `compare`.
+        timestep: As of `compare`.
+        seed: As of `compare`.
+        names: As of `compare`.
+        actuators: As of `compare`.
+        floor: As of `compare`.
+        every: As of `compare`.
+        keyframe: As of `compare`.
         reporter: Told how it gets on; by default no one, and notes are warnings.
 
     Raises:
@@ -134,22 +107,9 @@ def converge(
             (model, data).
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
+    arguments = locals()
     if isinstance(left, ConvergeRequest):
-        check_alone(converge, locals())
+        check_alone(converge, arguments)
         return limits.answer(left, reporter)
-    run = RunArguments(
-        left=left,
-        right=right,
-        what=what,
-        backends=backends,
-        menagerie=menagerie,
-        seconds=seconds,
-        timestep=timestep,
-        seed=seed,
-        names={} if names is None else names,
-        actuators=actuators,
-        floor=floor,
-        every=every,
-        keyframe=keyframe,
-    ).request()
+    run = RunArguments.of(arguments).request()
     return limits.answer(ConvergeRequest(run), reporter)

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from ...errors import BadInputError, EngineError, TraceError
 from ...interface import Array, Ints
-from ...measures import QUANTITIES, common_moments, same_pairs
+from ...measures import QUANTITIES, common_moments, with_left_pair_names
 from ...processes.parallel import forks_for, in_forks
 from ..recordings import Rerun, Trace
-from ..runs.drive import Progress, silent
+from ..runs.drive import Progress, no_progress
 from .agreement import Agreement, Comparison
 from .outcomes import outcomes_of
 from .perturbed import EXACT, ROUNDING, RUNS, Uncertainty, perturbed_run
@@ -121,7 +121,7 @@ def chaos_floor(
     seed: int = 0,
     uncertain: Uncertainty = EXACT,
     jobs: int | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> ChaosFloor:
     """Compute the chaos floor of each quantity of a comparison.
 
@@ -292,7 +292,7 @@ def _named_as(known: Mapping[str, Array], distances: dict[str, Array]) -> dict[s
     for ending in (NORMAL, _FIRST_TOUCH):
         pairs = {name.removesuffix(ending): name for name in known if name.endswith(ending)}
         own = {name.removesuffix(ending): name for name in distances if name.endswith(ending)}
-        for pair, name in same_pairs(pairs, own).items():
+        for pair, name in with_left_pair_names(pairs, own).items():
             named[f"{pair}{ending}"] = named.pop(name)
     return named
 

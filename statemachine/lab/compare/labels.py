@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...interface.options import OptionValue
-from ...measures import SAME, Common
+from ...measures import SAME_MOMENT, CommonMoments
 from ...measures.text import few, milliseconds, numbers, significant
 from ..recordings import Header, Trace
 from ..runs.floating import base_of
@@ -164,7 +164,9 @@ def numbered(names: Two) -> Two:
     return names if names[0] != names[1] else (f"{names[0]} (first)", f"{names[1]} (second)")
 
 
-def notes_on(left: Trace, right: Trace, common: Common, of_quantities: Iterable[str]) -> list[str]:
+def notes_on(
+    left: Trace, right: Trace, common: CommonMoments, of_quantities: Iterable[str]
+) -> list[str]:
     """Return a line for each thing that a reader of the figures must know.
 
     Args:
@@ -233,7 +235,7 @@ def _notes_on_experiments(left: Header, right: Header) -> Iterator[str]:
         yield f"the experiments are two: {left.experiment} and {right.experiment}"
 
 
-def _notes_on_time(left: Trace, right: Trace, common: Common, labels: Two) -> Iterator[str]:
+def _notes_on_time(left: Trace, right: Trace, common: CommonMoments, labels: Two) -> Iterator[str]:
     left_step, right_step = left.header.timestep, right.header.timestep
     until = float(common.time[-1])
     if left_step != right_step:
@@ -245,7 +247,7 @@ def _notes_on_time(left: Trace, right: Trace, common: Common, labels: Two) -> It
         )
     left_end = float(left.time[-1] - left.time[0])
     right_end = float(right.time[-1] - right.time[0])
-    if abs(left_end - right_end) > max(left_step, right_step) * (1 + SAME):
+    if abs(left_end - right_end) > max(left_step, right_step) * (1 + SAME_MOMENT):
         longer = labels[1] if right_end > left_end else labels[0]
         yield (
             f"the runs are {left_end:g} and {right_end:g} s long: what {longer} does after "
@@ -263,7 +265,7 @@ def _notes_on_physics(left: Header, right: Header) -> Iterator[str]:
         )
 
 
-def _notes_on_commands(left: Trace, right: Trace, common: Common) -> Iterator[str]:
+def _notes_on_commands(left: Trace, right: Trace, common: CommonMoments) -> Iterator[str]:
     if left.header.actuators != right.header.actuators:
         yield "the actuators differ, in name or in order"
         return

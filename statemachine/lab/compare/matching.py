@@ -20,10 +20,12 @@ from ...engines.records import BodyPair, Pairs
 from ...errors import BadInputError, check_name
 from ...installed import DEFAULT
 from ...interface import Model
+from ...interface.options import OptionValue
 from ...measures.text import command
 from ...rotations import HERE, Placement
 from .matched import Matched, Only, RenamedPair, joint_name
 
+_SWITCHED_BY = {"actuators": "actuation", "floor": "contacts"}  # the option of each part
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
 
 
@@ -323,8 +325,15 @@ def _by_place(
                 yield RenamedPair(kind, left_name, right_name, f"one {place}", suggestion)
 
 
-def missing_parts(left: Model, right: Model) -> tuple[tuple[str, str], ...]:
-    """What one of two Models has nothing of, and the other has.
+def missing_parts(
+    left: Model, right: Model, options: Mapping[str, OptionValue]
+) -> tuple[tuple[str, str], ...]:
+    """What one of two Models has nothing of, and the other has, as far as it acts.
+
+    Args:
+        left: The one.
+        right: The other.
+        options: Of what is run, which may switch actuators or contacts off.
 
     Returns:
         Pairs: "left" or "right", who has none; and "actuators" or "floor".
@@ -338,4 +347,5 @@ def missing_parts(left: Model, right: Model) -> tuple[tuple[str, str], ...]:
         ("right" if left_counts[part] else "left", part)
         for part in left_counts
         if bool(left_counts[part]) is not bool(right_counts[part])
+        if options.get(_SWITCHED_BY[part], True)
     )

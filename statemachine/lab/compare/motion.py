@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...interface import Array, Ints, JointType
-from ...measures import OF_A_RUN, QUANTITIES, RobotScale, distances, largest_or_inf
+from ...measures import QUANTITIES, RUN_FLOORS, RobotScale, distances, largest_or_inf
 from ...measures.floors import energy_floor, force_floor
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings import Trace
@@ -24,7 +24,7 @@ LeastMotion = Mapping[str, float]
 # What two runs have to move by so that a gap that is rounding says that they move alike: 100 times
 # what the arithmetic of an engine makes of a run, 1e-6 rad and 1e-7 m.
 SEEN: LeastMotion = {
-    kind: 100 * OF_A_RUN[quantity.unit] for kind, quantity in QUANTITIES.items() if quantity.own
+    kind: 100 * RUN_FLOORS[quantity.unit] for kind, quantity in QUANTITIES.items() if quantity.own
 }
 
 

@@ -32,7 +32,7 @@ from ...measures import RobotScale
 from ...measures.floors import moving_bodies
 from ..recordings import Rerun
 from ..recordings.repetition import put_row
-from ..runs.drive import Progress, silent
+from ..runs.drive import Progress, no_progress
 from .matched import Matched
 from .matching import match_models
 from .stage_gaps import OneStep, Spike, StageGap
@@ -53,7 +53,7 @@ def one_step(
     names: Mapping[str, str] | None = None,
     moments: int = MOMENTS,
     relative: float = RELATIVE,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> OneStep:
     """Compare one step of two sides from each recorded state of the left one.
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from ...interface import Array, JointType
-from ...measures import QUANTITIES, SAME, tolerance_of
+from ...measures import QUANTITIES, SAME_MOMENT, tolerance_of
 from ...rotations import matrix_from_quat
 from ..recordings import Trace
 from ..runs.floating import free_joint_of_robot
@@ -107,7 +107,7 @@ def outcomes_of_run(trace: Trace, until: float) -> dict[str, float | None]:
         until: What of it counts [s from the start].
     """
     time = trace.time - trace.time[0]
-    rows = np.flatnonzero(time <= until + SAME * trace.header.timestep)
+    rows = np.flatnonzero(time <= until + SAME_MOMENT * trace.header.timestep)
     outcomes: dict[str, float | None] = {}
     joint = free_joint_of_robot(trace.header)
     if joint is not None and len(rows):

@@ -11,10 +11,10 @@ import numpy as np
 from ...backends.starts import asleep_from_the_start
 from ...errors import BadInputError, EngineWarning
 from ...interface import Array, Data, JointType, Model
-from ...measures import amount
+from ...measures import parse_amount
 from ...rotations import times
-from ..recordings import Rerun, Trace, beginning_with
-from ..runs.drive import Progress, part_of, silent
+from ..recordings import Rerun, Trace, with_first_ctrl
+from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.scenarios import Controller
 
 RUNS = 8  # of each side
@@ -45,7 +45,7 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
     """
     sizes: dict[str, float] = {}
     for word in words:
-        value, unit = amount(word)
+        value, unit = parse_amount(word)
         kind = {"m": "length", "rad": "angle"}.get(unit, "")
         if not kind or np.isnan(value):
             raise BadInputError(f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}")
@@ -62,7 +62,7 @@ def perturbed_runs(
     seed: int = 0,
     uncertain: Uncertainty = EXACT,
     derive: bool = True,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Iterator[Trace]:
     """The same run, again and again, from starts and with commands that differ by rounding.
 
@@ -92,7 +92,7 @@ def perturbed_runs(
             seed=seed,
             uncertain=uncertain,
             derive=derive,
-            progress=part_of(progress, k / runs, 1 / runs),
+            progress=progress_of_stage(progress, k / runs, 1 / runs),
         )
 
 
@@ -103,7 +103,7 @@ def perturbed_run(
     seed: int = 0,
     uncertain: Uncertainty = EXACT,
     derive: bool = True,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Trace:
     """The run with the number `k` of `perturbed_runs`, which depends on no other."""
     if seed < 0:
@@ -212,4 +212,4 @@ def nudged_controller(controller: Controller | None, draw: np.random.Generator) 
         return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw)
 
     # Once: a ctrl that stays as it is must not wander.
-    return beginning_with(lambda data: _nudged(data.ctrl, draw), nudging)
+    return with_first_ctrl(lambda data: _nudged(data.ctrl, draw), nudging)

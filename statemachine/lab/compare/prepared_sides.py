@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from ...engines import raw_engine_of
-from ...errors import TraceError
+from ...errors import BadInputError, TraceError
 from ...interface import Model
 from ...measures import common_moments
 from ...measures.text import milliseconds
@@ -17,10 +17,10 @@ from ...release_names import engine_of
 from ..recordings import (
     Rerun,
     SideStart,
-    beginning_with,
     start_of,
+    with_first_ctrl,
 )
-from ..runs.drive import check_length, steps_in
+from ..runs.drive import check_length, number_of_steps
 from ..runs.floating import Bases
 from ..runs.scenarios import Controller, Scenario
 from .alike import (
@@ -92,7 +92,7 @@ def prepare_sides(request: Request) -> PreparedSides:
         played = request.experiment
         notes.append(f"the ctrl of {played} was played on both sides, from the state it starts in")
     else:
-        scenario = scenario.on(left)
+        scenario = on_left(scenario, left, right)
         seed = request.seed if scenario.seeded else None
     right_start = _start_of_right(scenario.keyframe, left_start, left, right, matched)
     notes += right_start.notes
@@ -111,7 +111,7 @@ def prepare_sides(request: Request) -> PreparedSides:
         if right_start.written is None:
             return controller
         first_ctrl = right_start.written.ctrl
-        return beginning_with(lambda _: first_ctrl, controller)
+        return with_first_ctrl(lambda _: first_ctrl, controller)
 
     left_rerun = Rerun(
         left,
@@ -137,6 +137,23 @@ def prepare_sides(request: Request) -> PreparedSides:
     notes += dict.fromkeys(chain(*notes_on_engines))
     notes += read_otherwise(left, right)
     return PreparedSides(reruns, matched, loaded.bases, tuple(notes))
+
+
+def on_left(scenario: Scenario, left: Model, right: Model) -> Scenario:
+    """Return what is run, as it is on the left.
+
+    Raises:
+        BadInputError: It makes no sense there; with the option that mends it, where the right has
+            what the left lacks.
+    """
+    try:
+        return scenario.on(left)
+    except BadInputError as error:
+        if left.nu or not right.nu:
+            raise
+        raise BadInputError(
+            f"{error}; --actuators right gives the left those of {right.path.name}"
+        ) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +224,7 @@ def _of_scenario(rerun: Rerun, scenario: Scenario, seed: int | None) -> Rerun:
 def _check_moments(models: Sequence[Model], seconds: float) -> None:
     """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
     steps = [model.timestep for model in models]
-    left, right = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
+    left, right = (np.arange(0.0, number_of_steps(m, seconds) + 1) * m.timestep for m in models)
     try:
         common_moments(left, right, (steps[0], steps[1]))
     except TraceError as error:

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from ...measures import QUANTITIES, Tolerance, same_pairs
-from ...measures.text import on
+from ...measures import QUANTITIES, Tolerance, with_left_pair_names
+from ...measures.text import on_label
 from ..recordings import Trace
 from .outcomes import RunOutcome
 from .series import Touch
@@ -70,7 +70,7 @@ def of_outcome(outcome: RunOutcome, until: float, labels: tuple[str, str]) -> Ag
     if outcome.kind == "fall":
         at = outcome.first
     if outcome.is_on_one_side:
-        note = f"never {on(labels[0] if outcome.left is None else labels[1])}"
+        note = f"never {on_label(labels[0] if outcome.left is None else labels[1])}"
     since = None if outcome.verdict == "agrees" else at
     return Agreement(
         name=outcome.name,
@@ -96,9 +96,9 @@ def missed_touch(touch: Touch, left: Trace, right: Trace, labels: tuple[str, str
         trace, label = right, labels[1]
     else:
         return ""
-    touching_later = same_pairs({touch.pair: None}, dict.fromkeys(trace.touches()))
+    touching_later = with_left_pair_names({touch.pair: None}, dict.fromkeys(trace.touches()))
     when = "later" if touch.pair in touching_later else "never"
-    return f"{when} {on(label)}"
+    return f"{when} {on_label(label)}"
 
 
 def first_touch(touch: Touch, missed: str, until: float, allowed: Tolerance) -> Agreement:

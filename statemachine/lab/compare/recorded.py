@@ -9,7 +9,7 @@ from ...backends import load, parse_backend
 from ...errors import BadInputError, StateMachineError
 from ...interface import Model
 from ...models import AnyPath
-from ..recordings import Header, Trace, commands_of, model_file
+from ..recordings import Header, Trace, controller_of_trace, model_file
 from ..runs.scenarios import Scenario
 from .sides import Request, Side
 
@@ -62,7 +62,7 @@ def recorded_scenario(*traces: Trace) -> Scenario:
         says=header.says,
         model="",
         seconds=seconds,
-        controller=lambda _model, _seed: commands_of(traces[0]),
+        controller=lambda _model, _seed: controller_of_trace(traces[0]),
         elsewhere=header.says,
         needs=lambda _model: None,
         options=header.options,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...interface import Array, Ints, JointType
 from ...interface.sites import usual_site
-from ...measures import QUANTITIES, SAME, common_moments, distances, same_pairs
+from ...measures import QUANTITIES, SAME_MOMENT, common_moments, distances, with_left_pair_names
 from ...rotations import angle_between, matrix_from_quat
 from ..recordings import Header, Trace
 from ..runs.floating import free_joint_of_robot
@@ -126,7 +126,7 @@ def _normal_forces_of_pairs(time: Array, sides: Sides) -> list[Series]:
     """Compare the normal force of each pair of bodies that touches on either side."""
     (left, left_rows), (right, right_rows) = sides
     left_forces = normal_forces(left)
-    right_forces = same_pairs(left_forces, normal_forces(right))
+    right_forces = with_left_pair_names(left_forces, normal_forces(right))
     curves = []
     for pair in dict.fromkeys([*left_forces, *right_forces]):
         left_force = left_forces.get(pair, np.zeros(len(left)))
@@ -301,7 +301,7 @@ def touches(left: Trace, right: Trace) -> tuple[Touch, ...]:
         return ()
     until = float(common_moments(left.time, right.time, (left.timestep, right.timestep)).time[-1])
     left_contacts = _contacts(left, until)
-    right_contacts = same_pairs(left_contacts, _contacts(right, until))
+    right_contacts = with_left_pair_names(left_contacts, _contacts(right, until))
     never = PairContacts()
     return tuple(
         Touch(pair, left_contacts.get(pair, never), right_contacts.get(pair, never))
@@ -312,8 +312,8 @@ def touches(left: Trace, right: Trace) -> tuple[Touch, ...]:
 def _contacts(trace: Trace, until: float) -> dict[str, PairContacts]:
     """Return the contacts of a trace by pair of bodies, up to a moment [s from the start]."""
     time = trace.time - trace.time[0]
-    time = time[time <= until + SAME * trace.header.timestep]
-    tail = np.flatnonzero(time >= until * (1 - SETTLED) - SAME * trace.header.timestep)
+    time = time[time <= until + SAME_MOMENT * trace.header.timestep]
+    tail = np.flatnonzero(time >= until * (1 - SETTLED) - SAME_MOMENT * trace.header.timestep)
     forces, totals = normal_forces(trace), total_forces(trace)
     contacts = {}
     for pair, touching in trace.touches().items():

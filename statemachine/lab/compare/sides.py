@@ -21,13 +21,13 @@ from ...interface import Model
 from ...interface.checks import as_count
 from ...interface.free_base import FreeBase
 from ...interface.options import OptionValue
-from ...interface.read_options import told
+from ...interface.read_options import non_default_options
 from ...interface.records import READ_OPTIONS
 from ...measures.text import listed
 from ...models import resolve
 from ..recordings import Trace, read
 from ..recordings.files import SUFFIXES
-from ..runs.controllers import Function, function_place, function_scenario, is_function
+from ..runs.controllers import Function, file_and_name_of, function_scenario, is_function
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
 from .matching import match_models
@@ -62,7 +62,7 @@ class Side:
     @classmethod
     def of_model(cls, model: Model) -> Side:
         """Return a side that is a Model as it is."""
-        options = {**told(model.read_options), **model.options}
+        options = {**non_default_options(model.read_options), **model.options}
         return cls(str(model.path), model.backend, model.defaults, options, loaded=model)
 
     def to_be_loaded(self) -> Side:
@@ -336,7 +336,7 @@ def word_of(what: What) -> str:
         return Path(what).name
     if isinstance(what, Trace):
         return what.header.experiment or "a trace"
-    return function_place(what)[1]
+    return file_and_name_of(what)[1]
 
 
 def _trace_of(what: What) -> Trace:

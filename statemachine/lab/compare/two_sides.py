@@ -10,18 +10,18 @@ from typing import Literal
 from ...backends import BackendChoice, parse_backend
 from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import DEFAULT
-from ...measures import RobotScale, places_of
+from ...measures import RobotScale, robot_points
 from ...measures.text import command
 from ..recordings import (
     Rerun,
     Trace,
     play,
-    replayed,
+    read_shipped_trace,
     rerun_of,
-    shipped,
+    rerun_of_trace,
 )
 from ..runs.controllers import is_function
-from ..runs.drive import Progress, part_of, silent
+from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.floating import Bases
 from ..runs.scenarios import SCENARIOS
 from .alike import (
@@ -93,7 +93,7 @@ class SidesRun:
             model = recorded_model(trace.header) if rerun is None else rerun.model
             if model is None or "xpos" not in trace or "site_xpos" not in trace:
                 return None
-            places = places_of(model, trace["xpos"][0], trace["site_xpos"][0])
+            places = robot_points(model, trace["xpos"][0], trace["site_xpos"][0])
             scales.append(RobotScale.of(model, places))
         return scales[0].smaller(scales[1])
 
@@ -111,7 +111,7 @@ class SidesRun:
         return (*lines, *self.matched.notes)
 
 
-def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
+def run_sides(request: Request | str, progress: Progress = no_progress) -> SidesRun:
     """Run both sides of a request, or open its traces.
 
     An experiment alone runs on both backends. Where one has no engine here, its recorded trace
@@ -162,7 +162,7 @@ def _run_both(
     left_run, right_run = (
         rerun.record(
             command=_command(request, BackendChoice(rerun.model.backend, rerun.defaults)),
-            progress=part_of(progress, 0.35 * k, 0.35),
+            progress=progress_of_stage(progress, 0.35 * k, 0.35),
         )
         for k, rerun in enumerate(reruns)
     )
@@ -171,8 +171,9 @@ def _run_both(
     right_runs = [right_run]
     if commands == "its own":
         left_for_right = in_terms_of_right(left_run, right_run, matched)
-        in_open_loop = replayed(left_for_right, right, reruns[1].defaults, reruns[1].options)
-        right_runs.append(in_open_loop.record(progress=part_of(progress, 0.7, 0.3)))
+        in_open_loop = rerun_of_trace(left_for_right, right, reruns[1].defaults, reruns[1].options)
+        right_runs.append(in_open_loop.record(progress=progress_of_stage(progress, 0.7, 0.3)))
+    missing = missing_parts(left, right, reruns[0].options)
     same_name = left_run.header.provenance.model_file == right_run.header.provenance.model_file
     if left.path != right.path and same_name:  # as much of the paths as tells them apart
         left_file, right_file = files_apart(left.path.parts, right.path.parts)
@@ -189,7 +190,7 @@ def _run_both(
         matched=matched,
         reruns=reruns,
         path=left.path if left.path == right.path else None,
-        missing=missing_parts(left, right),
+        missing=missing,
     )
 
 
@@ -240,7 +241,7 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
             )
         except MissingEngineError as error:
             try:
-                rerun, trace = None, shipped(scenario.name, side.engine, side.defaults)
+                rerun, trace = None, read_shipped_trace(scenario.name, side.engine, side.defaults)
             except StateMachineError:
                 raise error from None
             said.append(f"{error}; its side is the recorded run that comes with the package")

@@ -9,7 +9,7 @@ from platform import python_version
 
 from ...errors import BadInputError
 from ...installed import available, engine_version
-from ...measures.text import NONE
+from ...measures.text import NO_NUMBER
 from ...release_names import check_age
 from ...releases import Release, add, folder, releases, remove
 from ...show.blocks import Page, Table
@@ -134,5 +134,5 @@ def size_of(release: Release) -> str:
 def page(result: ReleasesResult) -> Page:
     """Return the page of the releases that are here, and of the engines beside this program."""
     rows = [(release.name, release.python, size_of(release)) for release in result.releases]
-    rows += [(engine.name, engine.python, NONE) for engine in result.engines]
+    rows += [(engine.name, engine.python, NO_NUMBER) for engine in result.engines]
     return render(ReleasesPage(result, Table(("release", "python", "size"), rows)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...engines.description.match import Matching, Pair
 from ...engines.description.records import OF_A_SLIDE, SCALAR, CollisionShape, RobotJoint
-from ...engines.description.shapes import likest
+from ...engines.description.shapes import most_alike
 from ...engines.description.urdf import Declared
 from ...rotations import HERE
 from ..compare.matching import MatchedTrees
@@ -21,7 +21,7 @@ POSES = 100  # at which the same positions are put into both
 _ORDER = tuple(SUBJECTS)
 _ALL_DIGITS = 17
 # Subjects of a joint: the field of its record, and the unit of a hinge's.
-_OF_JOINTS = {
+_JOINT_FIELDS = {
     "armature": ("armature", "kg m²"),
     "effort": ("effort", "N·m"),
     "damping": ("damping", "N·m·s"),
@@ -78,7 +78,7 @@ def agreements(
     reach = max(trees.left.reach, trees.right.reach)
     compared: dict[tuple[str, str], list[_Compared]] = {}
     for pair in trees.matching.pairs:
-        for figure in _of_pair(pair, trees.matching, reach, declared):
+        for figure in _link_figures(pair, trees.matching, reach, declared):
             compared.setdefault((figure.subject, figure.unit), []).append(figure)
     rows: list[QuantityAgreement] = []
     for (subject, unit), figures in compared.items():
@@ -99,12 +99,12 @@ def agreements(
     return tuple(sorted(rows, key=lambda row: _ORDER.index(row.subject)))
 
 
-def _of_pair(
+def _link_figures(
     pair: Pair, matching: Matching, reach: float, declared: Sequence[Declared | None]
 ) -> Iterator[_Compared]:
     """Yield every figure of two rigid parts that are one."""
     name = pair.left.name
-    left, right = pair.left.inertial.seen_from(pair.align), pair.right.inertial
+    left, right = pair.left.inertial.in_frame(pair.align), pair.right.inertial
     if left.mass and right.mass:
         heavier = max(left.mass, right.mass)
         yield _Compared("mass", "kg", name, abs(left.mass - right.mass), heavier)
@@ -113,7 +113,7 @@ def _of_pair(
         off = float(np.abs(np.linalg.eigvalsh(left.tensor - right.tensor)).max())
         largest = max(float(np.abs(tensor).max()) for tensor in (left.tensor, right.tensor))
         yield _Compared("inertia", "kg m²", name, off, largest)
-    yield from _of_shapes(pair, reach)
+    yield from _shape_figures(pair, reach)
     a, b = pair.left.joint, pair.right.joint
     if pair.by == "root" or a is None or b is None or a.kind != b.kind:
         return
@@ -122,10 +122,10 @@ def _of_pair(
         off_frame = pair.right.place.inverse @ above.align @ pair.left.place @ pair.align.inverse
         yield _Compared("places", "m", a.name, float(np.linalg.norm(off_frame.pos)), reach)
         yield _Compared("places", "rad", a.name, off_frame.angle(HERE), math.pi)
-    yield from _of_joint(a, b, declared)
+    yield from _joint_figures(a, b, declared)
 
 
-def _of_joint(
+def _joint_figures(
     left: RobotJoint, right: RobotJoint, declared: Sequence[Declared | None]
 ) -> Iterator[_Compared]:
     """Yield what two joints of one kind are set to."""
@@ -134,10 +134,10 @@ def _of_joint(
         for ours, theirs in zip(left.limits, right.limits, strict=True):
             unit = _unit_of(left, "rad")
             yield _Compared("limits", unit, left.name, abs(ours - theirs), span)
-    for subject, (field, of_a_hinge) in _OF_JOINTS.items():
-        if not _is_said(subject, left.name, declared[0]):
+    for subject, (field, of_a_hinge) in _JOINT_FIELDS.items():
+        if not _is_stated(subject, left.name, declared[0]):
             continue
-        if not _is_said(subject, right.name, declared[1]):
+        if not _is_stated(subject, right.name, declared[1]):
             continue
         ours, theirs = getattr(left, field), getattr(right, field)
         if ours is None or theirs is None or not math.isfinite(ours) or not math.isfinite(theirs):
@@ -153,7 +153,7 @@ def _unit_of(joint: RobotJoint, of_a_hinge: str) -> str:
     return unit_of_free_joint(of_a_hinge) if joint.kind == "free" else of_a_hinge
 
 
-def _is_said(subject: str, joint: str, declared: Declared | None) -> bool:
+def _is_stated(subject: str, joint: str, declared: Declared | None) -> bool:
     """Tell whether a side says what a joint is set to."""
     if declared is None:
         return True
@@ -163,14 +163,14 @@ def _is_said(subject: str, joint: str, declared: Declared | None) -> bool:
     return getattr(declared.joints[joint], field) is not None
 
 
-def _of_shapes(pair: Pair, reach: float) -> Iterator[_Compared]:
+def _shape_figures(pair: Pair, reach: float) -> Iterator[_Compared]:
     """Yield where the shapes are with which two parts touch, pair by pair."""
     ours: list[CollisionShape] = []
     for shape in pair.left.shapes:
         place = pair.align @ shape.place
         ours.append(CollisionShape(shape.kind, place, shape.size, shape.points, name=shape.name))
     theirs = list(pair.right.shapes)
-    for a, b in likest(ours, theirs).items():
+    for a, b in most_alike(ours, theirs).items():
         left, right = ours[a], theirs[b]
         if left.kind == right.kind != "plane":
             label = f"{pair.left.name}: {left.name if left.name else left.kind}"
@@ -181,7 +181,7 @@ def _of_shapes(pair: Pair, reach: float) -> Iterator[_Compared]:
             yield _Compared("shapes", "m", label, far, reach)
 
 
-def posed(trees: MatchedTrees, seed: int) -> PoseGap:
+def compare_poses(trees: MatchedTrees, seed: int) -> PoseGap:
     """Compute how far apart the same links are at the same joint positions.
 
     Args:

@@ -21,7 +21,7 @@ from ...measures.text import command, few, rounded
 from ...release_names import engine_of
 from ...rotations import HERE
 from ..compare.matching import Matched, MatchedTrees, match_models, match_trees
-from .agreement import agreements, posed
+from .agreement import agreements, compare_poses
 from .changes import difference_changes
 from .compiled import CompiledDifferences
 from .declared import enter_declared
@@ -77,7 +77,7 @@ def compare(
     matched = match_models(*models, names, one_world=one_world)
     trees = match_trees(*models, names, one_world=one_world)
     partners = {models[0].joint_names[a]: models[1].joint_names[b] for a, b in matched.joints}
-    effects = Effects(readings, trees, _as_run(readings, trees, names), names, partners)
+    effects = Effects(readings, trees, _links_as_run(readings, trees, names), names, partners)
     locator = Locator(readings, matched)
     listing = Listing(digits)
     skipped = CompiledDifferences(listing, readings, matched, effects, locator).enter()
@@ -92,7 +92,7 @@ def compare(
     left_side = _side(readings[0], trees.left, sides[0])
     right_side = _side(readings[1], trees.right, sides[1])
     notes = tuple(dict.fromkeys(_notes(readings, matched, trees)))
-    gap, versions = posed(trees, seed), _versions(readings)
+    gap, versions = compare_poses(trees, seed), _versions(readings)
     has_actuators = models[0].nu > 0
     labels = sides[0].label, sides[1].label
     changes: tuple[DifferenceChange, ...] = ()
@@ -117,7 +117,7 @@ def compare(
     )
 
 
-def _as_run(
+def _links_as_run(
     readings: Sequence[ModelReading], trees: MatchedTrees, names: Mapping[str, str]
 ) -> MatchedTrees:
     """Return the rigid parts with the masses and inertias that a run has, paired as those stated.
@@ -230,7 +230,7 @@ def _notes(
 ) -> Iterator[str]:
     """Yield what a reader should know, in sentences."""
     yield from matched.other_notes
-    yield from _frames_elsewhere(trees)
+    yield from _moved_frames(trees)
     yield from _suggestions(trees.matching)
     formats = [reading.format for reading in readings]
     if formats.count("URDF") == 1:
@@ -250,7 +250,7 @@ def _notes(
                 )
 
 
-def _frames_elsewhere(trees: MatchedTrees) -> Iterator[str]:
+def _moved_frames(trees: MatchedTrees) -> Iterator[str]:
     """Yield that the frame of a link is put elsewhere on the same solid, or has another name."""
     pairs = [pair for pair in trees.matching.pairs if pair.by != "root"]
     for pair in pairs:

@@ -67,11 +67,16 @@ _SUBJECTS: dict[str, dict[str, str]] = {
     "site": {"place": "tool frame", "owner": "tool frame"},
     "equality": {"extra equality": "structure"},
 }
-_OF_KIND = {"actuator": "drive", "option": "settings", "flag": "settings"}
+_SUBJECT_OF_KIND = {"actuator": "drive", "option": "settings", "flag": "settings"}
 # Of a body that is cut otherwise: what each quantity is a matter of.
-_OF_WEIGHT = {"mass": "mass", "com": "centre of mass", "moments": "inertia", TURNED: "inertia"}
+_SUBJECT_OF_INERTIAL = {
+    "mass": "mass",
+    "com": "centre of mass",
+    "moments": "inertia",
+    TURNED: "inertia",
+}
 # What a URDF, or what an engine tells, has no word for: by the kind of the element.
-_UNSAID = {
+_UNSTATED_VALUES = {
     "joint": ("armature", "spring", "rest of the spring", "stop", "softness of dry friction"),
     "geom": _SUBJECTS["geom"].keys() - {"shape", "hull", "heights", "extra shape", "place"},
 }
@@ -195,12 +200,12 @@ class CompiledDifferences:
     def _subject(self, row: ModelDifference, quantity: str) -> str:
         """Return the subject of a quantity."""
         is_weight = row.kind == "body" and row.subject in ("mass", "centre of mass", "inertia")
-        if is_weight and quantity in _OF_WEIGHT:
-            return _OF_WEIGHT[quantity]
+        if is_weight and quantity in _SUBJECT_OF_INERTIAL:
+            return _SUBJECT_OF_INERTIAL[quantity]
         if row.subject.startswith(ORDER_OF_JOINTS):
             return "structure"
-        if row.kind in _OF_KIND:
-            return _OF_KIND[row.kind]
+        if row.kind in _SUBJECT_OF_KIND:
+            return _SUBJECT_OF_KIND[row.kind]
         return _SUBJECTS.get(row.kind, {}).get(row.subject, "further")
 
     def _quantities(self, row: ModelDifference, ids: ElementIds) -> Iterator[DifferingQuantity]:
@@ -286,7 +291,7 @@ class CompiledDifferences:
         for side, entry in ((0, value.left), (1, value.right)):
             is_said = self._says(side, row, ids, entry)
             nothing = "none" if value.quantity.endswith("range") else "nothing"
-            values.append(_shown(entry, nothing) if is_said else None)
+            values.append(_listed_value(entry, nothing) if is_said else None)
         return values[0], values[1]
 
     def _says(self, side: int, row: ModelDifference, ids: ElementIds, entry: Value) -> bool:
@@ -299,7 +304,7 @@ class CompiledDifferences:
             return reading.settings is not None
         if row.kind == "actuator":
             return False
-        if row.subject in _UNSAID.get(row.kind, ()):
+        if row.subject in _UNSTATED_VALUES.get(row.kind, ()):
             is_friction = row.kind == "geom" and row.subject == "friction"
             return is_friction and self._declares_friction(side, ids)
         if row.kind == "joint":
@@ -339,7 +344,7 @@ class CompiledDifferences:
         return max(counts) <= 1 and bool(np.isclose(efforts[0], efforts[1], rtol=1e-9, atol=0))
 
 
-def _shown(value: Value, nothing: str) -> Value:
+def _listed_value(value: Value, nothing: str) -> Value:
     """Return a value of a compiled model as one of the list; `nothing` of what is not there."""
     if value is None:
         return nothing

@@ -24,9 +24,9 @@ from ...measures.text import milliseconds, rounded
 from ...rotations import HERE, Placement
 from ..compare.matching import MatchedTrees
 from .loads import JointLoad, ServoParts, SideLoads
-from .weighed_bodies import inertials, is_mended, relative_gap
+from .weighed_bodies import inertials, relative_gap, was_repaired
 
-_STILL = "stands still"
+_FIXED_TO_WORLD = "stands still"
 _ON_ITS_AXIS = 1e-9  # [m], and of entries of matrices: what is less is rounding
 
 
@@ -114,9 +114,11 @@ class Effects:
                 if effort:
                     return Meaning(apart / effort, f"{apart / effort:.2%} of the effort")
             case "damping":
-                return Meaning(self._share_of_damping(loads, apart, usual), _slowing(loads))
+                return Meaning(
+                    self._share_of_damping(loads, apart, usual), _decay_time_in_words(loads)
+                )
             case "effort":
-                return Meaning(usual, _effort(loads, values))
+                return Meaning(usual, _effort_in_words(loads, values))
         return Meaning(usual)
 
     def _share_of_damping(self, loads: list[JointLoad], apart: float, usual: float) -> float:
@@ -190,8 +192,8 @@ class Effects:
     def _inertia_of(self, pair: Pair) -> float:
         """Return the larger M_ii of the joint that carries a part; 0 where it is unknown."""
         felt = (
-            self._trees.left.felt(pair.left.number)[0],
-            self._trees.right.felt(pair.right.number)[0],
+            self._trees.left.inertia_and_load(pair.left.number)[0],
+            self._trees.right.inertia_and_load(pair.right.number)[0],
         )
         return max((inertia for inertia in felt if inertia > 0), default=0.0)
 
@@ -200,7 +202,7 @@ class Effects:
         pair, heavier = self.pair(body), max(left, right)
         share = abs(left - right) / heavier if heavier else 1.0
         if pair is not None and not self._moves(pair):
-            return Meaning(0.0, _STILL, matters=False)
+            return Meaning(0.0, _FIXED_TO_WORLD, matters=False)
         return Meaning(share, f"{share:.1%} of the larger")
 
     def of_centre(self, body: int, left: Array, right: Array) -> Meaning:
@@ -210,14 +212,14 @@ class Effects:
         if pair is None:
             return usual
         if not self._moves(pair):
-            return Meaning(0.0, _STILL, scale=self.reach, matters=False)
+            return Meaning(0.0, _FIXED_TO_WORLD, scale=self.reach, matters=False)
         joint = pair.right.joint
         if joint is None or joint.kind != "hinge":
             return usual
         weight = max(pair.left.inertial.mass, pair.right.inertial.mass) * GRAVITY * apart
         loads = (
-            self._trees.left.felt(pair.left.number)[1],
-            self._trees.right.felt(pair.right.number)[1],
+            self._trees.left.inertia_and_load(pair.left.number)[1],
+            self._trees.right.inertia_and_load(pair.right.number)[1],
         )
         load = max(*(value for value in loads if value > 0), weight, 0.0, 0.0)
         share = weight / load if load else 0.0
@@ -237,8 +239,8 @@ class Effects:
         left, right = inertials(pair, body, other)
         relative = relative_gap(*stated)  # of what is shown; the share is of what moves
         if not self._moves(pair):
-            return Meaning(0.0, _STILL, relative=relative, matters=False)
-        any_mended = is_mended(stated[0], left) or is_mended(stated[1], right)
+            return Meaning(0.0, _FIXED_TO_WORLD, relative=relative, matters=False)
+        any_mended = was_repaired(stated[0], left) or was_repaired(stated[1], right)
         mended = ", as mended" if any_mended else ""
         joint, inertia = pair.right.joint, self._inertia_of(pair)
         if joint is not None and joint.kind == "hinge" and inertia:
@@ -309,7 +311,7 @@ def _by_body(trees: MatchedTrees) -> dict[int, Pair]:
     return pairs
 
 
-def _slowing(loads: Sequence[JointLoad]) -> str:
+def _decay_time_in_words(loads: Sequence[JointLoad]) -> str:
     """Return in what time M_ii / damping a joint of each side slows down, in words.
 
     Of a ball and a free joint, which have no one M_ii, nothing is said.
@@ -326,7 +328,7 @@ def _slowing(loads: Sequence[JointLoad]) -> str:
     return " / ".join(dict.fromkeys(words))
 
 
-def _effort(loads: Sequence[JointLoad], values: Sequence[float]) -> str:
+def _effort_in_words(loads: Sequence[JointLoad], values: Sequence[float]) -> str:
     """Return what another largest force of a joint means, in words."""
     least, most = min(values), max(values)
     if len(values) == 2 and 0 < least < most < math.inf:

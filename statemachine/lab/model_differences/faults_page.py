@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import capital, grouped
 from ...show.blocks import Table
 from .records import FileFault, Value
-from .subject_page import MOMENT, value_text
+from .subject_page import LINK_INERTIA, value_text
 
 
 @dataclass(frozen=True)
@@ -77,5 +77,5 @@ def _value_of_fault(fault: FileFault, value: Value, none: str) -> str:
     if value is None:
         return none
     if fault.unit == "kg m²":
-        return f"{value_text(value, MOMENT)} kg mm²"
+        return f"{value_text(value, LINK_INERTIA)} kg mm²"
     return value_text(value, fault.unit)

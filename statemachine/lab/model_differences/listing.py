@@ -14,7 +14,7 @@ from .effects import Meaning
 from .records import SUBJECTS, ListedDifference, Value
 
 _ORDER = tuple(SUBJECTS)
-_ROUNDINGS = 8  # that may have come together in a figure
+_MAX_ROUNDING_STEPS = 8  # that may have come together in a figure
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ class Listing:
             unit: SI unit of each number.
             cause: The difference of the compiled models that it is of.
         """
-        size, usual = _apart(*values)
+        size, usual = _difference_and_scale(*values)
         relative = meaning.relative
         if relative is None:
             scale = max(usual, meaning.scale)
             relative = size / scale if size is not None and scale else math.inf
-        if size is not None and relative <= self.tolerance * _ROUNDINGS:
+        if size is not None and relative <= self.tolerance * _MAX_ROUNDING_STEPS:
             return
-        left, right = (_finite(value) for value in values)
+        left, right = (_text_if_infinite(value) for value in values)
         share = float(min(max(meaning.share, 0.0), 1.0))
         if size is not None and not math.isfinite(size):
             size = None
@@ -132,13 +132,13 @@ def _weight(row: ListedDifference) -> float:
 
 def share_of(values: tuple[Value, Value]) -> float:
     """Return how far two numbers are apart, as a part of the larger one; 0.5 of words."""
-    size, usual = _apart(*values)
+    size, usual = _difference_and_scale(*values)
     if size is None or not usual or not math.isfinite(size):
         return 0.5
     return min(size / usual, 1.0)
 
 
-def _apart(left: Value, right: Value) -> tuple[float | None, float]:
+def _difference_and_scale(left: Value, right: Value) -> tuple[float | None, float]:
     """Return how far two values are apart, and how large they are.
 
     Args:
@@ -149,7 +149,7 @@ def _apart(left: Value, right: Value) -> tuple[float | None, float]:
         The norm of the difference of as many numbers, of a range the largest of both ends; None of
         what are not as many numbers. The larger norm of both, of a range at least its width.
     """
-    a, b = _numbers(left), _numbers(right)
+    a, b = _as_numbers(left), _as_numbers(right)
     if a is None or b is None or a.shape != b.shape:
         return None, 0.0
     with np.errstate(invalid="ignore"):
@@ -162,14 +162,14 @@ def _apart(left: Value, right: Value) -> tuple[float | None, float]:
     return size, usual
 
 
-def _numbers(value: Value) -> Array | None:
+def _as_numbers(value: Value) -> Array | None:
     """Return a value as numbers (n,); None of one that is none."""
     if value is None or isinstance(value, str | bool):
         return None
     return np.atleast_1d(np.asarray(value, dtype=np.float64))
 
 
-def _finite(value: Value) -> Value:
+def _text_if_infinite(value: Value) -> Value:
     """Return a value; of an infinite number a word, and of a range without ends, too."""
     if isinstance(value, tuple):
         return value if np.isfinite(value).all() else "none"

@@ -36,7 +36,7 @@ class JointLoad:
             joint: The joint.
         """
         self.joint = joint
-        self.inertia, self.load = tree.felt(number)
+        self.inertia, self.load = tree.inertia_and_load(number)
 
     @property
     def effort(self) -> float:

@@ -65,7 +65,7 @@ class Meanings:
             case "com" if isinstance(left, tuple) and isinstance(right, tuple):
                 return effects.of_centre(ids.left, np.array(left), np.array(right))
         if row.subject == "place":
-            return effects.of_place(ids.left, value.quantity, _size(left, right))
+            return effects.of_place(ids.left, value.quantity, _largest_difference(left, right))
         if value.quantity in ("moments", TURNED):
             return effects.of_inertia(ids.left, ids.right)
         return Meaning(share_of((left, right)))
@@ -85,20 +85,20 @@ class Meanings:
             case "axis" if isinstance(left, tuple) and isinstance(right, tuple):
                 return effects.of_axis(np.array(left), np.array(right))
             case "anchor":
-                share = _size(left, right) / effects.reach
+                share = _largest_difference(left, right) / effects.reach
                 return Meaning(share, "beside the other's axis", scale=effects.reach)
             case "range":
                 ends = (_ends(left), _ends(right))
                 return effects.of_range(ends, value.unit)
             case "force limit":
-                limits = (_most(left), _most(right))
+                limits = (_largest_magnitude(left), _largest_magnitude(right))
                 return effects.of_joint(row.where, "effort", *limits)
         if row.subject in ("armature", "dry friction", "damping"):
             numbers = (_number(left), _number(right))
             if any(number is not None for number in numbers):
                 return effects.of_joint(row.where, row.subject, *numbers)
         if row.subject == "rest of the spring":
-            return Meaning(min(_size(left, right), 1.0), scale=1.0)
+            return Meaning(min(_largest_difference(left, right), 1.0), scale=1.0)
         return Meaning(share_of(values))
 
     def _of_extra_joint(self, row: ModelDifference) -> Meaning:
@@ -166,17 +166,19 @@ class Meanings:
         scale = np.pi if value.quantity == TURNED else self._effects.reach
         if value.quantity not in ("place", TURNED):
             return Meaning(1.0)
-        return Meaning(_size(value.left, value.right) / scale, scale=float(scale))
+        return Meaning(_largest_difference(value.left, value.right) / scale, scale=float(scale))
 
     def _of_geom(
         self, row: ModelDifference, value: DifferingQuantity, values: tuple[Value, Value]
     ) -> Meaning:
         """Return what another shape, place or contact means, as a part of the robot's reach."""
         if value.quantity == TURNED:
-            return Meaning(_size(*values) / np.pi / 10, scale=float(np.pi))
-        if value.unit == "m" and _size(*values):
+            return Meaning(_largest_difference(*values) / np.pi / 10, scale=float(np.pi))
+        if value.unit == "m" and _largest_difference(*values):
             reach = self._effects.reach
-            return Meaning(_size(*values) / reach, scale=reach if row.subject == "place" else 0.0)
+            return Meaning(
+                _largest_difference(*values) / reach, scale=reach if row.subject == "place" else 0.0
+            )
         return Meaning(share_of(values))
 
     def _of_setting(
@@ -194,7 +196,7 @@ class Meanings:
         return Meaning(share, effect)
 
 
-def _size(left: Value, right: Value) -> float:
+def _largest_difference(left: Value, right: Value) -> float:
     """Return how far two numbers, or as many, are apart; 0 of what are none."""
     if isinstance(left, str) or isinstance(right, str) or left is None or right is None:
         return 0.0
@@ -208,7 +210,7 @@ def _ends(value: Value) -> tuple[float, float] | None:
     return None
 
 
-def _most(value: Value) -> float | None:
+def _largest_magnitude(value: Value) -> float | None:
     """Return the largest number of a range without its sign; infinite of what has no range."""
     if value is None:
         return None

@@ -15,11 +15,15 @@ from .listing import CompiledCause, ElementPlace, Listing, share_of
 from .locating import Locator
 from .records import Value
 
-_READ = Meaning(0.5, "only a function that reads it moves otherwise")
-_SENSED = Meaning(0.0, "only a controller that reads it moves otherwise", matters=False)
-_READ_BY_NUMBER = Meaning(0.5, "only a function that reads qpos or qvel by number moves otherwise")
-_MOVED_BY_NUMBER = Meaning(0.5, "only a function that moves them by number moves otherwise")
-_ORDERED = Meaning(0.5, "a function that writes ctrl by number commands others")
+_MOVES_READERS = Meaning(0.5, "only a function that reads it moves otherwise")
+_MOVES_SENSOR_READERS = Meaning(
+    0.0, "only a controller that reads it moves otherwise", matters=False
+)
+_MOVES_READERS_BY_INDEX = Meaning(
+    0.5, "only a function that reads qpos or qvel by number moves otherwise"
+)
+_MOVES_WRITERS_BY_INDEX = Meaning(0.5, "only a function that moves them by number moves otherwise")
+_MOVES_CTRL_WRITERS = Meaning(0.5, "a function that writes ctrl by number commands others")
 _SAME = 1e-9
 
 
@@ -38,7 +42,7 @@ def enter_only_read(listing: Listing, matched: Matched, locator: Locator) -> Non
         element = locator.find(row.kind, row.where)
         for value in row.values:
             values = (_value(value.left), _value(value.right))
-            meaning = Meaning(share_of(values), _READ.effect)
+            meaning = Meaning(share_of(values), _MOVES_READERS.effect)
             listing.enter("further", element, row.subject, values, meaning, value.unit, _cause(row))
 
 
@@ -56,10 +60,12 @@ def _enter_orders(listing: Listing, matched: Matched) -> None:
         left, right = (
             few(list(model.actuator_names), 6) for model in (matched.left, matched.right)
         )
-        listing.enter("further", ElementPlace("ctrl", "ctrl"), "order", (left, right), _ORDERED)
+        listing.enter(
+            "further", ElementPlace("ctrl", "ctrl"), "order", (left, right), _MOVES_CTRL_WRITERS
+        )
     orders = (
-        ("qpos", order_of_qpos(matched), _READ_BY_NUMBER),
-        ("mocap bodies", order_of_mocap(matched), _MOVED_BY_NUMBER),
+        ("qpos", order_of_qpos(matched), _MOVES_READERS_BY_INDEX),
+        ("mocap bodies", order_of_mocap(matched), _MOVES_WRITERS_BY_INDEX),
     )
     for name, rows, meaning in orders:
         for row in rows:
@@ -116,8 +122,12 @@ def _enter_sensors(listing: Listing, matched: Matched, locator: Locator) -> None
             element = locator.find("sensor", row.where)
             values = (_value(value.left), _value(value.right))
             name = value.quantity
-            listing.enter("control", element, name, values, _SENSED, value.unit, _cause(row))
+            listing.enter(
+                "control", element, name, values, _MOVES_SENSOR_READERS, value.unit, _cause(row)
+            )
     if only_left or only_right:
         words = [few(names, 6) if names else "nothing" for names in (only_left, only_right)]
         element = ElementPlace("sensor", "sensors")
-        listing.enter("control", element, "on one side alone", (words[0], words[1]), _SENSED)
+        listing.enter(
+            "control", element, "on one side alone", (words[0], words[1]), _MOVES_SENSOR_READERS
+        )

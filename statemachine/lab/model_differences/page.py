@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ...measures.text import after, capital, grouped, reading, rounded, sentence
+from ...measures.text import capital, display_unit, grouped, rounded, sentence, unit_suffix
 from ...measures.text import versions_of as versions_text
 from ...show.blocks import Page, Table
-from ...show.first_screen import first_screen
+from ...show.first_screen import MOST_ROWS, first_that_fits
 from ...show.templates import PageContent, render, with_answer
 from ..compare.matched import RenamedPair
 from ..compare.typed_command import TypedCommand
@@ -23,11 +23,11 @@ from .changes_page import (
 from .faults_page import faults_table, reasons_of
 from .records import FileSide, ListedDifference, ModelsComparison, QuantityAgreement
 from .subject_page import (
-    APART,
-    MOMENT,
+    DIFFERENCE_TEXTS,
+    LINK_INERTIA,
     AlikeDifferences,
     LackOfArmature,
-    alike,
+    group_alike,
     heading,
     lack_of_armature,
     record_table,
@@ -36,8 +36,16 @@ from .subject_page import (
 )
 from .visuals import gross_visuals
 
-_READ = ("file", "read", "links", "joints", "touching", "drawn", "mass")  # rows of the sides
-_SAME_PLACE = 1e-5  # [m] within which links are at one place
+_SIDE_COLUMNS = (
+    "file",
+    "read",
+    "links",
+    "joints",
+    "touching",
+    "drawn",
+    "mass",
+)  # rows of the sides
+_POSITION_TOLERANCE = 1e-5  # [m] within which links are at one place
 
 ModelsState = Literal["differs", "not all compared", "equal"]
 Hint = Literal["differences", "figures", ""]
@@ -138,12 +146,14 @@ class ModelsPage(PageContent):
     def furthest(self) -> str:
         """The link that is furthest off; "" where none is."""
         posed = self.result.posed
-        return posed.link if posed.joints and posed.distance > _SAME_PLACE else ""
+        return posed.link if posed.joints and posed.distance > _POSITION_TOLERANCE else ""
 
     @property
     def sides(self) -> Table:
         """How both sides were read, and what they have."""
-        rows = zip(_READ, _column(self.result.left), _column(self.result.right), strict=True)
+        rows = zip(
+            _SIDE_COLUMNS, _column(self.result.left), _column(self.result.right), strict=True
+        )
         return Table(("", "left", "right"), list(rows))
 
     @property
@@ -239,8 +249,15 @@ def page(result: ModelsComparison, details: bool = False) -> Page:
     """
     if details:
         return with_answer(whole_page(result))
+    return first_that_fits(ever_shorter(result))
+
+
+def ever_shorter(result: ModelsComparison) -> Iterator[Page]:
+    """Yield the page with ever fewer of the weightiest differences, at least one if there are."""
     groups = weightiest(result)
-    return first_screen(lambda rows: with_answer(_page(result, groups[:rows])), len(groups))
+    most = min(len(groups), MOST_ROWS)
+    for rows in range(most, min(most, 1) - 1, -1):
+        yield with_answer(_page(result, groups[:rows]))
 
 
 def whole_page(result: ModelsComparison) -> Page:
@@ -270,7 +287,7 @@ def _page(
 
 def weightiest(result: ModelsComparison) -> list[AlikeDifferences]:
     """Return the differences that act on a motion, the weightiest first, whatever their subject."""
-    groups = alike([row for row in result.differences if row.matters])
+    groups = group_alike([row for row in result.differences if row.matters])
     return sorted(groups, key=lambda group: -round(group.first.share, 6))
 
 
@@ -372,12 +389,12 @@ def _equal(agreements: Sequence[QuantityAgreement]) -> Table:
 
 def _worst(agreement: QuantityAgreement) -> str:
     """Return the largest difference of those that agree."""
-    unit = MOMENT if agreement.subject == "inertia" else agreement.unit
-    factor, shown = APART.get(unit, (1.0, after(unit)))
+    unit = LINK_INERTIA if agreement.subject == "inertia" else agreement.unit
+    factor, shown = DIFFERENCE_TEXTS.get(unit, (1.0, unit_suffix(unit)))
     return f"{agreement.worst * factor:.1e}{shown}"
 
 
 def _tiny(value: float, unit: str) -> str:
     """Return a size with one digit where it is rounding."""
-    is_large = value * reading(unit)[0] > 1e-2
+    is_large = value * display_unit(unit)[0] > 1e-2
     return rounded(value, unit, 4 if is_large else 1)

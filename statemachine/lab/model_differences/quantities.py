@@ -10,7 +10,7 @@ from ...engines.records import DifferingQuantity
 from .records import Value
 
 # What the two numbers of a solref are where they are positive, and their units.
-_OF_SOLREF = (("timeconst", "s"), ("dampratio", ""))
+_SOLREF_PARTS = (("timeconst", "s"), ("dampratio", ""))
 
 
 def split_solref(values: Iterable[DifferingQuantity]) -> Iterator[DifferingQuantity]:
@@ -28,7 +28,7 @@ def split_solref(values: Iterable[DifferingQuantity]) -> Iterator[DifferingQuant
             yield value
             continue
         # Both have as many: those up to the last that differs.
-        for (name, unit), ours, theirs in zip(_OF_SOLREF, left, right, strict=False):
+        for (name, unit), ours, theirs in zip(_SOLREF_PARTS, left, right, strict=False):
             if ours != theirs:
                 yield DifferingQuantity(f"{value.quantity} {name}", ours, theirs, unit)
 

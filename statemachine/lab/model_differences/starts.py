@@ -14,7 +14,7 @@ from .effects import Meaning
 from .listing import CompiledCause, Listing
 from .locating import Locator
 
-_NEAR = 1e-9  # [m] and [rad]: as a file with ten digits leaves it
+_SAME_POSE_TOLERANCE = 1e-9  # [m] and [rad]: as a file with ten digits leaves it
 _EFFECT = "a run starts there"
 
 
@@ -48,11 +48,11 @@ def enter_starts(
         element = locator.find("body", locator.name(0, "body", body))
         cause = CompiledCause("start")
         far, angle = wanted.distance(theirs), wanted.angle(theirs)
-        if far > _NEAR:
+        if far > _SAME_POSE_TOLERANCE:
             places = _numbers(wanted.pos), _numbers(theirs.pos)
             meaning = Meaning(far / reach, _EFFECT, scale=reach)
             listing.enter("places", element, "place", places, meaning, "m", cause)
-        if angle > _NEAR:
+        if angle > _SAME_POSE_TOLERANCE:
             meaning = Meaning(angle / math.pi, _EFFECT, scale=math.pi)
             listing.enter("places", element, TURNED, (0.0, angle), meaning, "rad", cause)
 

@@ -7,24 +7,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...engines.description.lines import SourceLine
-from ...measures.text import after, capital, reading, significant
+from ...measures.text import capital, display_unit, significant, unit_suffix
 from ...show.blocks import Table
 from . import SUBJECTS, ListedDifference, Value
 
-MOMENT = "of a part"  # kg m², which are of another size than those of a joint
+LINK_INERTIA = "of a part"  # kg m², which are of another size than those of a joint
 # Units as a reader has them, of differences; a result has SI.
-APART = {
-    "rad": reading("rad"),
-    "m": reading("m"),
+DIFFERENCE_TEXTS = {
+    "rad": display_unit("rad"),
+    "m": display_unit("m"),
     "m³": (1e6, " cm³"),
-    MOMENT: (1e6, " kg mm²"),
+    LINK_INERTIA: (1e6, " kg mm²"),
 }
 # ... and of the figures themselves.
 _SHOWN = {
-    "m": APART["m"],
-    "rad": APART["rad"],
-    "m³": APART["m³"],
-    MOMENT: (1e6, ""),
+    "m": DIFFERENCE_TEXTS["m"],
+    "rad": DIFFERENCE_TEXTS["rad"],
+    "m³": DIFFERENCE_TEXTS["m³"],
+    LINK_INERTIA: (1e6, ""),
 }  # three in a row
 _LAST = {
     "places": "effect",
@@ -41,7 +41,7 @@ _LAST = {
     "structure": "",
 }
 # Quantities that say no more than the name of their difference.
-_SAID_BY_ITS_NAME = {
+_SELF_EXPLANATORY = {
     "actfrcrange",
     "actuator",
     "armature",
@@ -75,15 +75,15 @@ _SAID_BY_ITS_NAME = {
     "visual",
 }
 # Kinds of elements whose names say little without the kind.
-_OF_A_PART = ("mass", "centre of mass", "inertia")
+_LINK_SUBJECTS = ("mass", "centre of mass", "inertia")
 _NAMED_WITH_KIND = ("keyframe", "transmission", "visual")
 _HEADERS = ("figure", "left", "right", "apart")
 _LINES = "lines"
 # Subjects whose differences are no figure of an element.
-_TOLD_IN_WORDS = ("structure", "shapes", "drawing", "control")
+_TEXT_SUBJECTS = ("structure", "shapes", "drawing", "control")
 _SHORT = {"moments": "inertia"}
 _DIGITS, _FEW_DIGITS = 4, 3  # significant ones of a figure; of one on the first screen
-_ALIKE = 3  # places with one figure of the same values have one row
+_MIN_ALIKE = 3  # places with one figure of the same values have one row
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,8 @@ class AlikeDifferences:
         row, more = self.first, len(self.rows) - 1
         name = _name_of(row)
         name = f"{capital(name)} + {more} more" if more else capital(name)
-        is_known = row.cause or row.subject in _OF_A_PART
-        if is_known and row.quantity in _SAID_BY_ITS_NAME:
+        is_known = row.cause or row.subject in _LINK_SUBJECTS
+        if is_known and row.quantity in _SELF_EXPLANATORY:
             return name
         return f"{name}: {row.quantity}".removesuffix(": ").removeprefix(": ")
 
@@ -116,7 +116,7 @@ class AlikeDifferences:
     def short_label(self) -> str:
         """The element and its figure, for a table that has little room."""
         row, more = self.first, len(self.rows) - 1
-        if not row.element or row.subject in _TOLD_IN_WORDS:
+        if not row.element or row.subject in _TEXT_SUBJECTS:
             return self.label
         element = f"{row.element} + {more} more" if more else row.element
         quantity = _SHORT.get(row.quantity, row.quantity)
@@ -143,7 +143,7 @@ class AlikeDifferences:
         """How far the values are apart; "" where that says nothing."""
         if self.first.size is None or self.first.subject == "drawing":
             return ""
-        return _number(self.first.size, _unit_of(self.first), APART)
+        return _number(self.first.size, _unit_of(self.first), DIFFERENCE_TEXTS)
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class LackOfArmature:
     side: str
 
 
-def alike(differences: Sequence[ListedDifference]) -> list[AlikeDifferences]:
+def group_alike(differences: Sequence[ListedDifference]) -> list[AlikeDifferences]:
     """Group differences: three elements or more that have one figure with the same values.
 
     Args:
@@ -173,7 +173,7 @@ def alike(differences: Sequence[ListedDifference]) -> list[AlikeDifferences]:
         groups.setdefault(figure, []).append(row)
     found: list[AlikeDifferences] = []
     for rows in groups.values():
-        if len(rows) >= _ALIKE:
+        if len(rows) >= _MIN_ALIKE:
             found.append(AlikeDifferences(tuple(rows)))
         else:
             found += [AlikeDifferences((row,)) for row in rows]
@@ -242,7 +242,7 @@ def record_table(differences: Sequence[ListedDifference], files: tuple[str, str]
         by_subject.setdefault(row.subject, []).append(row)
     rows: list[tuple[str, ...]] = []
     for subject, members in by_subject.items():
-        groups = alike(members)
+        groups = group_alike(members)
         first = groups[0]
         example = f"{first.label}: {first.left} | {first.right}"
         rows.append((heading(subject), str(len(members)), example, _lines(first.first, files)))
@@ -275,7 +275,7 @@ def _name_of(row: ListedDifference) -> str:
 
     A mass that takes the centre of mass and the inertia along is one cause, and three figures.
     """
-    if row.subject in _OF_A_PART:
+    if row.subject in _LINK_SUBJECTS:
         return f"{row.subject} of {row.element}"
     if row.cause:
         return row.cause
@@ -284,7 +284,7 @@ def _name_of(row: ListedDifference) -> str:
 
 def _unit_of(row: ListedDifference) -> str:
     """Return the unit that a row is shown in."""
-    return MOMENT if row.subject == "inertia" and row.unit == "kg m²" else row.unit
+    return LINK_INERTIA if row.subject == "inertia" and row.unit == "kg m²" else row.unit
 
 
 def _lines(row: ListedDifference, files: tuple[str, str]) -> str:
@@ -321,5 +321,5 @@ def value_text(value: Value, unit: str, digits: int = _DIGITS) -> str:
 def _number(
     value: float, unit: str, units: dict[str, tuple[float, str]], digits: int = _DIGITS
 ) -> str:
-    factor, shown = units.get(unit, (1.0, after(unit)))
+    factor, shown = units.get(unit, (1.0, unit_suffix(unit)))
     return f"{significant(value * factor, digits)}{shown}"

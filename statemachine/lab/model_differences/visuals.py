@@ -25,10 +25,12 @@ from .listing import ElementPlace, Listing
 from .locating import Locator
 from .records import ListedDifference, ModelsComparison, Value
 
-_NEAR = 1e-6  # [m] within which two visuals are in one place: vertices are single precision
-_TURNED = 1e-6  # [rad] within which two visuals are turned alike
-_GROSS = 0.9  # of the larger: ten times as large, and a unit must be wrong
-_SAME = 1e-5  # of the extent
+_POSITION_TOLERANCE = (
+    1e-6  # [m] within which two visuals are in one place: vertices are single precision
+)
+_ANGLE_TOLERANCE = 1e-6  # [rad] within which two visuals are turned alike
+_UNIT_MISTAKE_SHARE = 0.9  # of the larger: ten times as large, and a unit must be wrong
+_SIZE_TOLERANCE = 1e-5  # of the extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,8 @@ def enter_visuals(
     if any(reading.format == "engine" for reading in readings):
         return
     for pair in trees.matching.pairs:
-        left = list(_of_part(readings[0], pair.left.links, pair.align))
-        right = list(_of_part(readings[1], pair.right.links, HERE))
+        left = list(_visuals_of_link(readings[0], pair.left.links, pair.align))
+        right = list(_visuals_of_link(readings[1], pair.right.links, HERE))
         for ours, theirs in _paired(left, right):
             there = ours if ours is not None else theirs
             assert there is not None
@@ -87,10 +89,10 @@ def enter_visuals(
 def gross_visuals(result: ModelsComparison) -> tuple[ListedDifference, ...]:
     """Return sizes and scales of what is drawn that are so far apart that a unit must be wrong."""
     rows = [row for row in result.differences if row.kind == "visual"]
-    return tuple(row for row in rows if row.share >= _GROSS)
+    return tuple(row for row in rows if row.share >= _UNIT_MISTAKE_SHARE)
 
 
-def _of_part(
+def _visuals_of_link(
     reading: ModelReading, links: Sequence[tuple[Link, Placement]], align: Placement
 ) -> Iterator[PlacedVisual]:
     """Yield the visual shapes of a rigid part.
@@ -117,9 +119,9 @@ def _paired(
 
     Of one name, of one mesh file, of one kind; then by their sizes, and then by their places.
     """
-    costs: list[tuple[_Unlikeness, int, int]] = []
+    costs: list[tuple[_Dissimilarity, int, int]] = []
     for k, ours in enumerate(left):
-        costs += [(_unlikeness(ours, theirs), k, i) for i, theirs in enumerate(right)]
+        costs += [(_dissimilarity(ours, theirs), k, i) for i, theirs in enumerate(right)]
     costs.sort()
     pairs = one_to_one((k, i) for _, k, i in costs)
     for k, ours in enumerate(left):
@@ -131,10 +133,10 @@ def _paired(
 
 # How unlike two visuals are: in what they are, in their sizes (of the larger one), and how far they
 # are apart [m].
-_Unlikeness = tuple[int, float, float]
+_Dissimilarity = tuple[int, float, float]
 
 
-def _unlikeness(left: PlacedVisual, right: PlacedVisual) -> _Unlikeness:
+def _dissimilarity(left: PlacedVisual, right: PlacedVisual) -> _Dissimilarity:
     """Return how unlike two visuals are, as a key to sort by."""
     ours, theirs = left.solid, right.solid
     size, far = _relative(left.shape.scale, right.shape.scale), 0.0
@@ -142,7 +144,7 @@ def _unlikeness(left: PlacedVisual, right: PlacedVisual) -> _Unlikeness:
         box, other = _box_around(ours), _box_around(theirs)
         size = _relative(sorted(box.size), sorted(other.size))
         far = box.place.distance(other.place)
-    return _rank(left.shape, right.shape), size if size > _SAME else 0.0, far
+    return _rank(left.shape, right.shape), size if size > _SIZE_TOLERANCE else 0.0, far
 
 
 _ONE_MESH = 2  # the most that two are of one mesh at
@@ -256,7 +258,7 @@ def _have_same_vertices(left: PlacedVisual, right: PlacedVisual) -> bool:
         points.append(visual.solid.points / visual.shape.scale)
     if points[0].shape != points[1].shape:
         return False
-    return _relative(points[0].ravel(), points[1].ravel()) <= _SAME
+    return _relative(points[0].ravel(), points[1].ravel()) <= _SIZE_TOLERANCE
 
 
 def _of_one_mesh(left: PlacedVisual, right: PlacedVisual) -> Iterator[_Quantity]:
@@ -266,9 +268,9 @@ def _of_one_mesh(left: PlacedVisual, right: PlacedVisual) -> Iterator[_Quantity]
     assert theirs is not None
     sizes = _times(2, _box_around(ours).size), _times(2, _box_around(theirs).size)
     scales = left.shape.scale, right.shape.scale
-    if _relative(*sizes) > _SAME:
+    if _relative(*sizes) > _SIZE_TOLERANCE:
         yield _of_sizes("size", sizes[0], sizes[1], "m")
-    elif _relative(*scales) > _SAME:  # one of them is mirrored
+    elif _relative(*scales) > _SIZE_TOLERANCE:  # one of them is mirrored
         yield _Quantity("scale", *scales)
     yield from _of_places(ours.place, theirs.place)
 
@@ -278,7 +280,7 @@ def _of_solids(
 ) -> Iterator[_Quantity]:
     """Yield what two shapes of one kind differ in; sizes are multiplied by a factor."""
     laid = laid_on(left, right)
-    if _relative(left.size, laid.size) > _SAME:
+    if _relative(left.size, laid.size) > _SIZE_TOLERANCE:
         yield _of_sizes("size", _times(factor, left.size), _times(factor, laid.size), "m")
     yield from _of_places(left.place, laid.place)
 
@@ -289,11 +291,11 @@ def _times(factor: float, size: Sequence[float]) -> tuple[float, ...]:
 
 def _of_places(left: Placement, right: Placement) -> Iterator[_Quantity]:
     """Yield how two frames lie to each other."""
-    if left.distance(right) > _NEAR:
+    if left.distance(right) > _POSITION_TOLERANCE:
         values = tuple(left.pos.tolist()), tuple(right.pos.tolist())
         yield _Quantity("place", *values, "", "m")
     angle = left.angle(right)
-    if angle > _TURNED:
+    if angle > _ANGLE_TOLERANCE:
         yield _Quantity(TURNED, 0.0, angle, "", "rad")
 
 

@@ -12,7 +12,7 @@ from ...engines.description.records import Inertial
 from ...engines.description.tree import Group
 from ...rotations import Placement
 
-_SAME_PLACE = 1e-9  # [m]: what is less is rounding
+_POSITION_TOLERANCE = 1e-9  # [m]: what is less is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ def weighed_bodies(group: Group) -> list[WeighedBody]:
     for link, place in group.links:
         inertial = link.inertial
         if inertial is not None and (inertial.mass or inertial.tensor.any()):
-            seen = inertial.seen_from(place)
+            seen = inertial.in_frame(place)
             bodies.append(WeighedBody(link.body, link.name, place, seen))
     return bodies
 
@@ -48,7 +48,7 @@ def are_alike(left: Sequence[WeighedBody], right: Sequence[WeighedBody]) -> bool
     if [body.name for body in left] != [body.name for body in right]:
         return False
     pairs = zip(left, right, strict=True)
-    return all(ours.place.distance(theirs.place) <= _SAME_PLACE for ours, theirs in pairs)
+    return all(ours.place.distance(theirs.place) <= _POSITION_TOLERANCE for ours, theirs in pairs)
 
 
 def inertials(pair: Pair, body: int, other: int) -> tuple[Inertial, Inertial]:
@@ -61,8 +61,8 @@ def inertials(pair: Pair, body: int, other: int) -> tuple[Inertial, Inertial]:
     if len(theirs) > 1 and are_alike(ours, theirs):
         for left, right in zip(ours, theirs, strict=True):
             if left.body == body and right.body == other:
-                return left.inertial.seen_from(pair.align), right.inertial
-    return pair.left.inertial.seen_from(pair.align), pair.right.inertial
+                return left.inertial.in_frame(pair.align), right.inertial
+    return pair.left.inertial.in_frame(pair.align), pair.right.inertial
 
 
 def relative_gap(left: Inertial, right: Inertial) -> float:
@@ -72,7 +72,7 @@ def relative_gap(left: Inertial, right: Inertial) -> float:
     return size / largest if largest else 0.0
 
 
-def is_mended(stated: Inertial, used: Inertial) -> bool:
+def was_repaired(stated: Inertial, used: Inertial) -> bool:
     """Tell whether a run has another inertia than the file states."""
     return not np.array_equal(stated.tensor, used.tensor)
 

@@ -171,12 +171,12 @@ class CallRecorder:
         self._listening = False
         due: list[str] = []
         for watch in self._watches.values():
-            for watched in watch.living():
+            for watched in watch.live_objects():
                 watched.named = False
             watch.name(namespace)
-            for watched in watch.living():
+            for watched in watch.live_objects():
                 self._note_writes(watched, thoroughly=True)
-                if watched.due():
+                if watched.is_outdated():
                     due.append(watched.title)
         return RecordedStatement(
             source, line, self._calls(), self._changed_outside(), printed, tuple(due)
@@ -244,7 +244,7 @@ class CallRecorder:
 
     def _note_writes(self, watched: WatchedObject, thoroughly: bool = False) -> None:
         """Note what differs from the last look: no call changed it."""
-        if not watched.gone:
+        if not watched.is_gone:
             for field, entry in watched.look_again(thoroughly).items():
                 self._written[_Field(watched, field)].add(entry)
 

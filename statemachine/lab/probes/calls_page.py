@@ -10,7 +10,7 @@ from typing import Literal
 from ...engines import raw_engine_of
 from ...engines.call_watch import CallWords
 from ...interface import DERIVED
-from ...measures.text import NONE, few, grouped
+from ...measures.text import NO_NUMBER, few, grouped
 from ...show.blocks import Block, Table, Text
 from ...show.templates import PageContent, render_blocks
 from .calls import Call, RecordedStatement, Recording
@@ -79,7 +79,7 @@ class RecordedCalls(PageContent):
     statements: Sequence[_Statement]
     endings: Sequence[_Ending]
     legend: Sequence[str]
-    no_change: str = NONE
+    no_change: str = NO_NUMBER
 
 
 def recorded_calls(recordings: Mapping[str, Recording]) -> list[Block]:
@@ -166,13 +166,13 @@ def _rows(calls: Sequence[Call]) -> list[tuple[str, str, str]]:
     if idle:
         names = ", ".join(call.function for call in idle)
         times = sum(call.count for call in idle)
-        rows.append((f"  {len(idle)} others", f"{times:,}", f"{NONE}: {names}"))
+        rows.append((f"  {len(idle)} others", f"{times:,}", f"{NO_NUMBER}: {names}"))
     return rows
 
 
 def _names(changed: Sequence[str]) -> str:
     if not changed:
-        return NONE
+        return NO_NUMBER
     shown = _NAMES_SHOWN if len(changed) > _NAMES_SHOWN + 1 else len(changed)
     return few(changed, shown)
 

@@ -16,16 +16,16 @@ import numpy as np
 from ...errors import BadInputError, DivergedError, shown
 from ...interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
 from ...interface.checks import as_count
-from ...measures import JointPlaces, farthest, largest_or_inf, turns
+from ...measures import JointAddresses, largest_difference, largest_or_inf, rotation_angles
 from ...measures.text import rough
 from ...release_names import engine_of
 
 _WIDTH = 80
-_BEFORE = 50  # steps until a run is saved
-_LONGER = 50  # steps more of the other run
-_STIR = 0.3  # how far the command is from that of the start [unit of the actuator], at most
+_STEPS_BEFORE_SAVE = 50  # steps until a run is saved
+_EXTRA_STEPS = 50  # steps more of the other run
+_CTRL_OFFSET = 0.3  # how far the command is from that of the start [unit of the actuator], at most
 # What stands in a part that is zero in both runs, as of forces that nobody applies [SI units].
-_LEFT_BEHIND = 1.0
+_APPLIED_FORCE = 1.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class FutureGap:
 
 
 @dataclass(frozen=True)
-class PartLeftOut:
+class OmittedStatePart:
     """A part of a State, and what follows where it is left out.
 
     Attributes:
@@ -98,7 +98,7 @@ class Audit:
     steps: int
     whole: FutureGap
     again: FutureGap
-    parts: tuple[PartLeftOut, ...]
+    parts: tuple[OmittedStatePart, ...]
 
     @property
     def decides(self) -> tuple[str, ...]:
@@ -161,11 +161,11 @@ def audit(model: Model, steps: int = 60, seed: int = 0) -> Audit:
     random = np.random.default_rng(seed)
     with make_data(model) as run, make_data(model) as other, make_data(model) as fresh:
         _start(model, run, random)
-        step(model, run, _BEFORE)
+        step(model, run, _STEPS_BEFORE_SAVE)
         saved = get_state(model, run)
         going_on = future(model, run, steps)
         _start(model, other, random)
-        step(model, other, _BEFORE + _LONGER)
+        step(model, other, _STEPS_BEFORE_SAVE + _EXTRA_STEPS)
         left = get_state(model, other)
         whole = _restored(model, other, saved, steps)
         again = _restored(model, fresh, saved, steps)
@@ -177,7 +177,7 @@ def audit(model: Model, steps: int = 60, seed: int = 0) -> Audit:
             gap = None
             if without is not None:
                 gap = _gap(model, whole, _restored(model, other, without, steps))
-            parts.append(PartLeftOut(name, size, gap))
+            parts.append(OmittedStatePart(name, size, gap))
     return Audit(
         backend=model.backend,
         engine_version=model.engine_version,
@@ -193,7 +193,7 @@ def audit(model: Model, steps: int = 60, seed: int = 0) -> Audit:
 def _start(model: Model, data: Data, random: np.random.Generator) -> None:
     """Put a Data to the start, under a command that is drawn anew."""
     reset(model, data, keyframe=0 if model.keyframes else None)
-    stir = random.uniform(-_STIR, _STIR, model.nu)
+    stir = random.uniform(-_CTRL_OFFSET, _CTRL_OFFSET, model.nu)
     data.ctrl[:] = np.clip(data.ctrl + stir, *model.actuator_ctrlrange.T)
 
 
@@ -221,7 +221,7 @@ def _without(saved: State, left: State, name: str) -> State | None:
     if np.array_equal(saved[name], other):
         if other.any():
             return None
-        other = np.full_like(other, _LEFT_BEHIND)
+        other = np.full_like(other, _APPLIED_FORCE)
     return saved.with_parts(**{name: other})
 
 
@@ -231,13 +231,15 @@ def _gap(model: Model, first: Array, second: Array) -> FutureGap:
     differs = (first.view(np.int64) != second.view(np.int64)).any(axis=1)
     if not differs.any():
         return FutureGap(None, 0.0, 0.0)
-    places = JointPlaces.of(model.jnt_type, model.jnt_qposadr)
-    hinge_gap = largest_or_inf(farthest(first[:, places.hinges], second[:, places.hinges]))
+    places = JointAddresses.of(model.jnt_type, model.jnt_qposadr)
+    hinge_gap = largest_or_inf(
+        largest_difference(first[:, places.hinges], second[:, places.hinges])
+    )
     quats = places.quats[:, None] + np.arange(4)
-    orientation_gap = largest_or_inf(turns(first[:, quats], second[:, quats]))
+    orientation_gap = largest_or_inf(rotation_angles(first[:, quats], second[:, quats]))
     straight = np.concatenate((places.slides, places.positions))
     return FutureGap(
         first=int(np.argmax(differs)),
         angle=max(hinge_gap, orientation_gap),
-        length=largest_or_inf(farthest(first[:, straight], second[:, straight])),
+        length=largest_or_inf(largest_difference(first[:, straight], second[:, straight])),
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...measures import QUANTITIES
-from ...measures.text import NONE, grouped, quantity, rounded
+from ...measures.text import NO_NUMBER, grouped, quantity, rounded
 from ...show.blocks import Block, Table
 from ...show.templates import PageContent, render_blocks
 from ...witness import SAME_READING
@@ -270,7 +270,7 @@ def _largest_or_note(agreement: Agreement) -> str:
 
 def _rms_cell(agreement: Agreement) -> str:
     if QUANTITIES[agreement.kind].is_outcome:
-        return NONE
+        return NO_NUMBER
     return difference(agreement.rms, agreement)
 
 
@@ -287,7 +287,7 @@ def _tolerance_cell(agreement: Agreement) -> str:
 
 
 def _since_cell(agreement: Agreement) -> str:
-    return NONE if agreement.kind == "contact" else moment(agreement.since)
+    return NO_NUMBER if agreement.kind == "contact" else moment(agreement.since)
 
 
 def _floor_columns(floor: ChaosFloor) -> Columns:
@@ -296,12 +296,12 @@ def _floor_columns(floor: ChaosFloor) -> Columns:
 
     def floor_cell(agreement: Agreement) -> str:
         if agreement.name not in bands:
-            return NONE
+            return NO_NUMBER
         return quantity(bands[agreement.name].most, agreement.unit)
 
     def inside_cell(agreement: Agreement) -> str:
         if agreement.name not in bands:
-            return NONE
+            return NO_NUMBER
         return moment(bands[agreement.name].inside_from)
 
     return {"floor": floor_cell, "inside from, s": inside_cell}

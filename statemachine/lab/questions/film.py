@@ -28,7 +28,7 @@ from ...show.drawing.scene import Camera, Motion, Pixels, camera_for, framed, po
 from ...show.pictures import Picture, RobotPicture
 from ..compare import Comparison, labels_of
 from ..recordings import Trace
-from ..runs.drive import Progress, silent
+from ..runs.drive import Progress, no_progress
 from .film_overlay import Overlay
 from .stage.quantity_chart import charts_of
 
@@ -116,7 +116,7 @@ def write_film(
     renderer: Renderer,
     comparison: Comparison | None = None,
     *,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> FilmFile:
     """Write a film of one trace, or of two and how far apart they are.
 

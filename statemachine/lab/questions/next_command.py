@@ -8,23 +8,26 @@ from typing import Literal
 
 from ...measures import QUANTITIES
 from ..compare.instead import Instead
-from ..compare.sides import Request
+from ..compare.sides import Request, Side
 from ..compare.typed_command import TypedCommand, typed_command
 from ..runs.scenarios import SCENARIOS
 from .compared_names import name_of
 from .finding import Finding
 
 _OTHER = "waves"  # moves whatever has an actuator
+_STEPS = ("timestep", "substeps")
 
 # What the command is for: it tells which difference causes the gap; the same until before a run
 # ended; it gives a side the parts or the base that the other has; it tells which stage of one step
-# differs, which chance cannot hide; it runs something that moves more; there is none to type.
+# differs, which chance cannot hide; it tells whether a gap vanishes with the timestep, where
+# nothing else differs; it runs something that moves more; there is none to type.
 Purpose = Literal[
     "why",
     "why until then",
     "same parts",
     "same base",
     "one step",
+    "converge",
     "move more",
     "move at all",
     "nothing",
@@ -74,7 +77,23 @@ def next_command(request: Request, finding: Finding, instead: Instead | None) ->
         return _asking(request, "one step", "--one-step")
     if not moves:
         return NextCommand("nothing")
+    if _only_timesteps_differ(request):
+        return _asking(request, "converge", "--converge")
     return _asking(request, "why", "--why", "--quantity", name_of(finding.lead.name))
+
+
+def _only_timesteps_differ(request: Request) -> bool:
+    """Tell whether both sides are one file on one engine, and the timesteps are what differs."""
+    if request.is_traces or len(request.sides) != 2:
+        return False
+    left, right = request.sides
+    return left != right and _without_steps(left) == _without_steps(right)
+
+
+def _without_steps(side: Side) -> Side:
+    """Return a side without what it says of its timestep."""
+    others = {name: value for name, value in side.options.items() if name not in _STEPS}
+    return replace(side, options=others)
 
 
 def _moving(request: Request, instead: Instead | None) -> NextCommand:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import NONE, percent, quantity, sentence
+from ...measures.text import NO_NUMBER, percent, quantity, sentence
 from ...show.blocks import Page, Table
 from ...show.first_screen import first_screen
 from ...show.templates import PageContent, render, with_answer
@@ -178,9 +178,9 @@ def _stages_table(steps: OneStep) -> Table:
 def _stage_cells(gap: StageGap) -> tuple[str, ...]:
     """Return the cells of a stage behind its name."""
     if not gap.told or not gap.unit:
-        reason = gap.reason if gap.reason else NONE
-        return NONE, NONE, NONE, NONE, reason, NONE, NONE, NONE
-    largest, at, where = "0", NONE, NONE
+        reason = gap.reason if gap.reason else NO_NUMBER
+        return NO_NUMBER, NO_NUMBER, NO_NUMBER, NO_NUMBER, reason, NO_NUMBER, NO_NUMBER, NO_NUMBER
+    largest, at, where = "0", NO_NUMBER, NO_NUMBER
     if gap.beyond:
         largest, where = quantity(gap.worst, gap.unit), gap.where
         if gap.at is not None:

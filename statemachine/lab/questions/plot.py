@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ...atomic_files import replace_bytes
 from ...interface import Array, JointType
-from ...measures import COUNT, distances
-from ...measures.text import few, listed, milliseconds, reading, rounded, short_time
+from ...measures import ENCODER_COUNT, distances
+from ...measures.text import display_unit, few, listed, milliseconds, rounded, short_time
 from ...show import report_template as template
 from ...show.charts import SETTINGS, SIDES, check_suffix, draw_picture, saved
 from ...show.pictures import Traces
@@ -184,12 +184,12 @@ def of_trace(trace: Trace) -> TracePlot:
 def _joint_chart(trace: Trace, joint: int, servo: int | None) -> Traces:
     """Return the curve of a hinge or a slide, with that of its command if an actuator moves it."""
     header, is_hinge = trace.header, trace.header.jnt_type[joint] == JointType.HINGE
-    scale, unit = reading("rad" if is_hinge else "m")
+    scale, unit = display_unit("rad" if is_hinge else "m")
     name = header.joints[joint] if header.joints[joint] else f"joint {joint}"
     positions = scale * trace.qpos[:, header.jnt_qposadr[joint]]
     command = None if servo is None else scale * trace.ctrl[:, servo]
     # What the robot itself would not notice is not blown up to the height of a chart.
-    least = 20 * scale * COUNT if is_hinge else 0.0
+    least = 20 * scale * ENCODER_COUNT if is_hinge else 0.0
     return _chart(f"{name} [{unit.strip()}]", trace, positions, command, least)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...measures.text import (
-    NONE,
+    NO_NUMBER,
     figure,
     milliseconds,
     numbers,
@@ -80,7 +80,7 @@ def _pressing(touch: Touch) -> tuple[float, float]:
 def _contact_cells(contact: PairContacts) -> tuple[str, ...]:
     """Return the cells of a pair of bodies on one side."""
     if contact.first is None:
-        return NONE, NONE, NONE, NONE, "never touches"
+        return NO_NUMBER, NO_NUMBER, NO_NUMBER, NO_NUMBER, "never touches"
     last = "in the end"
     if not contact.ends and contact.last is not None:
         last = short_time(contact.last)
@@ -119,7 +119,7 @@ def loops_table(comparison: Comparison, played: Comparison | None) -> Table:
 
 def _cells(agreement: Agreement | None) -> tuple[str, str]:
     if agreement is None:
-        return NONE, NONE
+        return NO_NUMBER, NO_NUMBER
     verdict = TableCell(agreement.verdict, verdict=agreement.verdict)
     if agreement.kind in ("contact", "fall") and agreement.note:
         return verdict, agreement.note
@@ -167,7 +167,7 @@ def provenance(comparison: Comparison) -> Table:
     rows = [("ran as", _ran_as(left), _ran_as(right))]
     versions, others = left.provenance.versions, right.provenance.versions
     for name in versions | others:
-        rows.append((name, versions.get(name, NONE), others.get(name, NONE)))
+        rows.append((name, versions.get(name, NO_NUMBER), others.get(name, NO_NUMBER)))
     rows.append(("rows", f"{comparison.left.rows}", f"{comparison.right.rows}"))
     facts, other_facts = facts_of(left), facts_of(right)
     for name, fact in facts.items():
@@ -201,6 +201,6 @@ def facts_of(header: Header) -> dict[str, str]:
     facts["timestep"] = timestep
     facts["gravity"] = f"{numbers(header.gravity)} m/s²"
     facts["seed"] = "none drawn" if source.seed is None else f"{source.seed}"
-    facts["energies by"] = header.energy_by if header.energy_by else NONE
+    facts["energies by"] = header.energy_by if header.energy_by else NO_NUMBER
     facts["made again by"] = TableCell(header.command, code=True)
     return facts

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...interface import JointType
 from ...measures.text import figure, short_time, versions_of
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
@@ -70,18 +71,59 @@ def _facts_table(trace: Trace) -> Table:
 
 def _columns_table(trace: Trace) -> Table:
     """Return the range of each column."""
-    rows: list[tuple[str, str, str, str]] = []
+    rows: list[tuple[str, str, str, str, str]] = []
     for column in COLUMNS:
         if column not in trace:
             continue
         array = trace[column]
         shape = " × ".join(str(length) for length in array.shape)
+        unit = unit_of(trace.header, column)
         if array.size and np.isfinite(array).any():
             least, most = float(np.nanmin(array)), float(np.nanmax(array))
-            rows.append((column, shape, figure(least), figure(most)))
+            rows.append((column, shape, unit, figure(least), figure(most)))
         else:
-            rows.append((column, shape, "not told" if array.size else "", ""))
-    return Table(("column", "shape", "smallest", "largest"), rows, "What is in it")
+            rows.append((column, shape, unit, "not told" if array.size else "", ""))
+    headers = ("column", "shape", "unit", "smallest", "largest")
+    return Table(headers, rows, "What is in it", words=frozenset({0, 2}))
+
+
+# Units of columns that do not depend on the joints; rotations have none.
+_UNITS = {"time": "s", "mocap_pos": "m", "xpos": "m", "site_xpos": "m", "energy": "J"}
+# Those of a coordinate that turns, and of one that slides.
+_OF_COORDINATES = {"qpos": ("rad", "m"), "qvel": ("rad/s", "m/s"), "qfrc": ("N·m", "N")}
+
+
+def unit_of(header: Header, column: str) -> str:
+    """Return the unit of a column, or the units where coordinates turn and slide; "" for none.
+
+    Args:
+        header: Of the trace.
+        column: Its name.
+    """
+    if column == "ctrl":
+        return _unit_of_commands(header)
+    units = _OF_COORDINATES.get(column.partition("_")[0])
+    if units is None:
+        return _UNITS.get(column, "")
+    kinds = {JointType(kind) for kind in header.jnt_type}
+    turning = {JointType.HINGE}
+    if column != "qpos":  # in which a rotation is a quaternion
+        turning |= {JointType.BALL, JointType.FREE}
+    there = [bool(kinds & turning), bool(kinds & {JointType.SLIDE, JointType.FREE})]
+    return ", ".join(unit for unit, is_there in zip(units, there, strict=True) if is_there)
+
+
+def _unit_of_commands(header: Header) -> str:
+    """Return the unit of what servos aim at; of other actuators it is their own."""
+    units: list[str] = []
+    for number, gear in enumerate(header.servo_gear):
+        unit = "of the actuator"
+        if gear:
+            kind = JointType(header.jnt_type[header.actuator_jntid[number]])
+            unit = "rad" if kind == JointType.HINGE else "m"
+        if unit not in units:
+            units.append(unit)
+    return ", ".join(units)
 
 
 def _touches_table(trace: Trace) -> Table:

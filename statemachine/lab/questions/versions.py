@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ...measures.text import NONE, quantity, sentence, short_time
+from ...measures.text import NO_NUMBER, quantity, sentence, short_time
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import MOST_ROWS, first_that_fits
 from ...show.pictures import Bars
@@ -218,7 +218,7 @@ def _cells(pair: ReleasePair) -> tuple[str, ...]:
     worst, outcome = leading(pair.comparison), pair.comparison.outcome
     verdict = "DIFFERS" if pair.is_changed else outcome
     if not worst.max:
-        return pair.release, pair.next, "nothing differs", NONE, NONE, NONE, verdict
+        return pair.release, pair.next, "nothing differs", NO_NUMBER, NO_NUMBER, NO_NUMBER, verdict
     largest, tolerance = quantity(worst.max, worst.unit), quantity(worst.tolerance, worst.unit)
     name, at = name_of(worst.name), short_time(worst.at)
     return pair.release, pair.next, name, largest, at, tolerance, verdict

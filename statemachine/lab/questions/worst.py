@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...measures import QUANTITIES
-from ...measures.text import NONE, quantity
+from ...measures.text import NO_NUMBER, quantity
 from ...show.blocks import Table, TableCell
 from ..compare import Agreement, Comparison
 from ..compare.chaos import ChaosFloor
@@ -66,7 +66,7 @@ class WorstQuantities:
 
     def _floor_cell(self, agreement: Agreement) -> str:
         if agreement.name not in self.floors:
-            return NONE
+            return NO_NUMBER
         return quantity(self.floors[agreement.name], agreement.unit)
 
 
@@ -131,7 +131,7 @@ def largest_cell(agreement: Agreement) -> str:
 def end_cell(agreement: Agreement) -> str:
     """Return how far apart a quantity is at the end; one number of a run is not."""
     if QUANTITIES[agreement.kind].is_outcome:
-        return NONE
+        return NO_NUMBER
     return difference(agreement.settled, agreement)
 
 

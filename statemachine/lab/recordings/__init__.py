@@ -14,23 +14,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .files import export_csv, model_file, read, shipped, shipped_names, write
+    from .files import export_csv, model_file, read, read_shipped_trace, shipped_trace_names, write
     from .header import COLUMNS, CONTACTS, Header
     from .recorder import RunMetadata, RunStart, record
     from .rerun import (
         Rerun,
         SideStart,
-        beginning_with,
-        commands_of,
+        controller_of_trace,
         play,
         record_scenario,
-        replayed,
         rerun_of,
+        rerun_of_trace,
         start_of,
+        with_first_ctrl,
     )
     from .trace import Trace
 
-_HOMES = {
+_MODULES = {
     "COLUMNS": "header",
     "CONTACTS": "header",
     "Header": "header",
@@ -39,18 +39,18 @@ _HOMES = {
     "RunStart": "recorder",
     "SideStart": "rerun",
     "Trace": "trace",
-    "beginning_with": "rerun",
-    "commands_of": "rerun",
+    "with_first_ctrl": "rerun",
+    "controller_of_trace": "rerun",
     "export_csv": "files",
     "model_file": "files",
     "play": "rerun",
     "read": "files",
     "record": "recorder",
     "record_scenario": "rerun",
-    "replayed": "rerun",
+    "rerun_of_trace": "rerun",
     "rerun_of": "rerun",
-    "shipped": "files",
-    "shipped_names": "files",
+    "read_shipped_trace": "files",
+    "shipped_trace_names": "files",
     "start_of": "rerun",
     "write": "files",
 }
@@ -64,26 +64,26 @@ __all__ = [
     "RunStart",
     "SideStart",
     "Trace",
-    "beginning_with",
-    "commands_of",
+    "controller_of_trace",
     "export_csv",
     "model_file",
     "play",
     "read",
+    "read_shipped_trace",
     "record",
     "record_scenario",
-    "replayed",
     "rerun_of",
-    "shipped",
-    "shipped_names",
+    "rerun_of_trace",
+    "shipped_trace_names",
     "start_of",
+    "with_first_ctrl",
     "write",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    value = getattr(import_module(f".{_MODULES[name]}", __name__), name)
     globals()[name] = value  # so that the next use is an ordinary look-up
     return value

@@ -24,7 +24,7 @@ from ...errors import (
     did_you_mean,
 )
 from ...interface import MOCAP, JointType
-from ...models import AnyPath, resolve, what_is_there
+from ...models import AnyPath, kind_of_path, resolve
 from ..runs.provenance import model_digest
 from .formats import read_npz, read_parquet, write_npz, write_parquet
 from .header import COLUMNS, Header
@@ -50,7 +50,7 @@ def write(trace: Trace, path: AnyPath) -> Path:
         MissingEngineError: Parquet, and pyarrow is not installed.
         OSError: It cannot be written.
     """
-    target = _known(path)
+    target = _checked_suffix(path)
     Header.from_json(trace.header.as_json())
     fill = write_parquet if target.suffix.lower() == ".parquet" else write_npz
     replace_file(target, partial(fill, trace))
@@ -68,9 +68,9 @@ def read(path: AnyPath) -> Trace:
         TraceError: The file is not there, or is not a trace, or is damaged.
         MissingEngineError: Parquet, and pyarrow is not installed.
     """
-    source = _known(path)
+    source = _checked_suffix(path)
     if not source.is_file():
-        raise _missing(source)
+        raise _missing_trace_error(source)
     reader = read_parquet if source.suffix.lower() == ".parquet" else read_npz
     try:
         header, columns = reader(source)
@@ -86,7 +86,7 @@ def read(path: AnyPath) -> Trace:
         raise TraceError(f"{source.name} is not a trace: {reason}") from None
 
 
-def shipped_names() -> list[str]:
+def shipped_trace_names() -> list[str]:
     """Return the names of the shipped traces.
 
     They read EXPERIMENT.BACKEND, or EXPERIMENT.BACKEND.engine for the engine's defaults.
@@ -94,14 +94,14 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in _FOLDER.glob("*.npz"))
 
 
-def shipped(experiment: str, backend: str, defaults: str = "model") -> Trace:
+def read_shipped_trace(experiment: str, backend: str, defaults: str = "model") -> Trace:
     """Load a trace that was recorded elsewhere; its header says on what.
 
     Raises:
         UnknownNameError: None was recorded of this.
     """
     name = f"{experiment}.{backend}" + (".engine" if defaults == "engine" else "")
-    check_name("recorded trace", name, shipped_names())
+    check_name("recorded trace", name, shipped_trace_names())
     return read(_FOLDER / f"{name}.npz")
 
 
@@ -125,7 +125,7 @@ def model_file(
         ModelFileError: It is nowhere.
     """
     known = header.provenance
-    candidates = list(dict.fromkeys(_candidates(known.model_file, menagerie, beside)))
+    candidates = list(dict.fromkeys(_candidate_model_files(known.model_file, menagerie, beside)))
     for path in candidates:
         if model_digest(path) == known.model_sha256:
             return path, True
@@ -136,17 +136,17 @@ def model_file(
     return candidates[0], False
 
 
-def _known(path: AnyPath) -> Path:
+def _checked_suffix(path: AnyPath) -> Path:
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
         raise BadInputError(f"a trace is a file {' or '.join(SUFFIXES)}; got {target.name!r}")
     return target
 
 
-def _missing(path: Path) -> TraceError:
+def _missing_trace_error(path: Path) -> TraceError:
     """Return the error for a missing file, with the nearest name beside it."""
     message = f"there is no trace {path}"
-    if (kind := what_is_there(path)) != "nothing":
+    if (kind := kind_of_path(path)) != "nothing":
         message = f"{path} is {kind}, not a trace"
     elif path.parent.is_dir():
         names = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
@@ -154,7 +154,9 @@ def _missing(path: Path) -> TraceError:
     return TraceError(message)
 
 
-def _candidates(name: str, menagerie: AnyPath | None, beside: AnyPath | None) -> Iterator[Path]:
+def _candidate_model_files(
+    name: str, menagerie: AnyPath | None, beside: AnyPath | None
+) -> Iterator[Path]:
     folder = menagerie or os.environ.get("MENAGERIE") or None
     for where in (None, folder) if folder else (None,):
         with suppress(StateMachineError):

@@ -19,13 +19,13 @@ from ...errors import TraceError
 from ...installed import require_extra
 from ...interface import MOCAP
 from .header import COLUMNS, CONTACTS, INPUTS, Header
-from .trace import WHOLE, Trace, as_column, check_shapes, check_size
+from .trace import INTEGER_COLUMNS, Trace, as_column, check_shapes, check_size
 
-_HEADER_MOST = 2**24  # bytes of a header
+_MAX_HEADER_SIZE = 2**24  # bytes of a header
 # Of the header in the metadata: a digest of header and columns, then the header. Parquet
 # has no checksum of its own that every reader looks at.
-_KEY = b"statemachine.trace.sha256"
-_DIGITS = hashlib.sha256().digest_size * 2
+_DIGEST_KEY = b"statemachine.trace.sha256"
+_DIGEST_LENGTH = hashlib.sha256().digest_size * 2
 
 
 def write_npz(trace: Trace, out: BinaryIO) -> None:
@@ -33,7 +33,7 @@ def write_npz(trace: Trace, out: BinaryIO) -> None:
     columns: dict[str, Any] = dict(trace.columns)
     if trace.header.single:
         columns = {
-            name: array if name in (*INPUTS, *MOCAP, *WHOLE) else array.astype(np.float32)
+            name: array if name in (*INPUTS, *MOCAP, *INTEGER_COLUMNS) else array.astype(np.float32)
             for name, array in columns.items()
         }
     header = np.frombuffer(trace.header.as_json().encode(), dtype=np.uint8)
@@ -43,14 +43,14 @@ def write_npz(trace: Trace, out: BinaryIO) -> None:
 def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
     """Read header and columns; what the archive states is checked before it is unpacked."""
     with zipfile.ZipFile(path) as archive:
-        entries = _entries(archive)
+        entries = _archive_entries(archive)
         if "header" not in entries:
             raise TraceError("has no header: it is not a trace")
         header = _read_header(archive, entries.pop("header"))
-        described = {name: _describe(archive, entry) for name, entry in entries.items()}
+        described = {name: _shape_and_dtype(archive, entry) for name, entry in entries.items()}
         for name, (_, kind) in described.items():
-            if kind.kind not in ("iu" if name in WHOLE else "fiu"):
-                what = "whole numbers" if name in WHOLE else "numbers"
+            if kind.kind not in ("iu" if name in INTEGER_COLUMNS else "fiu"):
+                what = "whole numbers" if name in INTEGER_COLUMNS else "numbers"
                 raise TraceError(f"column {name!r} holds {kind}, not {what}")
         check_shapes(header, {name: shape for name, (shape, _) in described.items()})
         check_size(sum(8 * int(np.prod(shape)) for shape, _ in described.values()), path)
@@ -59,7 +59,7 @@ def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
         }
 
 
-def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+def _archive_entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     """Return the archive's arrays by name."""
     entries: dict[str, zipfile.ZipInfo] = {}
     for entry in archive.infolist():
@@ -74,7 +74,7 @@ def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     return entries
 
 
-def _describe(
+def _shape_and_dtype(
     archive: zipfile.ZipFile, entry: zipfile.ZipInfo
 ) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Return shape and dtype of an array, from its first bytes."""
@@ -88,12 +88,12 @@ def _describe(
 
 
 def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
-    shape, kind = _describe(archive, entry)
+    shape, kind = _shape_and_dtype(archive, entry)
     if kind != np.uint8 or len(shape) != 1:
         raise TraceError("has a header that is not text: it is not a trace")
     size = math.prod(shape)
-    if size > _HEADER_MOST:
-        raise TraceError(f"has a header of {size:,} bytes; at most {_HEADER_MOST:,}")
+    if size > _MAX_HEADER_SIZE:
+        raise TraceError(f"has a header of {size:,} bytes; at most {_MAX_HEADER_SIZE:,}")
     return Header.from_json(_array_of(archive, entry).tobytes().decode())
 
 
@@ -112,7 +112,7 @@ def write_parquet(trace: Trace, out: BinaryIO) -> None:
         MissingEngineError: pyarrow is not installed.
     """
     arrow, parquet = _pyarrow()
-    parquet.write_table(_table(trace, arrow), out, compression="zstd")
+    parquet.write_table(_arrow_table(trace, arrow), out, compression="zstd")
 
 
 def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
@@ -123,12 +123,12 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
     """
     _, parquet = _pyarrow()
     with parquet.ParquetFile(path) as file:
-        known = (file.metadata.metadata or {}).get(_KEY)
+        known = (file.metadata.metadata or {}).get(_DIGEST_KEY)
         if known is None:
             raise TraceError("has no header: it is not a trace")
-        digest, text = known[:_DIGITS].decode(), known[_DIGITS:].decode()
+        digest, text = known[:_DIGEST_LENGTH].decode(), known[_DIGEST_LENGTH:].decode()
         header = Header.from_json(text)
-        check_size(_unfolded_size(file.metadata, header), path)
+        check_size(_uncompressed_size(file.metadata, header), path)
         columns = _columns(file.read(), header)
     if digest != _digest(text, columns):
         raise TraceError("is damaged: its numbers are not those that were written")
@@ -159,7 +159,7 @@ def _digest(text: str, columns: dict[str, Any]) -> str:
     return digest.hexdigest()
 
 
-def _unfolded_size(metadata: Any, header: Header) -> int:
+def _uncompressed_size(metadata: Any, header: Header) -> int:
     """Return the size of all numbers of a file [bytes], as its metadata state it.
 
     Contacts, whose number no header says, count as they are packed. What the file says of a
@@ -170,7 +170,7 @@ def _unfolded_size(metadata: Any, header: Header) -> int:
     return 8 * width * metadata.num_rows + sum(group.total_byte_size for group in groups)
 
 
-def _table(trace: Trace, arrow: Any) -> Any:
+def _arrow_table(trace: Trace, arrow: Any) -> Any:
     """Return columns of numbers, or of lists of as many as a row has; contacts as lists of rows."""
     columns, offsets = {}, None
     if "contact_row" in trace:
@@ -187,7 +187,7 @@ def _table(trace: Trace, arrow: Any) -> Any:
     text = trace.header.as_json()
     numbers = {name: as_column(name, array) for name, array in trace.columns.items()}
     value = (_digest(text, numbers) + text).encode()
-    return arrow.table(columns).replace_schema_metadata({_KEY: value})
+    return arrow.table(columns).replace_schema_metadata({_DIGEST_KEY: value})
 
 
 def _columns(table: Any, header: Header) -> dict[str, Any]:

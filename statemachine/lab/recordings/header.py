@@ -49,7 +49,7 @@ CONTACTS: dict[str, tuple[int, ...]] = {
     "contact_frame": (9,),
     "contact_force": (3,),
 }
-_LONGEST = 1000  # characters of a name or a sentence
+_MAX_TEXT_LENGTH = 1000  # characters of a name or a sentence
 
 
 @dataclass(frozen=True)
@@ -167,8 +167,8 @@ class Header:
             if facts.get("schema") != SCHEMA:
                 given = repr(facts.get("schema"))[:20]
                 raise TraceError(f"this trace has schema {given}; this version reads {SCHEMA}")
-            by = {name: _frozen(value) for name, value in facts.pop("provenance").items()}
-            frozen = {name: _frozen(value) for name, value in facts.items()}
+            by = {name: _as_tuples(value) for name, value in facts.pop("provenance").items()}
+            frozen = {name: _as_tuples(value) for name, value in facts.items()}
             header = cls(provenance=Provenance(**by), **frozen)
             header._check()
         except TraceError:
@@ -258,128 +258,137 @@ def labels_of_joints(
     return tuple(labels)
 
 
-def _frozen(value: Any) -> Any:
+def _as_tuples(value: Any) -> Any:
     """Return lists of JSON as tuples."""
-    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
+    return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-def _text(value: Any) -> bool:
-    if not isinstance(value, str) or len(value) > _LONGEST:
+def _is_text(value: Any) -> bool:
+    if not isinstance(value, str) or len(value) > _MAX_TEXT_LENGTH:
         return False
     # Half of a surrogate pair is not text: it can be written nowhere.
     return not any("\ud800" <= character <= "\udfff" for character in value)
 
 
-def _number(value: Any) -> bool:
-    return isinstance(value, float) or _integer(value)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, float) or _is_integer(value)
 
 
-def _finite(value: Any) -> bool:
-    return _number(value) and math.isfinite(value) and abs(value) <= HUGE
+def _is_finite(value: Any) -> bool:
+    return _is_number(value) and math.isfinite(value) and abs(value) <= HUGE
 
 
-def _integer(value: Any) -> bool:
+def _is_integer(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
 
 
-def _tuple_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+def _is_tuple_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, tuple) and all(map(fits, value))
 
 
-def _option(name: str, value: Any) -> bool:
+def _is_option(name: str, value: Any) -> bool:
     """Return whether an option may be one of `Model.replace` or `load`, which check it further."""
-    known = isinstance(value, bool) or _text(value) or _finite(value) or _tuple_of(_finite)(value)
+    known = (
+        isinstance(value, bool)
+        or _is_text(value)
+        or _is_finite(value)
+        or _is_tuple_of(_is_finite)(value)
+    )
     return name in (*OPTIONS, *READ_OPTIONS) and known
 
 
-def _count(value: Any) -> bool:
-    return _integer(value) and 0 <= value < 10**6
+def _is_count(value: Any) -> bool:
+    return _is_integer(value) and 0 <= value < 10**6
 
 
-def _timestep(value: Any) -> bool:
+def _is_timestep(value: Any) -> bool:
     return isinstance(value, float) and 0 < value < 1e6
 
 
-def _defaults(value: Any) -> bool:
+def _is_defaults(value: Any) -> bool:
     return value in ("model", "engine")
 
 
-def _options(value: Any) -> bool:
+def _are_options(value: Any) -> bool:
     if not isinstance(value, dict):
         return False
-    return all(_option(name, option) for name, option in value.items())
+    return all(_is_option(name, option) for name, option in value.items())
 
 
-def _text_or_none(value: Any) -> bool:
-    return value is None or _text(value)
+def _is_text_or_none(value: Any) -> bool:
+    return value is None or _is_text(value)
 
 
-def _integer_or_none(value: Any) -> bool:
-    return value is None or _integer(value)
+def _is_integer_or_none(value: Any) -> bool:
+    return value is None or _is_integer(value)
 
 
-def _vector(value: Any) -> bool:
-    return _finites(value) and len(value) == 3
+def _is_vector(value: Any) -> bool:
+    return _are_finite(value) and len(value) == 3
 
 
-def _interval(value: Any) -> bool:
-    return _tuple_of(_number)(value) and len(value) == 2
+def _is_interval(value: Any) -> bool:
+    return _is_tuple_of(_is_number)(value) and len(value) == 2
 
 
-def _switch(value: Any) -> bool:
+def _is_switch(value: Any) -> bool:
     return isinstance(value, bool)
 
 
-def _versions(value: Any) -> bool:
+def _are_versions(value: Any) -> bool:
     if not isinstance(value, dict):
         return False
-    return all(_text(name) and _text(version) for name, version in value.items())
+    return all(_is_text(name) and _is_text(version) for name, version in value.items())
 
 
-_texts, _integers, _finites = _tuple_of(_text), _tuple_of(_integer), _tuple_of(_finite)
-_intervals = _tuple_of(_interval)
+_are_texts, _are_integers, _are_finite = (
+    _is_tuple_of(_is_text),
+    _is_tuple_of(_is_integer),
+    _is_tuple_of(_is_finite),
+)
+_are_intervals = _is_tuple_of(_is_interval)
 _KINDS: dict[str, Callable[[Any], bool]] = {
-    "nq": _count,
-    "nv": _count,
-    "nu": _count,
-    "nmocap": _count,
-    "substeps": _count,
-    "timestep": _timestep,
-    "experiment": _text,
-    "says": _text,
-    "command": _text,
-    "energy_by": _text,
-    "ended": _text,
-    "defaults": _defaults,
-    "options": _options,
-    "keyframe": _text_or_none,
-    "gravity": _vector,
-    "joints": _texts,
-    "sites": _texts,
-    "bodies": _texts,
-    "geoms": _texts,
-    "actuators": _texts,
-    "jnt_type": _integers,
-    "jnt_qposadr": _integers,
-    "jnt_dofadr": _integers,
-    "jnt_bodyid": _integers,
-    "site_bodyid": _integers,
-    "servo_gear": _finites,
-    "geom_bodyid": _integers,
-    "body_parentid": _integers,
-    "actuator_jntid": _integers,
-    "ctrlrange": _intervals,
-    "rewritten": _integer,
-    "single": _switch,
+    "nq": _is_count,
+    "nv": _is_count,
+    "nu": _is_count,
+    "nmocap": _is_count,
+    "substeps": _is_count,
+    "timestep": _is_timestep,
+    "experiment": _is_text,
+    "says": _is_text,
+    "command": _is_text,
+    "energy_by": _is_text,
+    "ended": _is_text,
+    "defaults": _is_defaults,
+    "options": _are_options,
+    "keyframe": _is_text_or_none,
+    "gravity": _is_vector,
+    "joints": _are_texts,
+    "sites": _are_texts,
+    "bodies": _are_texts,
+    "geoms": _are_texts,
+    "actuators": _are_texts,
+    "jnt_type": _are_integers,
+    "jnt_qposadr": _are_integers,
+    "jnt_dofadr": _are_integers,
+    "jnt_bodyid": _are_integers,
+    "site_bodyid": _are_integers,
+    "servo_gear": _are_finite,
+    "geom_bodyid": _are_integers,
+    "body_parentid": _are_integers,
+    "actuator_jntid": _are_integers,
+    "ctrlrange": _are_intervals,
+    "rewritten": _is_integer,
+    "single": _is_switch,
 }
-_OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {
-    "backend": _text,
-    "versions": _versions,
-    "model_file": _text,
-    "model_sha256": _text,
-    "timestep": _number,
-    "emulated": _texts,
-    "seed": _integer_or_none,
+_PROVENANCE_KINDS: dict[str, Callable[[Any], bool]] = {
+    "backend": _is_text,
+    "versions": _are_versions,
+    "model_file": _is_text,
+    "model_sha256": _is_text,
+    "timestep": _is_number,
+    "emulated": _are_texts,
+    "seed": _is_integer_or_none,
 }
 
 
@@ -389,7 +398,7 @@ def _check_fields(header: Header) -> None:
     Raises:
         TraceError: One is not.
     """
-    for owner, kinds in ((header, _KINDS), (header.provenance, _OF_PROVENANCE)):
+    for owner, kinds in ((header, _KINDS), (header.provenance, _PROVENANCE_KINDS)):
         for name, fits in kinds.items():
             value = getattr(owner, name)
             if not fits(value):

@@ -19,15 +19,22 @@ from ...errors import BadInputError, DivergedError, EngineError
 from ...interface import INPUTS, MOCAP, Array, Data, Model, State, make_data, reset, set_state
 from ...interface.checks import HUGE
 from ...interface.options import OptionValue
-from ...interface.read_options import told
+from ...interface.read_options import non_default_options
 from ...interface.records import Arrays, Defaults
 from ..runs.controllers import check_controller
-from ..runs.drive import Controller, Progress, drive, part_of, silent, steps_in
+from ..runs.drive import (
+    Controller,
+    Progress,
+    drive,
+    no_progress,
+    number_of_steps,
+    progress_of_stage,
+)
 from ..runs.provenance import provenance
 from ..runs.robot import is_servo, warn_of_start
 from .energies import energies
 from .header import Header
-from .repetition import derived
+from .repetition import compute_derived
 from .trace import Trace
 
 
@@ -96,7 +103,7 @@ def record(
     metadata: RunMetadata = RunMetadata(),
     derive: bool = True,
     writes_state: bool = True,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Trace:
     """Run a controller from a start, and keep everything.
 
@@ -122,16 +129,20 @@ def record(
     """
     if controller is not None:
         check_controller(controller)
-    total = steps_in(model, seconds)
+    total = number_of_steps(model, seconds)
     share = 0.3 if derive else 1.0
     with make_data(model) as data:
         start.put(model, data)
         warn_of_start(model, data)
-        inputs, ended = _run(model, data, controller, total, part_of(progress, 0.0, share))
+        inputs, ended = _run(
+            model, data, controller, total, progress_of_stage(progress, 0.0, share)
+        )
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""
     if derive:
-        more, rewritten = derived(model, start.put, inputs, part_of(progress, share, 1.0 - share))
+        more, rewritten = compute_derived(
+            model, start.put, inputs, progress_of_stage(progress, share, 1.0 - share)
+        )
         if rewritten and (controller is None or not writes_state):
             raise EngineError(
                 f"the run could not be repeated: {rewritten} rows began in another state; the "
@@ -155,8 +166,8 @@ def _header(
     model: Model, controller: Controller | None, start: RunStart, metadata: RunMetadata
 ) -> Header:
     """Return what is known of a run before it begins."""
-    options: dict[str, OptionValue] = {**told(model.read_options)}
-    options |= {name: _plain(value) for name, value in metadata.options.items()}
+    options: dict[str, OptionValue] = {**non_default_options(model.read_options)}
+    options |= {name: _as_json_value(value) for name, value in metadata.options.items()}
     return Header(
         experiment=_experiment(metadata, controller),
         says=metadata.says,
@@ -179,7 +190,7 @@ def _experiment(metadata: RunMetadata, controller: Controller | None) -> str:
     return getattr(controller, "__name__", "") or "run"
 
 
-def _plain(option: Any) -> Any:
+def _as_json_value(option: Any) -> Any:
     """Return the value of an option, an array as a list."""
     return option.tolist() if isinstance(option, np.ndarray | np.generic) else option
 

@@ -24,11 +24,11 @@ from ...interface.records import Arrays
 from ..runs.drive import Progress
 from .trace import COLUMNS, CONTACTS
 
-_TOLD = tuple(name for name in DERIVED if name in COLUMNS)
+_RECORDED_ARRAYS = tuple(name for name in DERIVED if name in COLUMNS)
 Start = Callable[[Model, Data], None]
 
 
-def derived(
+def compute_derived(
     model: Model, begin: Start, inputs: Arrays, progress: Progress
 ) -> tuple[dict[str, Any], int]:
     """Repeat a run and read what is derived.
@@ -45,7 +45,7 @@ def derived(
         than the step before them left.
     """
     rows = len(inputs["time"])
-    arrays: dict[str, list[Array]] = {name: [] for name in _TOLD}
+    arrays: dict[str, list[Array]] = {name: [] for name in _RECORDED_ARRAYS}
     contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
     after = is_stale(model)
     rewritten = 0
@@ -57,13 +57,13 @@ def derived(
                 data.time = float(inputs["time"][k])
             if not after:
                 forward(model, data)
-                _read(data, k, arrays, contacts)
+                _append_derived(data, k, arrays, contacts)
             if k < rows - 1:
                 step(model, data)
             elif after:
-                _one_more(model, data)
+                _take_final_step(model, data)
             if after:
-                _read(data, k, arrays, contacts)
+                _append_derived(data, k, arrays, contacts)
             if k % 32 == 0:
                 progress(k / rows)
     progress(1.0)
@@ -96,7 +96,7 @@ def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
     return bool(others)
 
 
-def _one_more(model: Model, data: Data) -> None:
+def _take_final_step(model: Model, data: Data) -> None:
     """Take the step that the last row would begin, so that it too is of the run itself.
 
     `forward` may start afresh: PyBullet's contacts then lack what the run has built up.
@@ -118,7 +118,7 @@ def array_or_nan(data: Data, name: str) -> Array:
         return np.full(np.shape(data.qvel), np.nan)
 
 
-def _read(
+def _append_derived(
     data: Data, row: int, arrays: dict[str, list[Array]], contacts: dict[str, list[Any]]
 ) -> None:
     for name, values in arrays.items():

@@ -14,8 +14,8 @@ from ...measures.text import command
 from ...models import AnyPath
 from ..runs.controllers import (
     Function,
+    file_and_name_of,
     function_file,
-    function_place,
     function_scenario,
     is_function,
 )
@@ -23,7 +23,7 @@ from ..runs.reporter import QUIET, Reporter
 from ..runs.scenarios import SCENARIOS, Scenario, scenario
 from . import Trace, model_file, play, read, record_scenario
 
-_MODEL = "so101/scene"  # of a function, which names none
+_MODEL_OF_FUNCTION = "so101/scene"  # of a function, which names none
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ class RecordRequest:
         """What is done, in a word: the experiment, the stem of the file, or the function."""
         if isinstance(self.what, str):
             return function_file(self.what).stem
-        return function_place(self.what)[1]
+        return file_and_name_of(self.what)[1]
 
     @property
     def file_name(self) -> str:
         """Name that its trace has where no other is given."""
-        return f"{self.name}.{_in_a_name(self.chosen_backend())}.npz"
+        return f"{self.name}.{_backend_for_file_name(self.chosen_backend())}.npz"
 
     @property
     def typed(self) -> str:
@@ -140,7 +140,7 @@ class PlayRequest:
     @property
     def file_name(self) -> str:
         """Name that the new trace has where no other is given."""
-        return f"{Path(self.file).stem}.{_in_a_name(self.chosen_backend())}.npz"
+        return f"{Path(self.file).stem}.{_backend_for_file_name(self.chosen_backend())}.npz"
 
     @property
     def typed(self) -> str:
@@ -158,7 +158,9 @@ def answer_record(request: RecordRequest, reporter: Reporter = QUIET) -> Trace:
         StateMachineError: The model cannot be loaded, or the run makes no sense on it.
     """
     asked, backend = request.scenario(), request.chosen_backend()
-    model = backend.load_to_run(request.model or asked.model or _MODEL, menagerie=request.menagerie)
+    model = backend.load_to_run(
+        request.model or asked.model or _MODEL_OF_FUNCTION, menagerie=request.menagerie
+    )
     options = {}
     if request.timestep is not None:
         options["timestep"] = request.timestep
@@ -213,6 +215,6 @@ def without_folders(model: AnyPath) -> str:
     return Path(model).name if Path(model).is_file() else str(model)
 
 
-def _in_a_name(backend: BackendChoice) -> str:
+def _backend_for_file_name(backend: BackendChoice) -> str:
     """Return a backend as it stands in the name of a file, which has no colon on Windows."""
     return str(backend).replace(":", ".")

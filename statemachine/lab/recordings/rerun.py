@@ -12,7 +12,7 @@ from ...errors import TraceError
 from ...interface import MOCAP, Array, Data, Model, make_data, reset
 from ...interface.options import OptionValue
 from ...interface.records import Defaults
-from ..runs.drive import Controller, Progress, check_length, silent
+from ..runs.drive import Controller, Progress, check_length, no_progress
 from ..runs.scenarios import Scenario
 from .header import Header
 from .recorder import RunMetadata, RunStart, record
@@ -70,7 +70,7 @@ class Rerun:
         qvel: Array | None = None,
         command: str = "",
         derive: bool = True,
-        progress: Progress = silent,
+        progress: Progress = no_progress,
     ) -> Trace:
         """Record the run.
 
@@ -144,7 +144,7 @@ def rerun_of(
     )
 
 
-def replayed(
+def rerun_of_trace(
     trace: Trace,
     model: Model,
     defaults: Defaults = "model",
@@ -154,7 +154,7 @@ def replayed(
     header = trace.header
     return Rerun(
         model=model,
-        controller=lambda _model: commands_of(trace),
+        controller=lambda _model: controller_of_trace(trace),
         seconds=float(trace.time[-1] - trace.time[0]),
         qpos=trace.qpos[0],
         qvel=trace.qvel[0],
@@ -176,7 +176,7 @@ def record_scenario(
     command: str = "",
     defaults: Defaults = "model",
     options: dict[str, OptionValue] | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Trace:
     """Record a scenario on a model, which is given as loaded.
 
@@ -210,7 +210,7 @@ def play(
     command: str = "",
     defaults: Defaults = "model",
     options: dict[str, OptionValue] | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Trace:
     """Play the ctrl of a trace, from the state it starts in, on another model or engine.
 
@@ -220,7 +220,7 @@ def play(
         TraceError: The model has other joints or actuators, in name or in order.
     """
     _check_layout(trace.header, model)
-    rerun = replayed(trace, model, defaults, options)
+    rerun = rerun_of_trace(trace, model, defaults, options)
     return rerun.record(command=command, progress=progress)
 
 
@@ -247,7 +247,7 @@ def _check_layout(header: Header, model: Model) -> None:
         )
 
 
-def commands_of(trace: Trace) -> Controller:
+def controller_of_trace(trace: Trace) -> Controller:
     """Return a controller that gives the ctrl of a trace.
 
     A command holds until the time of the next. The poses of mocap bodies are written likewise.
@@ -270,7 +270,7 @@ def commands_of(trace: Trace) -> Controller:
     return controller
 
 
-def beginning_with(first: Callable[[Data], Array], controller: Controller) -> Controller:
+def with_first_ctrl(first: Callable[[Data], Array], controller: Controller) -> Controller:
     """Return a controller that begins with some ctrl (nu,), where it gives none of its own."""
     begun = False
 

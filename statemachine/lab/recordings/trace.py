@@ -20,10 +20,10 @@ from .header import COLUMNS, CONTACTS, INPUTS, Header
 
 # Bytes that a trace may unfold into: this many, or so many times the size of its file.
 # Recorded runs are 2 to 3 times as large as their files.
-_UNFOLDED, _TIMES, _MOST = 2**28, 100, 2**32
-WHOLE = ("contact_row", "contact_geom")  # columns of whole numbers
+_ALWAYS_ALLOWED, _MAX_COMPRESSION, _MAX_SIZE = 2**28, 100, 2**32
+INTEGER_COLUMNS = ("contact_row", "contact_geom")  # columns of whole numbers
 # No number of a run is larger, and what is computed from smaller ones stays finite.
-LARGEST = 1e100
+LARGEST_ENTRY = 1e100
 
 
 def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
@@ -52,7 +52,7 @@ def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
 def _check_entries(name: str, array: NDArray[Any]) -> None:
     """Check that inputs are numbers that an engine takes; the rest may be NaN: not told."""
     is_input = name in (*INPUTS, *MOCAP)
-    most = HUGE if is_input else LARGEST
+    most = HUGE if is_input else LARGEST_ENTRY
     if is_input and not np.isfinite(array).all():
         raise TraceError(f"column {name!r} has an entry that is not a finite number")
     # fmax and fmin pass over NaN.
@@ -68,7 +68,7 @@ def check_size(unfolded: int, path: Path) -> None:
     Raises:
         TraceError: It does.
     """
-    most = min(max(_UNFOLDED, _TIMES * path.stat().st_size), _MOST)
+    most = min(max(_ALWAYS_ALLOWED, _MAX_COMPRESSION * path.stat().st_size), _MAX_SIZE)
     if unfolded > most:
         raise TraceError(
             f"unfolds into {unfolded / 2**20:,.0f} MB; a file of this size may into "
@@ -78,7 +78,7 @@ def check_size(unfolded: int, path: Path) -> None:
 
 def as_column(name: str, array: Any) -> Any:
     """Return an array of a file as a column: int64, or float64."""
-    return np.asarray(array, dtype=np.int64 if name in WHOLE else np.float64)
+    return np.asarray(array, dtype=np.int64 if name in INTEGER_COLUMNS else np.float64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

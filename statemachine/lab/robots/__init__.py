@@ -29,7 +29,7 @@ from ...installed import DEFAULT, ENGINES, engine_version, require
 from ...models import SUFFIXES, AnyPath
 from ...processes import ALONE, checked_jobs, fresh_python, sandbox
 from ...processes.parallel import in_parallel, unwinding
-from ..runs.drive import Progress, silent
+from ..runs.drive import Progress, no_progress
 from ..runs.provenance import model_digest, model_files
 from .gaps import STEPS
 from .records import (
@@ -181,7 +181,7 @@ def examine_all(
     jobs: int | None = None,
     seed: int = 0,
     table: Path | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Survey:
     """Examine every model, several at once.
 

@@ -31,7 +31,7 @@ from ...installed import DEFAULT, WITNESS, require
 from ...interface import Data, Model, get_state, make_data, reset, set_state, step
 from ..probes.state_audit import future
 from ..recordings import record_scenario
-from ..runs.in_turns import Ratio, in_turns
+from ..runs.interleaved_timing import Ratio, time_interleaved
 from ..runs.scenarios import scenario
 from ..validate.fingertip import certify
 from . import gaps
@@ -278,10 +278,10 @@ class _Examination:
                 for _ in range(steps):
                     step(model, data)
 
-            first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
+            first = time_interleaved({"": lambda: ours(3)}, 2)[""][-1] / 3
             steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
             ways = {"ours": lambda: ours(steps), "alone": lambda: alone(steps)}
-            times = in_turns(ways, _ROUNDS, seed=self.seed)
+            times = time_interleaved(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import StateMachineError
 from ...interface import Array, Ints, Model, make_data, reset
-from ...measures import JointPlaces, farthest, largest_or_inf, turns
+from ...measures import JointAddresses, largest_difference, largest_or_inf, rotation_angles
 from ..compare.perturbed import nudged_controller, nudged_start
 from ..runs.drive import Controller, drive
 from ..runs.robot import start_keyframe
@@ -111,11 +111,11 @@ def _gap(model: Model, left: tuple[Array, str], right: tuple[Array, str]) -> Run
     (first, ended), (second, also_ended) = left, right
     rows = min(len(first), len(second))
     a, b = first[:rows, : model.nq], second[:rows, : model.nq]
-    places = JointPlaces.of(model.jnt_type, model.jnt_qposadr)
+    places = JointAddresses.of(model.jnt_type, model.jnt_qposadr)
     turn = None
     if len(places.quats):
         quats = places.quats[:, None] + np.arange(4)
-        turn = largest_or_inf(turns(a[:, quats], b[:, quats]))
+        turn = largest_or_inf(rotation_angles(a[:, quats], b[:, quats]))
     hinge = _largest_difference(a, b, places.hinges)
     slide = _largest_difference(a, b, places.slides)
     position = _largest_difference(a, b, places.positions)
@@ -137,4 +137,4 @@ def _largest_difference(a: Array, b: Array, columns: Ints) -> float | None:
     """Return how far some columns of two arrays (n, nq) are apart at most; None of no column."""
     if not len(columns):
         return None
-    return largest_or_inf(farthest(a[:, columns], b[:, columns]))
+    return largest_or_inf(largest_difference(a[:, columns], b[:, columns]))

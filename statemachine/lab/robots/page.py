@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from ...measures.text import NONE, count, figure, grouped, rough
+from ...measures.text import NO_NUMBER, count, figure, grouped, rough
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
 from .examine import TRIED
@@ -26,7 +26,7 @@ from .survey import Survey
 _WIDEST = 28  # characters of a name
 _LISTED = 20  # of what is wrong, and of features
 
-_MARKS = {None: NONE, True: "✓", False: "✗"}
+_MARKS = {None: NO_NUMBER, True: "✓", False: "✗"}
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
 def _grades_table(survey: Survey) -> Table:
     """Return how many models the witness read in which way."""
     rows = [(grade, str(number)) for grade, number in survey.grades.items()]
-    return Table(("the witness's reading", "models"), rows)
+    return Table(("reading", "models"), rows)
 
 
 def _table(survey: Survey, widest: int) -> Table:
@@ -196,13 +196,13 @@ def _runs(row: ExaminedModel) -> str:
     """Return how many experiments run, by backend."""
     tried = [backend.scenarios.values() for backend in row.backends.values() if backend.scenarios]
     numbers = [str(list(words).count(RUNS)) for words in tried]
-    return " ".join(numbers) if numbers else NONE
+    return ", ".join(numbers) if numbers else NO_NUMBER
 
 
 def _costs(row: ExaminedModel) -> str:
     """Return what a step costs over the engine's own, by backend."""
     costs = [backend.cost for backend in row.backends.values() if backend.cost is not None]
-    return " ".join(f"{cost:.3g}" for cost in costs) if costs else NONE
+    return " ".join(f"{cost:.3g}" for cost in costs) if costs else NO_NUMBER
 
 
 _EXACTNESS: dict[Exactness, str] = {
@@ -210,7 +210,7 @@ _EXACTNESS: dict[Exactness, str] = {
     "refused": "no",
     "differs": "✗",
     "exact": "✓",
-    "not asked": NONE,
+    "not asked": NO_NUMBER,
 }
 
 
@@ -223,7 +223,7 @@ def _gap(row: ExaminedModel, other: str, contacts: bool) -> str:
     """Return the size of a gap, or in a word what became of the comparison."""
     comparison = row.comparison(other, contacts)
     if comparison == "not compared":
-        return NONE
+        return NO_NUMBER
     gap = row.backends[other].gap(contacts)
     if gap is None or comparison in ("still", "explodes", "stops", "rounding"):
         return comparison
@@ -233,7 +233,7 @@ def _gap(row: ExaminedModel, other: str, contacts: bool) -> str:
 
 def _witness(row: ExaminedModel) -> str:
     if row.witness is None:
-        return NONE
+        return NO_NUMBER
     if row.witness.gap is None:
         return "refused"
     return f"{row.witness.grade.partition(' ')[0]} {rough(row.witness.gap)}"
@@ -250,7 +250,7 @@ def _engines_table(survey: Survey) -> Table:
 
 
 def _known(number: int | None) -> str:
-    return NONE if number is None else str(number)
+    return NO_NUMBER if number is None else str(number)
 
 
 _ENGINE_HEADERS = (
@@ -294,7 +294,7 @@ _LOADING: dict[Loading, str] = {
 
 
 def _cost(row: BackendRow) -> str:
-    return NONE if row.cost is None else f"{row.cost:.3g} ×"
+    return NO_NUMBER if row.cost is None else f"{row.cost:.3g} ×"
 
 
 def _facts_table(row: ExaminedModel) -> Table:
@@ -308,7 +308,7 @@ def _facts_table(row: ExaminedModel) -> Table:
     facts |= {f"experiment {name}": partial(_scenario, name) for name in TRIED}
     facts["cost of a step over the engine's own, here"] = _cost
     rows = [(fact, *map(cell, row.backends.values())) for fact, cell in facts.items()]
-    known = [cells for cells in rows if set(cells[1:]) != {NONE}]
+    known = [cells for cells in rows if set(cells[1:]) != {NO_NUMBER}]
     return Table(("what", *row.backends), known, words=frozenset(range(9)))
 
 
@@ -328,13 +328,13 @@ def _scenario(name: str, row: BackendRow) -> str:
     """Return whether an experiment runs."""
     word = row.scenarios.get(name)
     if word is None:
-        return NONE
+        return NO_NUMBER
     return "✓" if word == RUNS else "no"
 
 
 def _gap_in_full(gap: RunGap | None) -> str:
     if gap is None:
-        return NONE
+        return NO_NUMBER
     sizes = {"hinge": gap.hinge, "slide": gap.slide, "free body": gap.position, "turn": gap.turn}
     units = ("rad", "m", "m", "rad")
     known = [
@@ -342,7 +342,7 @@ def _gap_in_full(gap: RunGap | None) -> str:
         for (name, size), unit in zip(sizes.items(), units, strict=True)
         if size is not None
     ]
-    parts = [", ".join(known) or NONE]
+    parts = [", ".join(known) or NO_NUMBER]
     if gap.shrinks is not None:
         parts.append(f"divided by {gap.shrinks:.3g} at half the timestep")
     if gap.floor is not None:

@@ -17,13 +17,13 @@ from ...errors import BadInputError, did_you_mean
 from ...interface import Data, Model
 from ...interface.checks import as_vector
 from ...measures.text import count, few
-from ...models import what_is_there
+from ...models import kind_of_path
 from .drive import Controller
 from .scenarios import Scenario
 
 # A Python file of a user's: load it, and say in one line what went wrong in it.
 
-_LONGEST = 200  # characters of an error's own text
+_MAX_TEXT_LENGTH = 200  # characters of an error's own text
 
 
 def load_module(name: str, path: Path) -> Any:
@@ -39,7 +39,7 @@ def load_module(name: str, path: Path) -> Any:
     return module
 
 
-def misfit(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
+def signature_mismatch(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
     """Return the signature of a function and why it cannot be called with these arguments.
 
     Both are "" where it can.
@@ -53,34 +53,34 @@ def misfit(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
     return "", ""
 
 
-def line_of(error: BaseException, file: Path) -> tuple[Path, int, str]:
+def last_user_line(error: BaseException, file: Path) -> tuple[Path, int, str]:
     """Return the last line of the user's own code in an error's traceback: file, number and text.
 
     Of the file, or of another in its folder or below, but for packages that live there; 0 and ""
     if there is none.
     """
-    if isinstance(error, SyntaxError) and _is_users(Path(error.filename or ""), file):
+    if isinstance(error, SyntaxError) and _is_user_code(Path(error.filename or ""), file):
         return Path(error.filename or ""), error.lineno or 0, (error.text or "").strip()
     for frame, number in reversed(list(traceback.walk_tb(error.__traceback__))):
         place = Path(frame.f_code.co_filename)
-        if _is_users(place, file):
+        if _is_user_code(place, file):
             return place, number, linecache.getline(str(place), number).strip()
     return file, 0, ""
 
 
-def _is_users(place: Path, file: Path) -> bool:
+def _is_user_code(place: Path, file: Path) -> bool:
     beside = file.parent in place.parents and not {"site-packages", "statemachine"} & set(
         place.relative_to(file.parent).parts
     )
     return place == file or (beside and place.is_file())
 
 
-def said(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Return the kind and the text of an error in one line."""
     # A SyntaxError's text names file and line once more.
     words = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
-    if len(words) > _LONGEST:
-        words = words[:_LONGEST] + " …"
+    if len(words) > _MAX_TEXT_LENGTH:
+        words = words[:_MAX_TEXT_LENGTH] + " …"
     known: dict[type[BaseException], str] = {
         SystemExit: "it ends the program (sys.exit with "
         f"{getattr(error, 'code', None)!r}) where it should return",
@@ -97,13 +97,13 @@ def said(error: BaseException) -> str:
 
 
 Function = Callable[..., Any]
-_TAKES = ("model", "data")  # by position
+_POSITIONAL = ("model", "data")  # by position
 
 
 def is_function(spec: object) -> bool:
     """Tell whether something is a function, or a word FILE.py or FILE.py:NAME."""
     if isinstance(spec, str):
-        return Path(_place(spec)[0]).suffix == ".py"
+        return Path(_file_and_name(spec)[0]).suffix == ".py"
     return callable(spec)
 
 
@@ -127,13 +127,13 @@ def function_scenario(
         BadInputError: There is no such file or function, or the file fails; the controller
             raises it where the function fails, or returns what is not ctrl.
     """
-    path, name = function_place(spec)
+    path, name = file_and_name_of(spec)
     given = dict(parameters or {})
 
     def imported() -> Function:
         if isinstance(spec, str):
-            return _imported(path, name, given)
-        _check_takes(spec, name, path, given)
+            return _import_controller(path, name, given)
+        _check_signature(spec, name, path, given)
         return spec
 
     imported()  # that it fails is said before anything is loaded
@@ -145,7 +145,7 @@ def function_scenario(
         def controller(model: Model, data: Data) -> Any:
             if next(numbers) % every:
                 return None
-            with _errors_of(path, name, data.time):
+            with _errors_in_one_line(path, name, data.time):
                 ctrl = function(model, data, **given)
                 return None if ctrl is None else as_vector(ctrl, (model.nu,), "ctrl")
 
@@ -174,18 +174,18 @@ def parameters_of(spec: str) -> tuple[str, ...]:
     Raises:
         BadInputError: There is no such function, or the file fails.
     """
-    path, name = _place(spec)
-    return _further(_function(path, name))
+    path, name = _file_and_name(spec)
+    return _keyword_parameters(_import_function(path, name))
 
 
-def _further(function: Function) -> tuple[str, ...]:
+def _keyword_parameters(function: Function) -> tuple[str, ...]:
     """Return what a function (model, data, …) takes by keyword."""
     try:
         given = inspect.signature(function).parameters.values()
     except ValueError:  # something of C's without a signature
         return ()
     kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
-    takes = [parameter.name for parameter in given if parameter.kind in kinds][: len(_TAKES)]
+    takes = [parameter.name for parameter in given if parameter.kind in kinds][: len(_POSITIONAL)]
     named = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
     return tuple(
         parameter.name
@@ -196,19 +196,19 @@ def _further(function: Function) -> tuple[str, ...]:
 
 def function_file(spec: str) -> Path:
     """Return the file that "FILE.py:NAME" names."""
-    return _place(spec)[0]
+    return _file_and_name(spec)[0]
 
 
-def function_place(spec: str | Function) -> tuple[Path, str]:
+def file_and_name_of(spec: str | Function) -> tuple[Path, str]:
     """Return the file and the name of a function of the user's."""
     if isinstance(spec, str):
-        return _place(spec)
+        return _file_and_name(spec)
     code = getattr(inspect.unwrap(spec), "__code__", None)
     path = Path(code.co_filename if code is not None else type(spec).__name__)
     return path, getattr(spec, "__name__", type(spec).__name__)
 
 
-def _place(spec: str) -> tuple[Path, str]:
+def _file_and_name(spec: str) -> tuple[Path, str]:
     """Return the file and the name of the function that "FILE.py:NAME" names."""
     file, colon, name = spec.rpartition(":")
     if not colon or name.endswith(".py") or "/" in name or "\\" in name:
@@ -216,18 +216,20 @@ def _place(spec: str) -> tuple[Path, str]:
     return Path(file), name
 
 
-def _imported(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
+def _import_controller(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
     """Run a file, and return its function `name`, which takes a Model, a Data and `parameters`."""
-    function = _function(path, name)
-    _check_takes(function, name, path, parameters)
+    function = _import_function(path, name)
+    _check_signature(function, name, path, parameters)
     return function
 
 
-def _check_takes(function: Function, name: str, path: Path, parameters: Mapping[str, Any]) -> None:
+def _check_signature(
+    function: Function, name: str, path: Path, parameters: Mapping[str, Any]
+) -> None:
     """Check that a function can be called with a Model, a Data and these parameters."""
-    takes, _ = misfit(function, *_TAKES, **parameters)
+    takes, _ = signature_mismatch(function, *_POSITIONAL, **parameters)
     if takes:
-        called_with = ", ".join((*_TAKES, *parameters))
+        called_with = ", ".join((*_POSITIONAL, *parameters))
         place = f" of {path.name}" if path.suffix == ".py" else ""
         raise BadInputError(
             f"{name}{place} takes {takes}, and a controller is called with ({called_with}): "
@@ -241,9 +243,9 @@ def check_is_controller(function: Function) -> None:
     Raises:
         BadInputError: It does not; the message shows what to write.
     """
-    path, name = function_place(function)
-    named = dict.fromkeys(_further(function))
-    _check_takes(function, name, path, named)
+    path, name = file_and_name_of(function)
+    named = dict.fromkeys(_keyword_parameters(function))
+    _check_signature(function, name, path, named)
 
 
 def check_controller(function: Function) -> None:
@@ -252,8 +254,8 @@ def check_controller(function: Function) -> None:
     Raises:
         BadInputError: It takes something else; the message shows what to write.
     """
-    path, name = function_place(function)
-    _check_takes(function, name, path, {})
+    path, name = file_and_name_of(function)
+    _check_signature(function, name, path, {})
 
 
 def _def_name(name: str) -> str:
@@ -261,11 +263,11 @@ def _def_name(name: str) -> str:
     return name if name.isidentifier() else "controller"
 
 
-def _function(path: Path, name: str) -> Function:
+def _import_function(path: Path, name: str) -> Function:
     """Run a file, and return its function `name`."""
     if path.suffix != ".py" or not path.is_file():
         raise _missing(path)
-    with _errors_of(path, name):
+    with _errors_in_one_line(path, name):
         module = load_module(f"controller_{path.stem}", path)
     function = getattr(module, name, None)
     if not callable(function):
@@ -273,14 +275,14 @@ def _function(path: Path, name: str) -> Function:
         hint = did_you_mean(name, functions)
         if functions and not hint:
             hint = f"; it has {few(functions)}"
-        raise BadInputError(f"{path.name} has no function {name}({', '.join(_TAKES)}){hint}")
+        raise BadInputError(f"{path.name} has no function {name}({', '.join(_POSITIONAL)}){hint}")
     return function
 
 
 def _missing(path: Path) -> BadInputError:
     if path.suffix != ".py":
         return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {str(path)!r}")
-    if (kind := what_is_there(path)) != "nothing":
+    if (kind := kind_of_path(path)) != "nothing":
         return BadInputError(f"{path} is {kind}, not a controller file")
     beside = [f.name for f in path.parent.glob("*.py")] if path.parent.is_dir() else []
     hint = did_you_mean(path.name, beside, 0.6)
@@ -288,7 +290,7 @@ def _missing(path: Path) -> BadInputError:
 
 
 @contextmanager
-def _errors_of(path: Path, name: str, time: float | None = None) -> Iterator[None]:
+def _errors_in_one_line(path: Path, name: str, time: float | None = None) -> Iterator[None]:
     """Run what is in a file, its folder among those of Python; an error is one line about it.
 
     Args:
@@ -301,11 +303,11 @@ def _errors_of(path: Path, name: str, time: float | None = None) -> Iterator[Non
     try:
         yield
     except (Exception, SystemExit) as error:
-        place, line, _ = line_of(error, path.absolute())
+        place, line, _ = last_user_line(error, path.absolute())
         where = place.name if place.is_file() else name
         where += f", line {line}" if line else ""
         when = "" if time is None else f", at {time:.3f} s"
-        raise BadInputError(f"{where}{when}: {said(error)}") from error
+        raise BadInputError(f"{where}{when}: {error_text(error)}") from error
     finally:
         if folder in sys.path:
             sys.path.remove(folder)

@@ -15,41 +15,41 @@ Progress = Callable[[float], None]  # told the fraction that is done
 Controller = Callable[[Model, Data], Any]  # (model, data) -> ctrl (nu,), or None to leave it
 
 
-def silent(_fraction: float) -> None:
+def no_progress(_fraction: float) -> None:
     """Show nothing: a Progress for those who want none."""
 
 
-def part_of(progress: Progress, start: float, share: float) -> Progress:
+def progress_of_stage(progress: Progress, start: float, share: float) -> Progress:
     """Return the Progress of a stage that is a share of the whole, from `start` on."""
     return lambda fraction: progress(start + share * fraction)
 
 
-_TRIED = 10  # steps
+_TIMED_STEPS = 10  # steps
 # A run that would take hours is a slip of the keyboard.
-_STEPS_MOST = 10_000_000
+_MAX_STEPS = 10_000_000
 
 
-def cost_of_a_second(model: Model) -> float:
+def wall_time_per_second(model: Model) -> float:
     """Estimate the wall time of a simulated second [s] from the first steps."""
     with make_data(model) as data:
         began = time.perf_counter()
         try:
-            step(model, data, _TRIED)
+            step(model, data, _TIMED_STEPS)
         except DivergedError:
             return 0.0
-        return (time.perf_counter() - began) / (_TRIED * model.timestep)
+        return (time.perf_counter() - began) / (_TIMED_STEPS * model.timestep)
 
 
-def steps_in(model: Model, seconds: float) -> int:
+def number_of_steps(model: Model, seconds: float) -> int:
     """Return the number of timesteps in a time, at least one."""
     steps = max(1.0, seconds / model.timestep)
     if not np.isfinite(seconds) or seconds <= 0:
         raise BadInputError(f"seconds must be above 0; got {seconds}")
     engine_steps = steps * model.substeps
-    if engine_steps > _STEPS_MOST:
+    if engine_steps > _MAX_STEPS:
         raise BadInputError(
             f"{seconds:g} s are {engine_steps:.3g} steps of the engine, and a run has at most "
-            f"{_STEPS_MOST:,}"
+            f"{_MAX_STEPS:,}"
         )
     return round(steps)
 

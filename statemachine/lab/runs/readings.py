@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import BadInputError, check_name
 from ...interface import INPUTS, Array, Contacts, Data, Model
-from ...measures.quantities import readings
+from ...measures.quantities import derived_arrays
 from .robot import carried_by, carried_by_joint
 
 FINGERTIP = "gripperframe"
@@ -111,7 +111,7 @@ def read_stored(data: Data) -> dict[str, bytes]:
 
 def read_derived(data: Data) -> dict[str, bytes]:
     """Return the bytes of every derived array that this engine gives, contacts among them."""
-    return {name: _bytes_of(value) for name, value in readings(data).items()}
+    return {name: _bytes_of(value) for name, value in derived_arrays(data).items()}
 
 
 def _bytes_of(value: Array | Contacts) -> bytes:

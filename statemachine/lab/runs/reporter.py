@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Protocol
 
-from .drive import Progress, silent
+from .drive import Progress, no_progress
 
 if TYPE_CHECKING:
     from ...show.blocks import Page
@@ -47,7 +47,7 @@ class QuietReporter:
         self, what: str, runs_at_once: int = 0, takes: float | None = None
     ) -> Iterator[Progress]:
         """Begin a stage of which nothing is shown."""
-        yield silent
+        yield no_progress
 
     def note(self, text: str) -> None:
         """Warn of it."""

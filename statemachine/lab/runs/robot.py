@@ -31,14 +31,21 @@ from ...measures.text import few
 UNACTUATED: Mapping[str, OptionValue] = {"actuation": False}
 FREE_FALL: Mapping[str, OptionValue] = {**UNACTUATED, "contacts": False}
 
-ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+SO101_JOINTS = (
+    "shoulder_pan",
+    "shoulder_lift",
+    "elbow_flex",
+    "wrist_flex",
+    "wrist_roll",
+    "gripper",
+)
 _PLANE, _HFIELD = 0, 1  # mjtGeom
 
 
-def is_the_arm(model: Model) -> bool:
+def is_so101(model: Model) -> bool:
     """Return whether the robot is an SO-101: its driven joints have those names, in order."""
     driven = model.actuator_jntid.tolist()
-    return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == ARM
+    return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == SO101_JOINTS
 
 
 def has_floor(model: Model) -> bool:
@@ -59,7 +66,7 @@ def scalar_joint(model: Model, name: str) -> tuple[int, int]:
     return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
 
 
-def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
+def checked_ctrl(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
     """Return a full ctrl (nu,) of finite values."""
     array = np.array(list(values), dtype=np.float64)
     if array.shape != (model.nu,):
@@ -84,13 +91,13 @@ def carried_by_joint(model: Model, joint: str) -> frozenset[int]:
     return carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
 
 
-def moved_by_actuators(model: Model) -> frozenset[int]:
+def actuated_bodies(model: Model) -> frozenset[int]:
     """Return the robot's moving bodies: those that actuated joints carry."""
     joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
     return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
 
 
-def trees_of_actuators(model: Model) -> frozenset[int]:
+def actuated_trees(model: Model) -> frozenset[int]:
     """Return the robot's bodies: each kinematic tree with an actuated joint, its base included.
 
     Where actuators drive no joint (but a tendon, a site or a body), all trees that move.
@@ -103,7 +110,7 @@ def trees_of_actuators(model: Model) -> frozenset[int]:
     return carried_by(model, bodies)
 
 
-def touching(
+def contact_names(
     model: Model,
     contacts: Contacts,
     bodies: frozenset[int] | None = None,
@@ -121,18 +128,18 @@ def touching(
     return tuple(dict.fromkeys(names.geoms(*pair) for pair in geoms.tolist())) if names else ()
 
 
-def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
+def contact_counts(model: Model, contacts: Contacts) -> Counter[str]:
     """Count the contacts of each pair of bodies: {"gripper on box": 6}."""
     names = ContactNames.of(model)
     return Counter(names.pair(*geoms) for geoms in contacts.geom.tolist())
 
 
 # What is told to the arm [rad].
-TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
-_PART = 0.25  # of its range: how far a servo is sent
-_OUTSIDE = 1e-3  # rad, m; less is how a file rounds its numbers
-_START = "the run starts outside of joint limits [rad or m]: {joints}{inside}"
-_INSIDE = "; inside with --keyframe {names}"
+ARM_TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
+_RANGE_FRACTION = 0.25  # of its range: how far a servo is sent
+_LIMIT_TOLERANCE = 1e-3  # rad, m; less is how a file rounds its numbers
+_OUTSIDE_LIMITS = "the run starts outside of joint limits [rad or m]: {joints}{inside}"
+_INSIDE_LIMITS = "; inside with --keyframe {names}"
 
 
 def warn_of_start(model: Model, data: Data) -> None:
@@ -159,25 +166,25 @@ def _warn_of_limits(model: Model, qpos: Array) -> None:
     here, *there = np.maximum(low - at, at - high).round(6)
     outside: list[str] = []
     for k in np.argsort(-here, kind="stable"):
-        if here[k] > _OUTSIDE:
+        if here[k] > _LIMIT_TOLERANCE:
             name = model.joint_names[joints[k]] or f"joint {joints[k]}"
             outside.append(f"{name} by {here[k]:.3g}")
     if outside:
         frames = zip(model.keyframes, there, strict=True)
-        names = [f.name for f, beyond in frames if f.name and beyond.max() <= _OUTSIDE]
-        inside = _INSIDE.format(names=few(names, 3, " or ")) if names else ""
-        text = _START.format(joints=few(outside, 1), inside=inside)
+        names = [f.name for f, beyond in frames if f.name and beyond.max() <= _LIMIT_TOLERANCE]
+        inside = _INSIDE_LIMITS.format(names=few(names, 3, " or ")) if names else ""
+        text = _OUTSIDE_LIMITS.format(joints=few(outside, 1), inside=inside)
         warnings.warn(text, EngineWarning, stacklevel=4)
 
 
-def home(model: Model) -> str | None:
+def home_keyframe(model: Model) -> str | None:
     """Return the keyframe "home" if there is one, as is the custom; None for the default state."""
     return usual_start(model)
 
 
 def start_keyframe(model: Model) -> str | None:
     """Return where a lesson starts: the arm in its default state, another robot at home."""
-    return None if is_the_arm(model) else home(model)
+    return None if is_so101(model) else home_keyframe(model)
 
 
 def is_servo(model: Model) -> NDArray[np.bool_]:
@@ -190,13 +197,13 @@ def on_scalar_joint(model: Model) -> NDArray[np.bool_]:
     return np.isin(kinds, (int(JointType.HINGE), int(JointType.SLIDE)))
 
 
-def qpos_and_load_at_start(model: Model) -> tuple[Array, Array | None]:
+def start_qpos_and_holding_force(model: Model) -> tuple[Array, Array | None]:
     """Return qpos (nq,) at the start and the force (nv,) that keeps it there [N·m or N].
 
     The force is None where the engine cannot compute it.
     """
     with make_data(model) as data:
-        reset(model, data, home(model))
+        reset(model, data, home_keyframe(model))
         data.qvel[:] = 0
         forward(model, data)
         try:  # springs and what compensates for gravity are passive
@@ -206,18 +213,20 @@ def qpos_and_load_at_start(model: Model) -> tuple[Array, Array | None]:
         return data.qpos.copy(), load
 
 
-def load_at_start(model: Model) -> Array:
+def holding_force_size(model: Model) -> Array:
     """Return the size (nv,) of the force that keeps each joint where it starts [N·m or N].
 
     It is zero where the engine cannot compute it.
     """
-    _, load = qpos_and_load_at_start(model)
+    _, load = start_qpos_and_holding_force(model)
     return np.zeros(model.nv) if load is None else np.abs(load)
 
 
-def farther(begin: float, ends: tuple[float, float], most: float = np.inf) -> float:
+def target_towards_farther_end(
+    begin: float, ends: tuple[float, float], most: float = np.inf
+) -> float:
     """Return a target a quarter of the range away, towards the farther of two ends."""
     low, high = ends
     begin = min(max(begin, low), high)
-    step = min(_PART * (high - low), most)
+    step = min(_RANGE_FRACTION * (high - low), most)
     return begin + step if high - begin >= begin - low else begin - step

@@ -16,11 +16,11 @@ from ...errors import BadInputError, check_name
 from ...interface import Array, Data, Model
 from ...interface.options import OptionValue
 from .drive import Controller
-from .robot import FREE_FALL, UNACTUATED, has_floor, home, is_the_arm
-from .usual_commands import hold_ctrl, need_actuators, waves
+from .robot import FREE_FALL, UNACTUATED, has_floor, home_keyframe, is_so101
+from .usual_commands import check_has_actuators, draw_waves, hold_ctrl
 
 # Swings the arm with the box in its jaws by 23 degrees.
-MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
+BOX_SWING_CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
 
 
 @dataclass(frozen=True)
@@ -62,22 +62,22 @@ class Scenario:
         Raises:
             BadInputError: It makes no sense on the Model; with the names of those that do.
         """
-        if self.own or (is_the_arm(model) and (has_floor(model) or not self.says.count("floor"))):
+        if self.own or (is_so101(model) and (has_floor(model) or not self.says.count("floor"))):
             return self
         try:
             self.needs(model)
         except BadInputError as error:
-            others = fitting(model)
+            others = suitable_scenarios(model)
             known = f"; what makes sense on it: {', '.join(others)}" if others else ""
             raise BadInputError(f"{error}{known}") from None
-        if is_the_arm(model):
+        if is_so101(model):
             return replace(self, says=self.elsewhere)
-        key = self.keyframe or home(model)
+        key = self.keyframe or home_keyframe(model)
         begins = "" if key is None else f" It starts in the keyframe {key!r}."
         return replace(self, says=self.elsewhere + begins, keyframe=key)
 
 
-def fitting(model: Model) -> tuple[str, ...]:
+def suitable_scenarios(model: Model) -> tuple[str, ...]:
     """Return the names of the scenarios that make sense on a Model."""
     names = []
     for known in SCENARIOS.values():
@@ -87,17 +87,17 @@ def fitting(model: Model) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _constant(ctrl: Array | None) -> Controller:
+def _constant_command(ctrl: Array | None) -> Controller:
     """Return a controller with one command from the beginning on; None where nobody writes ctrl."""
     return lambda _model, _data: ctrl
 
 
-def _need_box(model: Model) -> None:
-    if not is_the_arm(model) or all(frame.name != "held" for frame in model.keyframes):
+def _check_holds_box(model: Model) -> None:
+    if not is_so101(model) or all(frame.name != "held" for frame in model.keyframes):
         raise BadInputError(f"{model.path.name} has no SO-101 that holds a box (so101/scene_box)")
 
 
-def _need_joints(model: Model) -> None:
+def _check_has_joints(model: Model) -> None:
     if not model.nv:
         raise BadInputError(
             f"{model.path.name} has no joints: nothing in it can move (two such files are compared "
@@ -105,14 +105,14 @@ def _need_joints(model: Model) -> None:
         )
 
 
-def _need_actuators(model: Model) -> None:
-    _need_joints(model)
-    need_actuators(model)
+def _check_has_joints_and_actuators(model: Model) -> None:
+    _check_has_joints(model)
+    check_has_actuators(model)
 
 
 def _waves(model: Model, seed: int) -> Controller:
     """Return a controller: each actuator follows three sines within the middle of its range."""
-    middle, size, frequency, phase = waves(model, seed)
+    middle, size, frequency, phase = draw_waves(model, seed)
 
     def controller(_model: Model, data: Data) -> Array:
         # From where it stands: the waves grow in over half a second.
@@ -125,17 +125,17 @@ def _waves(model: Model, seed: int) -> Controller:
 
 def _hold(model: Model, _seed: int) -> Controller:
     """Return a controller: servos take a pose as target, other actuators hold their joint."""
-    return _constant(hold_ctrl(model))
+    return _constant_command(hold_ctrl(model))
 
 
-def _nothing(_model: Model, _seed: int) -> Controller:
+def _no_command(_model: Model, _seed: int) -> Controller:
     """Return a controller that never writes ctrl."""
-    return _constant(None)
+    return _constant_command(None)
 
 
 def _move_the_box(_model: Model, _seed: int) -> Controller:
     """Return a controller that swings the arm aside with the jaws closed."""
-    return _constant(np.array(MOVING))
+    return _constant_command(np.array(BOX_SWING_CTRL))
 
 
 _ALL = (
@@ -147,16 +147,16 @@ _ALL = (
         _hold,
         "Each position servo is told a pose and goes there; any other actuator exerts what "
         "holds its joint at the start, or is left at the start's ctrl.",
-        _need_actuators,
+        _check_has_joints_and_actuators,
     ),
     Scenario(
         "gravity",
         "The servos are off: the arm falls onto the floor.",
         "so101/scene",
         4.0,
-        _nothing,
+        _no_command,
         "No actuator of the file acts: what can move is left to gravity and to what it touches.",
-        _need_joints,
+        _check_has_joints,
         options=UNACTUATED,
     ),
     Scenario(
@@ -164,20 +164,20 @@ _ALL = (
         "Nobody writes ctrl: the servos hold the arm at zero.",
         "so101/scene",
         2.0,
-        _nothing,
+        _no_command,
         "Nobody writes ctrl: each servo holds, and any other actuator exerts, what the start's "
         "ctrl says.",
-        _need_actuators,
+        _check_has_joints_and_actuators,
     ),
     Scenario(
         "fall",
         "The servos are off and nothing can touch anything: the arm falls.",
         "so101/scene",
         2.0,
-        _nothing,
+        _no_command,
         "No actuator of the file acts and nothing can touch anything: what can move is left "
         "to gravity. A robot that floats falls as a whole.",
-        _need_joints,
+        _check_has_joints,
         options=FREE_FALL,
     ),
     Scenario(
@@ -187,7 +187,7 @@ _ALL = (
         3.0,
         _move_the_box,
         "The jaws hold a box while the arm swings it aside.",
-        _need_box,
+        _check_holds_box,
         keyframe="held",
     ),
     Scenario(
@@ -197,7 +197,7 @@ _ALL = (
         4.0,
         _waves,
         "Every actuator follows waves that a seed draws.",
-        _need_actuators,
+        _check_has_joints_and_actuators,
         seeded=True,
     ),
 )

@@ -11,23 +11,23 @@ import numpy as np
 from ...errors import BadInputError
 from ...interface import Array, JointType, Model
 from .robot import (
-    TARGET,
-    farther,
-    home,
+    ARM_TARGET,
+    home_keyframe,
     is_servo,
-    is_the_arm,
+    is_so101,
     on_scalar_joint,
-    qpos_and_load_at_start,
+    start_qpos_and_holding_force,
+    target_towards_farther_end,
 )
 
-_FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
-_NO_FORCE = 1e-9  # N·m or N; less is rounding
+_MAX_DISPLACEMENT = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
+_FORCE_ROUNDING = 1e-9  # N·m or N; less is rounding
 _DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
 
 
 def start_ctrl(model: Model) -> Array:
     """Return ctrl (nu,) at the start: the keyframe's, else zero."""
-    key = home(model)
+    key = home_keyframe(model)
     return np.zeros(model.nu) if key is None else model.keyframes[model.key_id(key)].ctrl.copy()
 
 
@@ -42,33 +42,33 @@ def hold_ctrl(model: Model) -> Array:
     Raises:
         BadInputError: The model has no actuators.
     """
-    need_actuators(model)
-    if is_the_arm(model) and model.nu == len(TARGET):
-        return np.array(TARGET)
-    qpos, load = qpos_and_load_at_start(model)
-    ctrl, servos, key = start_ctrl(model), is_servo(model), home(model)
+    check_has_actuators(model)
+    if is_so101(model) and model.nu == len(ARM_TARGET):
+        return np.array(ARM_TARGET)
+    qpos, load = start_qpos_and_holding_force(model)
+    ctrl, servos, key = start_ctrl(model), is_servo(model), home_keyframe(model)
     for i in range(model.nu):
         low, high = model.actuator_ctrlrange[i]
         joint, gear = model.actuator_jntid[i], float(model.actuator_gear[i])
         if servos[i]:
             begin = ctrl[i] if key else float(qpos[model.jnt_qposadr[joint]] * gear)
-            most = _FARTHEST[JointType(int(model.jnt_type[joint]))] * abs(gear)
-            ctrl[i] = farther(begin, _reachable(model, i), most)
-        elif load is not None and _holds(model, i):
+            most = _MAX_DISPLACEMENT[JointType(int(model.jnt_type[joint]))] * abs(gear)
+            ctrl[i] = target_towards_farther_end(begin, _reachable_targets(model, i), most)
+        elif load is not None and _is_motor_on_fixed_base(model, i):
             force = load[model.jnt_dofadr[joint]] / np.count_nonzero(model.actuator_jntid == joint)
-            if abs(force) > _NO_FORCE:
+            if abs(force) > _FORCE_ROUNDING:
                 factor = model.actuator_gain[i] * gear
                 ctrl[i] = np.clip(force / factor, low, high)
     return np.array([float(f"{value:.{_DIGITS}g}") + 0.0 for value in ctrl])
 
 
-def need_actuators(model: Model) -> None:
+def check_has_actuators(model: Model) -> None:
     """Raise BadInputError for a model that nothing can be commanded in."""
     if not model.nu:
         raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
 
 
-def _reachable(model: Model, i: int) -> tuple[float, float]:
+def _reachable_targets(model: Model, i: int) -> tuple[float, float]:
     """Return the targets that a servo can reach: its ctrlrange, within the limits of its joint."""
     low, high = (float(end) for end in model.actuator_ctrlrange[i])
     joint = model.actuator_jntid[i]
@@ -79,7 +79,7 @@ def _reachable(model: Model, i: int) -> tuple[float, float]:
     return low, high
 
 
-def _holds(model: Model, i: int) -> bool:
+def _is_motor_on_fixed_base(model: Model, i: int) -> bool:
     """Return whether an actuator is a motor on a joint that hangs on no floating base.
 
     The legs of a robot that floats carry what the floor gives back, which is not known.
@@ -97,7 +97,7 @@ def _holds(model: Model, i: int) -> bool:
     return True
 
 
-def waves(model: Model, seed: int) -> tuple[Array, Array, Array, Array]:
+def draw_waves(model: Model, seed: int) -> tuple[Array, Array, Array, Array]:
     """Draw the waves that every actuator follows.
 
     They stay within the middle half of its range; without a range, of one from -1 to 1. A robot
@@ -123,7 +123,7 @@ def waves(model: Model, seed: int) -> tuple[Array, Array, Array, Array]:
     size = draw.uniform(0.2, 1.0, (3, model.nu))
     size *= 0.25 * (high - low) / size.sum(axis=0)
     middle = (low + high) / 2
-    if home(model) is not None:
+    if home_keyframe(model) is not None:
         quarter = 0.25 * (high - low)
         middle = np.clip(start_ctrl(model), low + quarter, high - quarter)
     return middle, size, frequency, phase

@@ -32,14 +32,23 @@ from ...errors import BadInputError, WorkerEndedError
 from ...installed import require_extra
 from ...processes import checked_jobs
 from ...processes.parallel import unwinding, worker_processes
-from ..runs.drive import Progress, silent
+from ..runs.drive import Progress, no_progress
 from .design import Design, DesignPoint, Vary
-from .folder import check_folder, design_of, locked, read_manifest, settle_manifest
-from .prepare import prepared
+from .folder import check_folder, design_of, locked, read_manifest, write_or_check_manifest
+from .prepare import prepare_sweep
 from .request import PreparedSweep, Sweep, SweepCell
-from .rows import CELLS, COLUMNS, DONE, RowWriter, counted, outcome_of, read_cells, remove_failed
+from .rows import (
+    CELLS,
+    COLUMNS,
+    DONE,
+    RowWriter,
+    iter_cell_outcomes,
+    outcome_of,
+    read_cells,
+    remove_failed,
+)
 from .summary import SweepSummary
-from .worker import Row, differing, row_of, run_batch
+from .worker import Row, environment_difference, row_of, run_batch
 
 __all__ = [
     "COLUMNS",
@@ -50,7 +59,7 @@ __all__ = [
     "SweepSummary",
     "Vary",
     "design_of",
-    "prepared",
+    "prepare_sweep",
     "read_cells",
     "read_manifest",
     "run_sweep",
@@ -63,10 +72,13 @@ Batch = Sequence[SweepCell]
 Results = Generator[list[Row], None, None]
 Submit = Callable[[PreparedSweep, Batch], Future[list[Row]]]  # to a worker
 
-_BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
-_TASKS = 4  # at least so many for each job, so that none is idle at the end
-_PATIENCE = 10.0  # seconds for a scheduler to answer
-_BATCH_APART = partial(run_batch, own=True)
+_BATCH_SECONDS, _MAX_BATCH_CELLS = (
+    1.0,
+    500,
+)  # a task takes about so many seconds, and has at most so many cells
+_TASKS_PER_JOB = 4  # at least so many for each job, so that none is idle at the end
+_SCHEDULER_TIMEOUT = 10.0  # seconds for a scheduler to answer
+_RUN_BATCH_IN_CHILD = partial(run_batch, own=True)
 
 
 def run_sweep(
@@ -77,7 +89,7 @@ def run_sweep(
     scheduler: str | None = None,
     extend: bool = False,
     retry_failed: bool = False,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> SweepSummary:
     """Run what is missing of a sweep.
 
@@ -91,21 +103,21 @@ def run_sweep(
         progress: Told the fraction of what is missing that is done.
 
     Raises:
-        BadInputError: The folder is of another sweep, or in use; see `prepared` for the rest.
+        BadInputError: The folder is of another sweep, or in use; see `prepare_sweep` for the rest.
         OSError: A file cannot be written; what was written is kept.
         MissingEngineError: An engine or a package is missing.
         KeyboardInterrupt: It was interrupted; what was done is in the folder.
     """
     began = time.monotonic()
     jobs, folder = checked_jobs(jobs), Path(out)
-    ready = sweep if isinstance(sweep, PreparedSweep) else prepared(sweep)
+    ready = sweep if isinstance(sweep, PreparedSweep) else prepare_sweep(sweep)
     check_folder(folder)
     with locked(folder), ExitStack() as stack:
         client = stack.enter_context(_connected(scheduler, ready)) if scheduler else None
-        known = dict(counted(folder))
+        known = dict(iter_cell_outcomes(folder))
         if extend and known:
             _check_grows(folder, ready, known)
-        settle_manifest(folder, ready.manifest(), extend)
+        write_or_check_manifest(folder, ready.manifest(), extend)
         if retry_failed:
             remove_failed(folder)
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
@@ -189,7 +201,7 @@ def _summary(
 
 def _cost_of_cell(ready: PreparedSweep, backend: str) -> float:
     """Return roughly what a cell takes on a backend, by the clock [s]."""
-    return max(1e-6, ready.cost.get(parse_backend(backend).name, _BATCH))
+    return max(1e-6, ready.cost.get(parse_backend(backend).name, _BATCH_SECONDS))
 
 
 def _cost_of_missing(ready: PreparedSweep, known: Mapping[str, str]) -> float:
@@ -204,10 +216,12 @@ def _cost_of_missing(ready: PreparedSweep, known: Mapping[str, str]) -> float:
 def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Iterator[Batch]:
     """Yield what is missing, in tasks of about a second, from all backends in turn."""
     missing = len(ready) - len(known)
-    most = max(1, math.ceil(missing / (_TASKS * jobs * len(ready.backends))))
+    most = max(1, math.ceil(missing / (_TASKS_PER_JOB * jobs * len(ready.backends))))
 
     def of(backend: str) -> Iterator[Batch]:
-        size = min(_MOST, max(1, int(_BATCH / _cost_of_cell(ready, backend))), most)
+        size = min(
+            _MAX_BATCH_CELLS, max(1, int(_BATCH_SECONDS / _cost_of_cell(ready, backend))), most
+        )
         cells = (cell for cell in ready.cells(backend) if cell.id not in known)
         while batch := list(itertools.islice(cells, size)):
             yield batch
@@ -229,7 +243,7 @@ def _run_apart(
     `look` is called between any two waits, and may raise.
     """
     with worker_processes(jobs) as workers:
-        here = [partial(submit, _BATCH_APART) for submit in workers]
+        here = [partial(submit, _RUN_BATCH_IN_CHILD) for submit in workers]
         yield from _results(ready, batches, here, here, look)
 
 
@@ -251,7 +265,7 @@ def _run_on_dask(
         def submit_here(ready: PreparedSweep, batch: Batch) -> Future[list[Row]]:
             if client.status != "running":
                 raise BadInputError("the scheduler went away; what was done is kept")
-            return worker(_BATCH_APART, ready, batch)
+            return worker(_RUN_BATCH_IN_CHILD, ready, batch)
 
         # Some batches always wait, so that no worker is idle.
         yield from _results(ready, batches, 2 * workers * [submit], [submit_here], look)
@@ -336,15 +350,15 @@ def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+            client = distributed.Client(address, timeout=_SCHEDULER_TIMEOUT, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise BadInputError(
                 f"no Dask scheduler answers at {address} ({type(error).__name__})"
             ) from None
     try:
         with suppress(TimeoutError):
-            client.wait_for_workers(1, timeout=_PATIENCE)
-        answers = client.run(differing, ready, __version__, on_error="return")
+            client.wait_for_workers(1, timeout=_SCHEDULER_TIMEOUT)
+        answers = client.run(environment_difference, ready, __version__, on_error="return")
         if not answers:
             raise BadInputError(f"the scheduler at {address} has no workers")
         for worker, wrong in answers.items():

@@ -38,7 +38,7 @@ from .quantities import (
 from .rows import read_cells
 
 SweepVerdict = Literal["none", "together", "tied", "one"]
-_TIED = 2.0  # standard errors
+_TIE_STANDARD_ERRORS = 2.0  # standard errors
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ def _are_tied(first: MainEffect, second: MainEffect) -> bool:
         return False
     if first.error is None or second.error is None:
         return False
-    return first.share - second.share < _TIED * math.hypot(first.error, second.error)
+    return first.share - second.share < _TIE_STANDARD_ERRORS * math.hypot(first.error, second.error)
 
 
 def effects(
@@ -252,7 +252,7 @@ def effects(
     manifest = read_manifest(folder)
     design, seeds = design_of(manifest), manifest["design"]["seeds"]
     asked_for = (backends,) if isinstance(backends, str) else backends
-    sides = _backends(manifest["design"]["backends"], asked_for)
+    sides = _compared_backends(manifest["design"]["backends"], asked_for)
     table = read_cells(folder)
     asked = default_quantity(table, sides) if quantity is None else parse_quantity(quantity)
     points = list(design.points())
@@ -261,7 +261,7 @@ def effects(
         both = "both " if len(sides) > 1 else ""
         raise BadInputError(
             f"no setting of this sweep has {asked} on {both}{' and '.join(sides)}: "
-            f"{_why_nothing(asked, cells)}"
+            f"{_why_no_values(asked, cells)}"
         )
     shares = main_effects(design, cells.values, cells.rounding)
     ranked = [
@@ -309,7 +309,7 @@ def _versions(manifest: SweepManifest, backends: Sequence[str]) -> dict[str, str
     return versions
 
 
-def _why_nothing(quantity: SweepQuantity, cells: CellValues) -> str:
+def _why_no_values(quantity: SweepQuantity, cells: CellValues) -> str:
     """Return why no cell has a value."""
     failed = sum(cells.failed.values())
     if failed:
@@ -365,7 +365,7 @@ def _last_part(name: str) -> str:
     return Path(name).name if Path(name).is_absolute() else name
 
 
-def _backends(there: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:
+def _compared_backends(there: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:
     """Return the engine, or the two engines, that a report is about.
 
     Raises:

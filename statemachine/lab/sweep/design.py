@@ -48,15 +48,15 @@ _MEANINGS: dict[Kind, str] = {
     "state": "{} where the run starts",
     "parameter": "{}, a keyword argument of the function",
 }
-_OWN = "{} as a multiple of the model's own value: 0.5 is half of it"
+_MULTIPLE_OF_MODEL = "{} as a multiple of the model's own value: 0.5 is half of it"
 _NAME = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]+)\])?")
 _DOTTED = re.compile(r"([A-Za-z_]\w*)\.(\S+)")
 _RANGE = re.compile(r"([^:]*):([^:]*)(?::([0-9]+))?")
 _SWITCHES = {"on": True, "off": False, "true": True, "false": False}
-_DIGITS = 32  # hexadecimal, of a digest
-_DIMENSIONS = 21201  # that SciPy has Sobol directions for
-_TIMES = ("x", "×")  # behind a number: times the model's own value
-_MOST = 10**6  # values of one factor
+_DIGEST_DIGITS = 32  # hexadecimal, of a digest
+_MAX_DIMENSIONS = 21201  # that SciPy has Sobol directions for
+_MULTIPLE_SIGNS = ("x", "×")  # behind a number: times the model's own value
+_MAX_VALUES = 10**6  # values of one factor
 _GRID_DIGITS = 12  # of the values of a grid, so that 0.6 is not 0.6000000000000001
 
 
@@ -110,7 +110,7 @@ class Vary:
     @property
     def meaning(self) -> str:
         """What its column says."""
-        return (_OWN if self.times else _MEANINGS[self.kind]).format(self.label)
+        return (_MULTIPLE_OF_MODEL if self.times else _MEANINGS[self.kind]).format(self.label)
 
     @property
     def numeric(self) -> bool:
@@ -129,7 +129,7 @@ def is_number(value: object) -> bool:
 
 
 def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
-    """Read words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi; `with_kinds` says what they vary.
+    """Read words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi; `resolve_kinds` says what they vary.
 
     Args:
         words: As typed behind `--vary`.
@@ -137,7 +137,7 @@ def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
     Raises:
         BadInputError: A word is invalid, or two of them vary the same.
     """
-    factors = tuple(map(_parsed, words))
+    factors = tuple(map(_parse_word, words))
     labels = [vary.label for vary in factors]
     for vary in factors:
         if labels.count(vary.label) > 1:
@@ -147,7 +147,7 @@ def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
     return factors
 
 
-def _parsed(word: str) -> Vary:
+def _parse_word(word: str) -> Vary:
     label, sign, text = word.partition("=")
     match = _NAME.fullmatch(label.strip())
     dotted = _DOTTED.fullmatch(label.strip())
@@ -163,17 +163,17 @@ def _parsed(word: str) -> Vary:
         )
     name, place = match[1], match[2] or ""
     if name == MODEL or ":" not in text:
-        values, times = _values(label, text.split(","), name == MODEL)
+        values, times = _parse_values(label, text.split(","), name == MODEL)
         return Vary(name, place, values=values, times=times)
     low, high, count, times = math.nan, math.nan, None, False
     if match := _RANGE.fullmatch(text):
-        ends, times = _values(label, [match[1], match[2]])
+        ends, times = _parse_values(label, [match[1], match[2]])
         low, high = (float(end) if is_number(end) else math.nan for end in ends)
         count = int(match[3]) if match[3] else None
-    if not low < high or (count is not None and not 2 <= count <= _MOST):
+    if not low < high or (count is not None and not 2 <= count <= _MAX_VALUES):
         raise BadInputError(
             f"{label}={text} wants from:to or from:to:count, two numbers, the smaller number "
-            f"first, with a count from 2 to {_MOST:,}"
+            f"first, with a count from 2 to {_MAX_VALUES:,}"
         )
     if count is None:
         return Vary(name, place, bounds=(low, high), times=times)
@@ -182,14 +182,14 @@ def _parsed(word: str) -> Vary:
     return Vary(name, place, values=values, times=times)
 
 
-def _values(
+def _parse_values(
     label: str, words: Sequence[str], names: bool = False
 ) -> tuple[tuple[Value, ...], bool]:
     """Return the values of words, and whether they are times the model's own."""
     words = [word.strip() for word in words]
     if "" in words:
         raise BadInputError(f"--vary {label} has an empty value")
-    pairs = [(word, False) if names else _value(word) for word in words]
+    pairs = [(word, False) if names else _parse_value(word) for word in words]
     values = tuple(value for value, _ in pairs)
     kinds = {(type(value), times) for value, times in pairs}
     if len(kinds) > 1:
@@ -202,10 +202,10 @@ def _values(
     return values, pairs[0][1]
 
 
-def _value(word: str) -> tuple[Value, bool]:
+def _parse_value(word: str) -> tuple[Value, bool]:
     if word.lower() in _SWITCHES:
         return _SWITCHES[word.lower()], False
-    times = word.endswith(_TIMES)
+    times = word.endswith(_MULTIPLE_SIGNS)
     try:
         number = typed_float(word[:-1] if times else word)
     except ValueError:
@@ -248,7 +248,7 @@ class Design:
             raise BadInputError(f"{ranges[0]} has a range: say --samples N, or a count behind it")
         if self.samples and not ranges:
             raise BadInputError("--samples is of ranges, NAME=from:to, and none is varied")
-        if len(ranges) > _DIMENSIONS:
+        if len(ranges) > _MAX_DIMENSIONS:
             raise BadInputError(f"{len(ranges)} ranges are more than can be sampled")
 
     @property
@@ -306,4 +306,4 @@ def digest(content: object) -> str:
     """Return the digest of plain values; 1 and 1.0 are the same."""
     plain = json.loads(json.dumps(content, allow_nan=False), parse_int=float)
     text = json.dumps(plain, sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGEST_DIGITS]

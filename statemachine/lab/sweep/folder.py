@@ -33,14 +33,14 @@ def locked(folder: Path) -> Iterator[None]:
     """
     handle = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        if not _taken(handle):
+        if not _try_lock(handle):
             raise BadInputError(f"another sweep runs in {folder}: one at a time")
         yield
     finally:
         os.close(handle)
 
 
-def _taken(handle: int) -> bool:
+def _try_lock(handle: int) -> bool:
     """Tell whether the lock could be had; a filesystem without locks gives it to everyone."""
     try:
         if os.name == "nt":
@@ -90,15 +90,15 @@ def read_manifest(folder: str | Path) -> SweepManifest:
         content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         raise BadInputError(f"{folder} is not a sweep: it has no {MANIFEST}") from None
-    manifest = _parsed(content)
+    manifest = _parse_json(content)
     if manifest is None or (_DIGEST in manifest and not _is_as_written(content, manifest)):
-        raise _damaged(path)
+        raise _damaged_manifest_error(path)
     if (version := manifest.get("schema")) != MANIFEST_VERSION:
         raise BadInputError(
             f"{path} has schema {shown(version)}; this version reads {MANIFEST_VERSION}"
         )
     if _DIGEST not in manifest:
-        raise _damaged(path)
+        raise _damaged_manifest_error(path)
     del manifest[_DIGEST]
     # The digest says that `write_manifest` wrote it, and the schema what it wrote.
     return cast("SweepManifest", manifest)
@@ -119,7 +119,7 @@ def write_manifest(folder: Path, manifest: SweepManifest) -> None:
     replace_bytes(folder / MANIFEST, sealed)
 
 
-def _parsed(content: bytes) -> dict[str, Any] | None:
+def _parse_json(content: bytes) -> dict[str, Any] | None:
     """Parse a manifest; None where it is not a JSON object."""
     try:
         manifest = json.loads(content.decode("utf-8"))
@@ -137,7 +137,7 @@ def _is_as_written(content: bytes, manifest: Mapping[str, Any]) -> bool:
     return hashlib.sha256(without).hexdigest() == digest
 
 
-def _damaged(path: Path) -> BadInputError:
+def _damaged_manifest_error(path: Path) -> BadInputError:
     return BadInputError(
         f"{path} is damaged: it is not as it was written, and without it nobody knows what the "
         "cells are of. Put back a copy, or name another folder"
@@ -166,7 +166,7 @@ def design_of(manifest: SweepManifest) -> Design:
     return Design(tuple(factors), design["samples"], design["design_seed"])
 
 
-def settle_manifest(folder: Path, manifest: SweepManifest, extend: bool) -> None:
+def write_or_check_manifest(folder: Path, manifest: SweepManifest, extend: bool) -> None:
     """Write what is asked for, or check that it is what the folder is of.
 
     Args:
@@ -222,13 +222,13 @@ def _differences(
     if grows:
         names = [name for name in names if name in there and name in wanted]
     return [
-        f"{name} {_word(there.get(name))} there, {_word(wanted.get(name))} here"
+        f"{name} {_short_text(there.get(name))} there, {_short_text(wanted.get(name))} here"
         for name in names
         if there.get(name) != wanted.get(name)
     ]
 
 
-def _word(value: object) -> str:
+def _short_text(value: object) -> str:
     """Return a list by its words, and a digest by its first digits."""
     if value is None:
         return "none"

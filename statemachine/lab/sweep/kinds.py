@@ -105,7 +105,7 @@ def _why_without_effect(model: Model, option: str) -> str:
     return ""
 
 
-def with_kinds(factors: Iterable[Vary], names: VariableNames) -> tuple[Vary, ...]:
+def resolve_kinds(factors: Iterable[Vary], names: VariableNames) -> tuple[Vary, ...]:
     """Return the same factors, each with its kind.
 
     Args:

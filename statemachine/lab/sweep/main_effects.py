@@ -15,9 +15,9 @@ from .design import Design, Value
 Flags = NDArray[np.bool_]
 
 _RESAMPLES = 400  # of a bootstrap
-_LEAST_SEEDS = 3  # of which a bootstrap says something
-_LEAST_SAMPLES = 8  # the same
-_LEAST_IN_CLASSES = 4  # samples that can be divided into two classes of two
+_MIN_SEEDS = 3  # of which a bootstrap says something
+_MIN_SAMPLES = 8  # the same
+_MIN_CLASS_SAMPLES = 4  # samples that can be divided into two classes of two
 
 
 @dataclass(frozen=True)
@@ -95,15 +95,15 @@ def main_effects(design: Design, values: Array, rounding: float = 0.0) -> MainEf
             everywhere. Of the seeds of a setting the median counts.
         rounding: What figures may differ by and be the same.
     """
-    balanced = _balanced(design, values)
+    balanced = _complete_design(design, values)
     centre = _median(balanced.cube)
     shares = errors = np.full(len(design.factors), np.nan)
     why_none = _why_none(design, centre, rounding)
     if not why_none:
-        shares = _first_order(balanced, centre, balanced.sampled)
+        shares = _first_order_indices(balanced, centre, balanced.sampled)
         if np.isnan(shares).all():
             why_none = "each parameter has too few values left"
-        drawn = list(_drawn_again(balanced, rounding))
+        drawn = list(_bootstrap_shares(balanced, rounding))
         if drawn:
             errors = np.where(np.isnan(shares), np.nan, np.std(drawn, axis=0))
     return MainEffects(
@@ -138,7 +138,7 @@ def _by_label(design: Design, figures: Array) -> dict[str, float | None]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Balanced:
+class _CompleteDesign:
     """The settings of a design that have a figure, at every combination of what stays.
 
     Attributes:
@@ -158,7 +158,7 @@ class _Balanced:
     left_out: Mapping[str, tuple[Value, ...]]
 
 
-def _balanced(design: Design, values: Array) -> _Balanced:
+def _complete_design(design: Design, values: Array) -> _CompleteDesign:
     """Leave out samples and levels, until no setting is without a figure.
 
     Args:
@@ -169,7 +169,7 @@ def _balanced(design: Design, values: Array) -> _Balanced:
     # The samples change slowest; see `Design.points`.
     lengths = [len(vary.values) for vary in design.listed]
     cube = values.reshape(samples, *lengths, values.shape[-1])
-    kept = _without_holes(np.asarray(np.isnan(cube).all(axis=-1)))
+    kept = _complete_indices(np.asarray(np.isnan(cube).all(axis=-1)))
     left_out: dict[str, tuple[Value, ...]] = {}
     values_left: list[tuple[Value, ...]] = []
     for vary, levels in zip(design.listed, kept[1:], strict=True):
@@ -178,10 +178,10 @@ def _balanced(design: Design, values: Array) -> _Balanced:
         if gone:
             left_out[vary.label] = gone
     sampled = design.sample_values()[kept[0]]
-    return _Balanced(design, cube[np.ix_(*kept)], sampled, values_left, left_out)
+    return _CompleteDesign(design, cube[np.ix_(*kept)], sampled, values_left, left_out)
 
 
-def _without_holes(holes: Flags) -> list[list[int]]:
+def _complete_indices(holes: Flags) -> list[list[int]]:
     """Return the places along each axis that stay where those with holes go, the worst first.
 
     Args:
@@ -191,7 +191,7 @@ def _without_holes(holes: Flags) -> list[list[int]]:
     while (left := holes[np.ix_(*kept)]).any():
         worst_axis, worst = 0, np.zeros(0)
         for axis in range(left.ndim):
-            shares = left.mean(axis=_others(left.ndim, axis))
+            shares = left.mean(axis=_other_axes(left.ndim, axis))
             # The last place of an axis stays: somewhere in it there is a figure.
             if len(shares) > 1 and shares.max() > worst.max(initial=0.0):
                 worst_axis, worst = axis, shares
@@ -201,12 +201,12 @@ def _without_holes(holes: Flags) -> list[list[int]]:
     return kept
 
 
-def _others(count: int, axis: int) -> tuple[int, ...]:
+def _other_axes(count: int, axis: int) -> tuple[int, ...]:
     """Return all axes but one."""
     return tuple(other for other in range(count) if other != axis)
 
 
-def _first_order(balanced: _Balanced, centre: Array, sampled: Array) -> Array:
+def _first_order_indices(balanced: _CompleteDesign, centre: Array, sampled: Array) -> Array:
     """Return Var(E[Y | X]) / Var(Y) of each parameter [1], in the order of the design.
 
     It is NaN of a list that has one value left of several, and of a range with too few samples.
@@ -216,29 +216,29 @@ def _first_order(balanced: _Balanced, centre: Array, sampled: Array) -> Array:
         centre: (n, n1, …, nk) the figure at the settings.
         sampled: (n, r) the samples of the ranges.
     """
-    by_sample = centre.mean(axis=_others(centre.ndim, 0))
+    by_sample = centre.mean(axis=_other_axes(centre.ndim, 0))
     between: list[float] = []
     column, axis = 0, 0
     for vary in balanced.design.factors:
         if vary.bounds is not None:
-            between.append(_between_classes(sampled[:, column], by_sample))
+            between.append(_variance_of_class_means(sampled[:, column], by_sample))
             column += 1
             continue
         axis += 1
-        means = centre.mean(axis=_others(centre.ndim, axis))
+        means = centre.mean(axis=_other_axes(centre.ndim, axis))
         is_known = len(means) > 1 or vary.label not in balanced.left_out
         between.append(float(means.var()) if is_known else np.nan)
     return np.array(between) / centre.var()
 
 
-def _levels(balanced: _Balanced, centre: Array) -> dict[str, tuple[LevelMean, ...]]:
+def _levels(balanced: _CompleteDesign, centre: Array) -> dict[str, tuple[LevelMean, ...]]:
     """Return the mean of the figure at each value of each parameter, by label.
 
     Args:
         balanced: What of.
         centre: (n, n1, …, nk) the figure at the settings.
     """
-    by_sample = centre.mean(axis=_others(centre.ndim, 0))
+    by_sample = centre.mean(axis=_other_axes(centre.ndim, 0))
     levels: dict[str, tuple[LevelMean, ...]] = {}
     column, axis = 0, 0
     for vary in balanced.design.factors:
@@ -247,7 +247,7 @@ def _levels(balanced: _Balanced, centre: Array) -> dict[str, tuple[LevelMean, ..
             column += 1
             continue
         axis += 1
-        means = centre.mean(axis=_others(centre.ndim, axis)).tolist()
+        means = centre.mean(axis=_other_axes(centre.ndim, axis)).tolist()
         values = balanced.values[axis - 1]
         levels[vary.label] = tuple(map(LevelMean, values, means))
     return levels
@@ -255,7 +255,7 @@ def _levels(balanced: _Balanced, centre: Array) -> dict[str, tuple[LevelMean, ..
 
 def _means_of_classes(values: Array, figures: Array) -> tuple[LevelMean, ...]:
     """Return the mean value and the mean figure of each class of samples; none of too few."""
-    if len(values) < _LEAST_IN_CLASSES:
+    if len(values) < _MIN_CLASS_SAMPLES:
         return ()
     parts = zip(_classes(values, values), _classes(values, figures), strict=True)
     return tuple(LevelMean(float(part.mean()), float(of.mean())) for part, of in parts)
@@ -267,14 +267,14 @@ def _classes(values: Array, figures: Array) -> list[Array]:
     return np.array_split(figures[np.argsort(values, kind="stable")], classes)
 
 
-def _between_classes(values: Array, figures: Array) -> float:
+def _variance_of_class_means(values: Array, figures: Array) -> float:
     """Return the variance of the means of classes of equally many samples; NaN of too few.
 
     Args:
         values: (n,) of a parameter, which make the classes.
         figures: (n,) whose means are taken.
     """
-    if len(values) < _LEAST_IN_CLASSES:
+    if len(values) < _MIN_CLASS_SAMPLES:
         return np.nan
     parts = _classes(values, figures)
     means = np.array([part.mean() for part in parts])
@@ -282,24 +282,24 @@ def _between_classes(values: Array, figures: Array) -> float:
     return float(np.average((means - figures.mean()) ** 2, weights=sizes))
 
 
-def _drawn_again(balanced: _Balanced, rounding: float) -> Iterator[Array]:
+def _bootstrap_shares(balanced: _CompleteDesign, rounding: float) -> Iterator[Array]:
     """Yield the shares of a bootstrap: over samples, else over seeds; none of too few.
 
     What is the same everywhere, or has no figure somewhere, has no shares and is passed over.
     """
     if balanced.design.sampled:
         centre = _median(balanced.cube)
-        for places in _places_again(len(centre), _LEAST_SAMPLES):
+        for places in _resampled_indices(len(centre), _MIN_SAMPLES):
             if np.ptp(centre[places]) > rounding:
-                yield _first_order(balanced, centre[places], balanced.sampled[places])
+                yield _first_order_indices(balanced, centre[places], balanced.sampled[places])
     else:
-        for places in _places_again(balanced.cube.shape[-1], _LEAST_SEEDS):
+        for places in _resampled_indices(balanced.cube.shape[-1], _MIN_SEEDS):
             centre = _median(balanced.cube[..., places])
             if np.ptp(centre) > rounding:
-                yield _first_order(balanced, centre, balanced.sampled)
+                yield _first_order_indices(balanced, centre, balanced.sampled)
 
 
-def _places_again(count: int, least: int) -> Iterator[Ints]:
+def _resampled_indices(count: int, least: int) -> Iterator[Ints]:
     """Yield places that are drawn again from `count` of them, many times; none of too few."""
     draw = np.random.default_rng(0)
     for _ in range(_RESAMPLES if count >= least else 0):

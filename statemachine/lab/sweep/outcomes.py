@@ -13,8 +13,8 @@ from ..runs.floating import free_joint_of_robot
 from ..runs.robot import is_servo
 
 # Columns of the dataset, and the joints whose servos each is of.
-_TRACKED = {"tracking_error": JointType.HINGE, "slide_tracking_error": JointType.SLIDE}
-_LOWEST = 1 / 3  # of its height at the start: a base below it has fallen
+_TRACKING_COLUMNS = {"tracking_error": JointType.HINGE, "slide_tracking_error": JointType.SLIDE}
+_FALLEN_HEIGHT = 1 / 3  # of its height at the start: a base below it has fallen
 
 
 def unavailable_columns(models: Sequence[Model]) -> tuple[str, ...]:
@@ -22,7 +22,7 @@ def unavailable_columns(models: Sequence[Model]) -> tuple[str, ...]:
     columns: list[str] = []
     if all(free_joint_of_robot(model) is None for model in models):
         columns += ["base", "distance", "fell"]
-    for name, kind in _TRACKED.items():
+    for name, kind in _TRACKING_COLUMNS.items():
         if not any(len(_servos_of(model, kind)) for model in models):
             columns.append(name)
     if all(usual_site(model.site_names, model.moving_sites) is None for model in models):
@@ -78,7 +78,7 @@ class Outcomes:
             self._start = qpos[self._address : self._address + 7].copy()
             # The direction of the base's own axes that points up where the run starts.
             self._up = matrix_from_quat(self._start[3:])[2].copy()
-        self._tracking = {name: _Tracking(model, kind) for name, kind in _TRACKED.items()}
+        self._tracking = {name: _Tracking(model, kind) for name, kind in _TRACKING_COLUMNS.items()}
         self._acting = [each for each in self._tracking.values() if len(each.servos)]
         self._is_fallen = False
 
@@ -94,7 +94,7 @@ class Outcomes:
     def _lies(self, pose: Array) -> bool:
         """Tell whether a base at a pose (7,) has fallen: it is too low, or turned over."""
         height = self._start[2]  # below the origin there is no third of it
-        if height > 0 and pose[2] < _LOWEST * height:
+        if height > 0 and pose[2] < _FALLEN_HEIGHT * height:
             return True
         up = matrix_from_quat(pose[3:])[2]
         return bool(up @ self._up < 0)

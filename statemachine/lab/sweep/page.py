@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ...measures.text import NONE, fixed, listed, percent, quantity
+from ...measures.text import NO_NUMBER, fixed, listed, percent, quantity
 from ...show.blocks import Page, Table
 from ...show.first_screen import first_screen
 from ...show.templates import PageContent, render
@@ -18,8 +18,8 @@ from .results import SweepReportResult, SweepResult
 
 _NextStep = Literal["more runs", "more runs in words", "details", "details in words", ""]
 _DECIMALS = 2  # of a share
-_LONGEST = 230  # characters of a command: three lines of a terminal
-_TOGETHER = "(none alone)"  # the row of what no parameter explains alone
+_MAX_COMMAND_LENGTH = 230  # characters of a command: three lines of a terminal
+_INTERACTIONS_ROW = "(none alone)"  # the row of what no parameter explains alone
 
 
 @dataclass(frozen=True)
@@ -94,12 +94,12 @@ class SweepReportPage(PageContent):
 
     def _fits(self, words: str) -> bool:
         """Tell whether the command with some words behind it is short enough."""
-        return len(self.effects.command) + len(words) < _LONGEST
+        return len(self.effects.command) + len(words) < _MAX_COMMAND_LENGTH
 
     @property
     def not_shown(self) -> int:
         """How many parameters are left out of the table."""
-        shown = sum(1 for row in self.shares.rows if row[0] != _TOGETHER)
+        shown = sum(1 for row in self.shares.rows if row[0] != _INTERACTIONS_ROW)
         return len(self.effects.effects) - shown
 
     @property
@@ -186,7 +186,7 @@ def _shares(sweep: SweepEffects, rows: int) -> Table:
     )
     if len(sweep.known_effects) < 2 or rows == 1:
         return table
-    remainder = (_TOGETHER, _share(sweep.together), "", "", "")
+    remainder = (_INTERACTIONS_ROW, _share(sweep.together), "", "", "")
     return replace(table, rows=[*table.rows, remainder])
 
 
@@ -220,13 +220,13 @@ def _label(sweep: SweepEffects, place: int) -> str:
 def _percent(sweep: SweepEffects, place: int) -> str:
     """Return the share that has a place among the largest, in per cent."""
     known = sweep.known_effects
-    return percent(known[place].share) if len(known) > place else NONE
+    return percent(known[place].share) if len(known) > place else NO_NUMBER
 
 
 def _level(sweep: SweepEffects, effect: MainEffect, level: LevelMean | None) -> str:
     """Return a mean and the value of the parameter that it is at."""
     if level is None:
-        return NONE
+        return NO_NUMBER
     mean = quantity(level.mean, sweep.unit)
     return f"{mean} at {_value(sweep, effect.parameter, level.value)}"
 
@@ -238,7 +238,7 @@ def _setting(sweep: SweepEffects, cell: ExtremeCell) -> str:
 
 
 def _share(share: float | None) -> str:
-    return NONE if share is None else fixed(share, _DECIMALS)
+    return NO_NUMBER if share is None else fixed(share, _DECIMALS)
 
 
 def _value(sweep: SweepEffects, parameter: str, value: Value) -> str:

@@ -22,24 +22,27 @@ from ...interface.read_options import checked_read_option
 from ...interface.records import AS_WRITTEN, READ_OPTIONS
 from ...models import resolve
 from ..compare.perturbed import EXACT, parse_uncertainty
-from ..runs.controllers import function_place, is_function, parameters_of
-from ..runs.drive import check_length, cost_of_a_second, steps_in
+from ..runs.controllers import file_and_name_of, is_function, parameters_of
+from ..runs.drive import check_length, number_of_steps, wall_time_per_second
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
 from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc
-from .kinds import variable_names, with_kinds
+from .kinds import resolve_kinds, variable_names
 from .outcomes import unavailable_columns
 from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
 from .rows import require_parquet
-from .worker import digest_of, load_of
+from .worker import digest_of, load_model_of_sweep
 
 MODEL_OF_A_FUNCTION = "so101/scene"
-_MANY, _MOST = 10_000, 10**8  # cells that are told beforehand, and that the driver can remember
+_ANNOUNCED_CELLS, _MAX_CELLS = (
+    10_000,
+    10**8,
+)  # cells that are told beforehand, and that the driver can remember
 _SWITCHES = ("contacts", "actuation", "limits")
-_LOOKED_AT = 1000  # values of a factor; of more, the ends
+_CHECKED_VALUES = 1000  # values of a factor; of more, the ends
 
 
-def prepared(sweep: Sweep) -> PreparedSweep:
+def prepare_sweep(sweep: Sweep) -> PreparedSweep:
     """Check a sweep: names, values, models, engines.
 
     What one backend alone refuses is not an error: its cells will be rows that say so.
@@ -65,29 +68,31 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     files = {name: model_digest(resolve(name, sweep.menagerie)) for name in names}
     places = {name: os.path.abspath(name) if Path(name).is_file() else name for name in names}
     parameters = parameters_of(sweep.what) if function else ()
-    models, backends, said = _loaded(sweep, [*places.values()], _switched_off(sweep, typed))
-    called = function_place(sweep.what)[1] if function else ""
+    models, backends, said = _load_models(
+        sweep, [*places.values()], _options_of_check(sweep, typed)
+    )
+    called = file_and_name_of(sweep.what)[1] if function else ""
     can_vary = [name for name in parameters if name != "seed"]
-    factors = with_kinds(typed, variable_names(models, called, can_vary))
+    factors = resolve_kinds(typed, variable_names(models, called, can_vary))
     design = Design(factors, sweep.samples, sweep.design_seed)
     cells = design.size * sweep.seeds * len(backends)
-    if cells > _MOST:
+    if cells > _MAX_CELLS:
         raise BadInputError(
-            f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
-            "divide it into several"
+            f"{cells:.3g} cells are more than a sweep can hold, which is {_MAX_CELLS:,}: vary "
+            "less, or divide it into several"
         )
     if design.sampled:
         require_qmc()
     if sweep.samples & (sweep.samples - 1):
         said.append(f"{sweep.samples} samples are not a power of two: a Sobol sequence wants one")
-    if cells > _MANY:
+    if cells > _ANNOUNCED_CELLS:
         said.append(f"{cells:,} cells")
     for vary in factors:
         said += _check_values(vary, models)
     chosen: dict[str, Value] = {"seed": 0} if "seed" in parameters else {}
     chosen |= {vary.name: vary.extremes[0] for vary in factors if vary.kind == "parameter"}
     asked = sweep.scenario(chosen)
-    _refused(models, lambda model: _check_run(asked, factors, model))
+    _report_refusals(models, lambda model: _check_run(asked, factors, model))
     said += _overlaps_at_start(asked, models)
     spread = EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(","))
     return PreparedSweep(
@@ -100,13 +105,13 @@ def prepared(sweep: Sweep) -> PreparedSweep:
         function=digest_of(sweep.what) if function else "",
         parameters=parameters,
         spread=spread,
-        cost={model.backend: _cost(model, asked.seconds) for model in models},
+        cost={model.backend: _cell_time(model, asked.seconds) for model in models},
         said=tuple(said),
         unavailable=unavailable_columns(models),
     )
 
 
-def _switched_off(sweep: Sweep, factors: Sequence[Vary]) -> dict[str, OptionValue]:
+def _options_of_check(sweep: Sweep, factors: Sequence[Vary]) -> dict[str, OptionValue]:
     """Return the options with which models are loaded to be checked.
 
     What an experiment switches off is nothing to refuse; a switch that is varied may be off, and
@@ -136,7 +141,7 @@ def _versions(models: Sequence[Model]) -> dict[str, str]:
     return versions
 
 
-def _loaded(
+def _load_models(
     sweep: Sweep, places: Sequence[str], options: Mapping[str, OptionValue]
 ) -> tuple[list[Model], tuple[str, ...], list[str]]:
     """Return every variant on every backend, the backends that are here, and lines for the reader.
@@ -154,7 +159,7 @@ def _loaded(
     for backend in backend_names() if "all" in asked else asked:
         for place in places:
             try:
-                models.append(load_of(sweep, place, backend, options))
+                models.append(load_model_of_sweep(sweep, place, backend, options))
             except MissingEngineError as error:
                 if "all" not in asked:
                     raise
@@ -171,7 +176,7 @@ def _loaded(
     return models, tuple(here), said
 
 
-def _refused(models: Sequence[Model], check: Callable[[Model], object]) -> list[str]:
+def _report_refusals(models: Sequence[Model], check: Callable[[Model], object]) -> list[str]:
     """Raise what every model says of a check; else what some say, in lines."""
     errors: list[StateMachineError] = []
     for model in models:
@@ -187,7 +192,7 @@ def _refused(models: Sequence[Model], check: Callable[[Model], object]) -> list[
 def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
     """Raise what every model says of a factor's values; else what some say, in lines."""
     values = vary.extremes
-    if len(values) > _LOOKED_AT and vary.numeric:
+    if len(values) > _CHECKED_VALUES and vary.numeric:
         values = (min(values), max(values))  # pyright: ignore[reportArgumentType, reportCallIssue]
 
     def check(model: Model) -> None:
@@ -199,7 +204,7 @@ def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
             elif vary.kind == "state":
                 start_at(model, [(vary, value)])
 
-    said = _refused(models, check)
+    said = _report_refusals(models, check)
     return said + (beyond_ranges(models[0], vary) if vary.kind == "state" else [])
 
 
@@ -208,7 +213,7 @@ def _check_run(scenario: Scenario, factors: Sequence[Vary], model: Model) -> Non
     keyframe = scenario.on(model).keyframe
     if keyframe is not None:
         model.key_id(keyframe)
-    steps_in(model, scenario.seconds)
+    number_of_steps(model, scenario.seconds)
     variants: list[Model] = []
     for vary in factors:
         if vary.label == "timestep":
@@ -234,9 +239,9 @@ def _overlaps_at_start(scenario: Scenario, models: Sequence[Model]) -> list[str]
     return lines
 
 
-def _cost(model: Model, seconds: float) -> float:
+def _cell_time(model: Model, seconds: float) -> float:
     """Estimate the wall time of a cell [s]: a Model, a Data, the steps."""
     began = time.perf_counter()
     with make_data(model.replace(timestep=model.timestep)):
         begin = time.perf_counter() - began
-    return begin + cost_of_a_second(model) * seconds
+    return begin + wall_time_per_second(model) * seconds

@@ -19,19 +19,19 @@ from ...interface import Array, Ints
 from .rows import COLUMNS, DONE, require_parquet
 
 _NAME = re.compile(r"(\w+)(?:\[([0-9]+)\])?")
-_PLACE = re.compile(r"(\w+) ([xyz])")
+_AXIS_NAME = re.compile(r"(\w+) ([xyz])")
 _AXES = "xyz"
 _NUMBERS = ("int64", "double", "list<double>", "list<list<double>>")
-_NO_RESULT = ("seed", "sample_time")  # columns of numbers that say what was asked for
+_INPUT_COLUMNS = ("seed", "sample_time")  # columns of numbers that say what was asked for
 _KINDS = {
     column.name: column.type
     for column in COLUMNS
-    if column.type in _NUMBERS and column.name not in _NO_RESULT
+    if column.type in _NUMBERS and column.name not in _INPUT_COLUMNS
 }
 _UNITS = {column.name: column.unit for column in COLUMNS}
 _MOMENTS = ("sample_qpos", "sample_tip")
-_PLACES = ("tip", "sample_tip", "base")  # their three numbers are one length
-_TOUCH = "first_touch"
+_POSITION_COLUMNS = ("tip", "sample_tip", "base")  # their three numbers are one length
+_FIRST_TOUCH = "first_touch"
 # What a robot needs so that its runs have a column.
 NEEDED_FOR = {
     "base": "a floating base",
@@ -60,7 +60,7 @@ class SweepQuantity:
     def __str__(self) -> str:
         if self.index is None:
             return self.column
-        if self.column in _PLACES and self.index < len(_AXES):
+        if self.column in _POSITION_COLUMNS and self.index < len(_AXES):
             return f"{self.column} {_AXES[self.index]}"
         return f"{self.column}[{self.index}]"
 
@@ -98,8 +98,8 @@ def parse_quantity(text: str) -> SweepQuantity:
     """
     if not isinstance(text, str):
         raise BadInputError(f"a quantity is a name, such as energy or base x; got {shown(text)}")
-    place = _PLACE.fullmatch(text)
-    if place and place[1] in _PLACES:
+    place = _AXIS_NAME.fullmatch(text)
+    if place and place[1] in _POSITION_COLUMNS:
         return SweepQuantity(place[1], _AXES.index(place[2]))
     words = text.replace(" ", "_")
     match = _NAME.fullmatch(words)
@@ -156,12 +156,12 @@ def cell_values(
     table = table.take(np.array(rows, dtype=int))
     shape = len(backends), len(points), seeds
     at = np.array(places, dtype=int).reshape(-1, 3)
-    numbers = _placed(_numbers(table, quantity), at, shape)
+    numbers = _arranged_by_cell(_numbers(table, quantity), at, shape)
     if len(backends) == 1:
         _check_is_one_number(quantity, numbers.shape[-1])
         values = numbers[0, ..., 0, 0]
-    elif quantity.column == _TOUCH:
-        ends = _placed(_numbers(table, SweepQuantity("time")), at, shape)[..., 0, 0]
+    elif quantity.column == _FIRST_TOUCH:
+        ends = _arranged_by_cell(_numbers(table, SweepQuantity("time")), at, shape)[..., 0, 0]
         values = _touch_gap(numbers[..., 0, 0], ends)
     else:
         values = _gap(quantity, numbers[0] - numbers[1])
@@ -183,7 +183,7 @@ def check_is_one_number(quantity: SweepQuantity) -> None:
         BadInputError: It does.
     """
     kind = _KINDS[quantity.column]
-    if quantity.index is None and quantity.column in _PLACES:
+    if quantity.index is None and quantity.column in _POSITION_COLUMNS:
         _check_is_one_number(quantity, len(_AXES))
     elif quantity.column in _MOMENTS:
         _check_is_one_number(quantity, 1)
@@ -229,7 +229,7 @@ def _gap(quantity: SweepQuantity, difference: Array) -> Array:
         quantity: What of; the numbers of a place are one length, of others the largest counts.
         difference: (p, s, m, d) of the engines; NaN where one has no run.
     """
-    if quantity.column in _PLACES and quantity.index is None:
+    if quantity.column in _POSITION_COLUMNS and quantity.index is None:
         return _largest(np.linalg.norm(difference, axis=-1))
     return _largest(_largest(np.abs(difference)))
 
@@ -255,7 +255,7 @@ def _largest(values: Array) -> Array:
     return np.fmax.reduce(values, axis=-1, initial=np.nan)
 
 
-def _placed(numbers: Array, at: Ints, shape: tuple[int, int, int]) -> Array:
+def _arranged_by_cell(numbers: Array, at: Ints, shape: tuple[int, int, int]) -> Array:
     """Put numbers (n, m, d) of cells to their backend, point and seed: (b, p, s, m, d)."""
     placed: Array = np.full((*shape, *numbers.shape[1:]), np.nan)
     placed[tuple(at.T)] = numbers

@@ -12,13 +12,13 @@ from ...measures.text import listed
 from ...models import AnyPath
 from ...processes import checked_jobs
 from ..runs.reporter import QUIET, Reporter
-from . import prepared, run_sweep
+from . import prepare_sweep, run_sweep
 from .analysis import SweepEffects, effects, without_folder
 from .quantities import NEEDED_FOR, SweepQuantity, check_is_one_number, parse_quantity
 from .request import PreparedSweep, Sweep
 from .summary import SweepSummary
 
-_NO_NAME = "the folder of a sweep has no name: say --out DIR, or --report DIR"
+_MISSING_FOLDER = "the folder of a sweep has no name: say --out DIR, or --report DIR"
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class SweepRequest:
 
     def __post_init__(self) -> None:
         if self.folder is not None and not os.fspath(self.folder):
-            raise BadInputError(_NO_NAME)
+            raise BadInputError(_MISSING_FOLDER)
         checked_jobs(self.jobs)
 
 
@@ -97,7 +97,7 @@ class SweepReportRequest:
 
     def __post_init__(self) -> None:
         if not os.fspath(self.folder):
-            raise BadInputError(_NO_NAME)
+            raise BadInputError(_MISSING_FOLDER)
         _check_report(self.quantity, self.backends)
 
 
@@ -121,12 +121,12 @@ def answer(request: SweepRequest, reporter: Reporter = QUIET) -> SweepSummary:
 
     Raises:
         BadInputError: A value is invalid, or the folder is of another sweep, in use, or none.
-        StateMachineError: As `prepared` does.
+        StateMachineError: As `prepare_sweep` does.
         OSError: A file cannot be written; what was written is kept.
     """
     if request.folder is None:
         raise BadInputError("a sweep writes a dataset: say where with --out DIR")
-    return _run(prepared(request.sweep), request, Path(request.folder), reporter)
+    return _run(prepare_sweep(request.sweep), request, Path(request.folder), reporter)
 
 
 def answer_effects(request: SweepEffectsRequest, reporter: Reporter = QUIET) -> SweepRun:
@@ -136,10 +136,10 @@ def answer_effects(request: SweepEffectsRequest, reporter: Reporter = QUIET) -> 
         BadInputError: As of `answer`; no robot of the sweep has that quantity; no cell has it, or
             it is not one number.
         UnknownNameError: The sweep has no such engine.
-        StateMachineError: As `prepared` does.
+        StateMachineError: As `prepare_sweep` does.
         OSError: A file cannot be written; what was written is kept.
     """
-    ready = prepared(request.run.sweep)
+    ready = prepare_sweep(request.run.sweep)
     if request.quantity is not None:
         _check_quantity(parse_quantity(request.quantity), ready)
     if request.run.folder is not None:

@@ -30,12 +30,12 @@ from .manifest import (
 )
 from .rows import columns_of
 
-_LONGEST = 7 * 86400.0  # that a cell may take [s]
+_MAX_TIMEOUT = 7 * 86400.0  # that a cell may take [s]
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The request of a sweep; nothing is loaded before it is `prepared`.
+    """The request of a sweep; nothing is loaded before `prepare_sweep`.
 
     Attributes:
         what: An experiment, or FILE.py:FUNCTION, called as function(model, data, …).
@@ -82,7 +82,7 @@ class Sweep:
         _check_at_least(1, "moments", self.moments)
         if not self.backends:
             raise BadInputError("a sweep is of at least one backend; none is named")
-        if not 0 < self.timeout <= _LONGEST:
+        if not 0 < self.timeout <= _MAX_TIMEOUT:
             raise BadInputError(f"--timeout must be above 0 s; got {self.timeout:g}")
         if not is_function(self.what):
             scenario(self.what)  # raises an error where there is none of this name
@@ -246,14 +246,14 @@ class PreparedSweep:
             columns[column.name] = {"unit": column.unit, "meaning": column.meaning}
         return {
             **self.provenance(),
-            "factors": [_recorded(vary) for vary in self.design.factors],
+            "factors": [_recorded_factor(vary) for vary in self.design.factors],
             "points": self.design.size,
             "cells": len(self),
             "columns": columns,
         }
 
 
-def _recorded(vary: Vary) -> RecordedFactor:
+def _recorded_factor(vary: Vary) -> RecordedFactor:
     """Return a factor as plain values."""
     return {
         "name": vary.name,
@@ -267,7 +267,7 @@ def _recorded(vary: Vary) -> RecordedFactor:
 
 
 _AXES = ("x", "y", "z")
-_STREAM = 1  # of a seed: not that of the commands which an experiment draws
+_SPREAD_STREAM = 1  # of a seed: not that of the commands which an experiment draws
 
 
 def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str, OptionValue]:
@@ -283,7 +283,7 @@ def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str
             is_a_count = vary.name == "substeps" and isinstance(value, float) and value.is_integer()
             options[vary.name] = int(value) if is_a_count else value
             continue
-        own, place = _own(model, vary)
+        own, place = _model_value(model, vary)
         if place is None:
             assert isinstance(value, float), "what is times the model's own is a number"
             options[vary.name] = own * value
@@ -297,7 +297,7 @@ def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str
     return options
 
 
-def _own(model: Model, vary: Vary) -> tuple[Array | float, int | None]:
+def _model_value(model: Model, vary: Vary) -> tuple[Array | float, int | None]:
     """Return the model's own value of an option, and which of its numbers is meant; None for all.
 
     Raises:
@@ -308,7 +308,7 @@ def _own(model: Model, vary: Vary) -> tuple[Array | float, int | None]:
         if isinstance(own, np.ndarray):
             # Of several numbers of each, as the three frictions of a geom, the first is meant.
             values = np.array(own[:, 0] if own.ndim == 2 else own, dtype=np.float64)
-            return values, _place(model, vary, owner, len(values)) if vary.place else None
+            return values, _entry_index(model, vary, owner, len(values)) if vary.place else None
         if isinstance(own, (int, float)) and not (isinstance(own, bool) or vary.place):
             return float(own), None
     missing = f"{vary.label} cannot be varied like this: a model has no {vary.name} of its own"
@@ -317,7 +317,7 @@ def _own(model: Model, vary: Vary) -> tuple[Array | float, int | None]:
     raise BadInputError(missing)
 
 
-def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
+def _entry_index(model: Model, vary: Vary, owner: str, length: int) -> int:
     """Return which number of an array is meant: by joint, body, …, axis or its own number."""
     if is_count(vary.place):
         if int(vary.place) >= length:
@@ -343,9 +343,9 @@ def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict
         if isinstance(value, (bool, str)):
             raise BadInputError(f"{vary.label} wants numbers; got {value}")
         if vary.name == "qpos":
-            qpos[_place(model, vary, "qpos", model.nq)] = value
+            qpos[_entry_index(model, vary, "qpos", model.nq)] = value
         else:
-            qvel[_place(model, vary, "dof", model.nv)] = value
+            qvel[_entry_index(model, vary, "dof", model.nv)] = value
     return qpos, qvel
 
 
@@ -367,7 +367,7 @@ def beyond_ranges(model: Model, vary: Vary) -> list[str]:
     return []
 
 
-def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Array:
+def spread_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Array:
     """Return a start (nq,) near another one, drawn from a seed; that of seed 0 is the same.
 
     Each coordinate moves by at most the spread, every value as likely as any other: a hinge and
@@ -376,7 +376,7 @@ def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Ar
     """
     if seed == 0:
         return qpos.copy()
-    draw = np.random.default_rng([seed, _STREAM])
+    draw = np.random.default_rng([seed, _SPREAD_STREAM])
     moved = displaced(
         model, qpos, spread, draw, lambda: draw.uniform(-1, 1), lambda: draw.uniform(0, 1)
     )

@@ -102,11 +102,15 @@ COLUMNS = (
     Column("engine_version", "string", "", "version of the engine"),
     Column("library_version", "string", "", "version of this library"),
 )
-_SOON, _LATE, _SHARE = 5.0, 60.0, 0.02  # seconds between two files, and of the time so far
-_MOST = 20_000  # rows of a file
+_MIN_PAUSE, _MAX_PAUSE, _PAUSE_SHARE = (
+    5.0,
+    60.0,
+    0.02,
+)  # seconds between two files, and of the time so far
+_MAX_ROWS = 20_000  # rows of a file
 
 
-def known(figure: Any) -> float | None:
+def finite_or_none(figure: Any) -> float | None:
     """Return a figure; None where it is not a finite number."""
     return float(figure) if math.isfinite(figure) else None
 
@@ -168,9 +172,9 @@ class RowWriter:
             self._waiting.setdefault(row["backend"], []).append(row)
         now = time.monotonic()
         # Seldom in a long sweep, so that its files stay few: what a kill loses is so much work.
-        pause = min(_LATE, max(_SOON, _SHARE * (now - self._began)))
+        pause = min(_MAX_PAUSE, max(_MIN_PAUSE, _PAUSE_SHARE * (now - self._began)))
         most = max(map(len, self._waiting.values()), default=0)
-        if most >= _MOST or now - self._flushed > pause:
+        if most >= _MAX_ROWS or now - self._flushed > pause:
             self.flush()
 
     def flush(self) -> None:
@@ -185,7 +189,7 @@ class RowWriter:
         self._flushed = time.monotonic()
 
 
-def _parts(folder: Path) -> list[Path]:
+def _dataset_files(folder: Path) -> list[Path]:
     return sorted((folder / CELLS).glob("backend=*/part-*.parquet"))
 
 
@@ -195,13 +199,13 @@ def outcome_of(row: Mapping[str, Any]) -> str:
     return row["status"] if error is None else error
 
 
-def counted(folder: Path) -> Iterator[tuple[str, str]]:
+def iter_cell_outcomes(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the id of every cell that the dataset has, and what became of it.
 
     Raises:
         BadInputError: A file does not belong to the dataset.
     """
-    for part in _parts(folder):
+    for part in _dataset_files(folder):
         for row in _read(part, ["cell", "status", "error_class"]).to_pylist():
             yield row["cell"], outcome_of(row)
 
@@ -212,7 +216,7 @@ def remove_failed(folder: Path) -> None:
     A cell without a row is missing: whoever goes on runs it, however this ended.
     """
     arrow, _ = require_parquet()
-    for part in _parts(folder):
+    for part in _dataset_files(folder):
         table = _read(part)
         done = table.filter(arrow.compute.equal(table["status"], DONE))
         if not done.num_rows:
@@ -231,7 +235,7 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
     arrow, parquet = require_parquet()
     check_is_file(part)
     content = part.read_bytes()
-    if _sealed(content) != content:
+    if _with_digest(content) != content:
         raise BadInputError(
             f"{part} cannot be read: it is not as it was written. Remove it, and its cells are run "
             "again"
@@ -251,10 +255,10 @@ def _write(part: Path, table: Any) -> None:
     ) as writer:
         writer.write_table(table)
         writer.add_key_value_metadata({_DIGEST.decode(): "0" * _DIGITS})
-    replace_bytes(part, _sealed(out.getvalue()))
+    replace_bytes(part, _with_digest(out.getvalue()))
 
 
-def _sealed(content: bytes) -> bytes:
+def _with_digest(content: bytes) -> bytes:
     """Return a file with the digest of all its other bytes where its footer has a place for it."""
     start = content.rfind(_DIGEST) + len(_DIGEST) + 2  # behind the key a type and a length
     before, after = content[:start], content[start + _DIGITS :]
@@ -272,7 +276,7 @@ def read_cells(folder: str | Path) -> Any:
     """
     arrow, _ = require_parquet()
     tables: list[Any] = []
-    for part in _parts(Path(folder)):
+    for part in _dataset_files(Path(folder)):
         table = _read(part)
         backend = unquote(part.parent.name.partition("=")[2])
         names = arrow.repeat(arrow.scalar(backend, arrow.string()), table.num_rows)

@@ -34,22 +34,24 @@ from ...models import resolve
 from ...processes.parallel import silence_child
 from ..recordings.energies import energies
 from ..runs.controllers import function_file
-from ..runs.drive import check_length, drive, steps_in
+from ..runs.drive import check_length, drive, number_of_steps
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from .design import Value, Vary, digest
 from .outcomes import Outcomes
-from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
-from .rows import DONE, FAILED, known
+from .request import PreparedSweep, Sweep, SweepCell, options_at, spread_start, start_at
+from .rows import DONE, FAILED, finite_or_none
 
 T = TypeVar("T")
 Row = dict[str, Any]
 
-_TO_LOAD = 60.0  # seconds that an engine and a model may take at least
-_GRACE = 10.0  # seconds beyond a time-out, after which a process that still hangs ends itself
-_CACHED = 16  # of the latest Models
-_LOOKED = 64  # steps after which the clock is looked at
-_ONE_AT_A_TIME = threading.Lock()  # a Dask worker may have several threads, and an engine must not
+_LOADING_SECONDS = 60.0  # seconds that an engine and a model may take at least
+_GRACE_SECONDS = (
+    10.0  # seconds beyond a time-out, after which a process that still hangs ends itself
+)
+_MAX_CACHED_MODELS = 16  # of the latest Models
+_CLOCK_STEPS = 64  # steps after which the clock is looked at
+_ENGINE_LOCK = threading.Lock()  # a Dask worker may have several threads, and an engine must not
 
 
 def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> list[Row]:
@@ -61,14 +63,14 @@ def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> li
         own: Whether this process is there for nothing else: it may then be kept silent, and ended.
     """
     if own:
-        _settle()
-    with _ONE_AT_A_TIME, warnings.catch_warnings(), silence():
+        _prepare_process()
+    with _ENGINE_LOCK, warnings.catch_warnings(), silence():
         warnings.simplefilter("ignore")  # the driver has loaded the same models, and passed them on
         return [_row(ready, cell, own) for cell in cells]
 
 
 @functools.cache
-def _settle() -> None:
+def _prepare_process() -> None:
     """Prepare this process once: its output is discarded, and it ends when its driver does."""
     silence_child()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
@@ -98,12 +100,12 @@ def _row(ready: PreparedSweep, cell: SweepCell, own: bool) -> Row:
     row: Row = {}
     failure: BaseException | None = None
     try:
-        with _limited(max(limit, _TO_LOAD), own):
+        with _time_limit(max(limit, _LOADING_SECONDS), own):
             model, options, scenario = _model(ready, cell, row)
-        with _limited(limit, own):
+        with _time_limit(limit, own):
             _run(ready, cell, model, options, scenario, row)
     except _OutOfTimeError:
-        failure = _timed_out(limit)
+        failure = _timeout_error(limit)
     except Exception as error:  # of any kind: it belongs into the row
         failure = error
     return {**row, **row_of(ready, cell, failure), "wall_seconds": time.perf_counter() - began}
@@ -114,7 +116,7 @@ class _OutOfTimeError(BaseException):
 
 
 @contextmanager
-def _limited(seconds: float, own: bool) -> Iterator[None]:
+def _time_limit(seconds: float, own: bool) -> Iterator[None]:
     """Raise `_OutOfTimeError` in what takes too long; end a process that does not even raise it.
 
     A run looks at the clock itself. This is for what does not come back from the user's function
@@ -131,7 +133,7 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
     if timer:
         signal.signal(signal.SIGALRM, end)
         signal.setitimer(signal.ITIMER_REAL, seconds)
-    faulthandler.dump_traceback_later(seconds + _GRACE, exit=True, file=sys.__stderr__ or 2)
+    faulthandler.dump_traceback_later(seconds + _GRACE_SECONDS, exit=True, file=sys.__stderr__ or 2)
     try:
         yield
     finally:
@@ -140,7 +142,7 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
         faulthandler.cancel_dump_traceback_later()
 
 
-def _timed_out(seconds: float) -> TimedOutError:
+def _timeout_error(seconds: float) -> TimedOutError:
     return TimedOutError(f"not at its end after {seconds:g} s on the clock")
 
 
@@ -153,7 +155,7 @@ def _model(
         BadInputError: The model or the function is another one than that of the sweep.
     """
     sweep, wrong = ready.sweep, "is not the file of the sweep: it changed, or is another here"
-    if not _is_same(ready):
+    if not _is_unchanged(ready):
         raise BadInputError(f"{function_file(sweep.what).name} {wrong}")
     chosen: dict[str, Value] = {"seed": cell.seed} if "seed" in ready.parameters else {}
     chosen |= {vary.name: value for vary, value in ready.settings(cell, "parameter")}
@@ -171,9 +173,9 @@ def _model(
     key = repr((name, ready.files[name], cell.backend, first, sweep))
 
     def loaded() -> tuple[Model, Scenario]:
-        if not _is_same(ready, name):
+        if not _is_unchanged(ready, name):
             raise BadInputError(f"{name} {wrong}")
-        base = load_of(sweep, ready.places[name], cell.backend, first)
+        base = load_model_of_sweep(sweep, ready.places[name], cell.backend, first)
         return base, scenario.on(base)
 
     base, on_robot = _cached(key, loaded)
@@ -194,52 +196,54 @@ def _model_name(ready: PreparedSweep, cell: SweepCell) -> str:
     return next(iter(ready.files))
 
 
-def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, OptionValue]) -> Model:
+def load_model_of_sweep(
+    sweep: Sweep, place: str, backend: str, options: Mapping[str, OptionValue]
+) -> Model:
     """Load a model of a sweep as all of its cells do."""
     return parse_backend(backend).load_to_run(place, menagerie=sweep.menagerie, **options)
 
 
-_LATEST: dict[str, Any] = {}
+_MODEL_CACHE: dict[str, Any] = {}
 
 
 def _cached(key: str, make: Callable[[], T]) -> T:
     """Return the cached result of `make` for a key; an error is a result too."""
     try:
-        result: Any = _LATEST.pop(key) if key in _LATEST else make()
+        result: Any = _MODEL_CACHE.pop(key) if key in _MODEL_CACHE else make()
     except Exception as error:
         result = error
-    _LATEST[key] = result  # the last one, so that the first is the one longest not asked for
-    if len(_LATEST) > _CACHED:
-        del _LATEST[next(iter(_LATEST))]
+    _MODEL_CACHE[key] = result  # the last one, so that the first is the one longest not asked for
+    if len(_MODEL_CACHE) > _MAX_CACHED_MODELS:
+        del _MODEL_CACHE[next(iter(_MODEL_CACHE))]
     if isinstance(result, Exception):
         raise result.with_traceback(None)
     return result
 
 
-def _on_default(model: Model) -> Model:
+def _cached_on_default(model: Model) -> Model:
     """Return `on_default` of a Model, whose file is read for the first cell only."""
     here = model.backend == DEFAULT
     return model if here else _cached(f"{model.path} on {DEFAULT}", lambda: on_default(model))
 
 
-_USED: dict[int, Data] = {}  # by the id of its Model, which it keeps
+_REUSABLE_DATA: dict[int, Data] = {}  # by the id of its Model, which it keeps
 
 
 @contextmanager
-def _used_before(model: Model) -> Iterator[Data]:
+def _reused_data(model: Model) -> Iterator[Data]:
     """Yield a Data that an earlier cell used, if there is one: making one costs more than `reset`.
 
     Not for a user's function, which may have changed what `reset` does not set back.
     """
-    data = _USED.pop(id(model), None) or make_data(model)
+    data = _REUSABLE_DATA.pop(id(model), None) or make_data(model)
     try:
         yield data
     except BaseException:
         data.close()
         raise
-    _USED[id(model)] = data
-    if len(_USED) > _CACHED:
-        _USED.pop(next(iter(_USED))).close()
+    _REUSABLE_DATA[id(model)] = data
+    if len(_REUSABLE_DATA) > _MAX_CACHED_MODELS:
+        _REUSABLE_DATA.pop(next(iter(_REUSABLE_DATA))).close()
 
 
 def _run(
@@ -257,19 +261,19 @@ def _run(
     """
     sweep, deadline = ready.sweep, time.monotonic() + ready.sweep.timeout
     check_length(model, scenario.seconds)
-    total = steps_in(model, scenario.seconds)
+    total = number_of_steps(model, scenario.seconds)
     controller = scenario.controller(model, cell.seed)
     moments = np.round(np.arange(1, sweep.moments + 1) * total / sweep.moments).astype(int)
     sampled = set(moments[moments > 0].tolist())
     row["sample_time"], samples = [], list[Array]()
     speed, fastest = np.zeros(model.nv), np.zeros(model.nv)
-    with make_data(model) if ready.function else _used_before(model) as data:
+    with make_data(model) if ready.function else _reused_data(model) as data:
         reset(model, data, scenario.keyframe)
         qpos, qvel = data.qpos, data.qvel  # the same arrays for the whole life of the Data
         starts = start_at(model, ready.settings(cell, "state"))
         for values, start in zip((qpos, qvel), starts, strict=True):
             values[list(start)] = list(start.values())
-        qpos[:] = drawn_start(model, qpos, ready.spread, cell.seed)
+        qpos[:] = spread_start(model, qpos, ready.spread, cell.seed)
         at_start = qpos.copy(), qvel.copy()
         outcomes = Outcomes(model, qpos)
         try:
@@ -286,8 +290,8 @@ def _run(
                 if k in sampled:
                     samples.append(qpos.copy())
                     row["sample_time"].append(float(now))
-                if not k % _LOOKED and time.monotonic() > deadline:
-                    raise _timed_out(sweep.timeout)
+                if not k % _CLOCK_STEPS and time.monotonic() > deadline:
+                    raise _timeout_error(sweep.timeout)
         finally:
             row["max_qvel"] = float(np.nan_to_num(fastest).max(initial=0.0))
             row["qpos"], row["qvel"] = qpos.tolist(), qvel.tolist()
@@ -295,14 +299,16 @@ def _run(
             row |= outcomes.columns(qpos)
             row["sample_qpos"] = [sample.tolist() for sample in samples]
         states = np.array([at_start[0], qpos]), np.array([at_start[1], qvel])
-        row["sample_tip"] = tips = _tips(model, data, samples)
+        row["sample_tip"] = tips = _tip_positions(model, data, samples)
         row["tip"] = tips[-1] if tips else None
     defaults = parse_backend(cell.backend).defaults
-    both, _ = energies(model, defaults, *states, options.get("gravity"), _on_default, _used_before)
-    row["energy_start"], row["energy"] = map(known, both.sum(axis=1))
+    both, _ = energies(
+        model, defaults, *states, options.get("gravity"), _cached_on_default, _reused_data
+    )
+    row["energy_start"], row["energy"] = map(finite_or_none, both.sum(axis=1))
 
 
-def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
+def _tip_positions(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
     """Return positions of the usual site (3,) [m] in world axes, one for each sample of qpos.
 
     `data` of the run that ended serves to compute them; None where there is no such site.
@@ -324,7 +330,7 @@ def digest_of(function: str) -> str:
     return digest(function_file(function).read_text(encoding="utf-8", errors="replace"))
 
 
-def _is_same(ready: PreparedSweep, model: str = "") -> bool:
+def _is_unchanged(ready: PreparedSweep, model: str = "") -> bool:
     """Return whether a model's file, or else the user's, is the one of the sweep."""
     try:
         if model:
@@ -335,7 +341,7 @@ def _is_same(ready: PreparedSweep, model: str = "") -> bool:
         return False
 
 
-def differing(ready: PreparedSweep, version: str) -> str:
+def environment_difference(ready: PreparedSweep, version: str) -> str:
     """Return how this machine differs from the driver of a sweep; "" if it does not.
 
     Args:
@@ -343,5 +349,5 @@ def differing(ready: PreparedSweep, version: str) -> str:
         version: Of the driver's library.
     """
     wrong = [] if version == __version__ else ["statemachine"]
-    wrong += [name for name in ready.files if not _is_same(ready, name)]
-    return listed(wrong if _is_same(ready) else [*wrong, ready.sweep.what])
+    wrong += [name for name in ready.files if not _is_unchanged(ready, name)]
+    return listed(wrong if _is_unchanged(ready) else [*wrong, ready.sweep.what])

@@ -16,7 +16,7 @@ from ...show.templates import PageContent, render
 from .fingertip_result import SAME_FRAME, FingertipResult, FrameOffset, TipGap
 
 _Choice = Literal["asked for", "usual site", "only end", "ends"]
-_SHOWN = 12  # rows of a table of tips
+_MAX_ROWS = 12  # rows of a table of tips
 _TINY = 5e-6  # [m or rad] that two decimals of a millimetre or a degree do not show
 
 
@@ -209,7 +209,7 @@ def table_of_tips(engine: str, result: FingertipResult) -> Table:
     columns["rotation matrix, worst"] = _rotation_worst
     columns["distance of the two frames"] = _frames
     return Table.of(
-        result.tips[:_SHOWN],
+        result.tips[:_MAX_ROWS],
         columns,
         title=f"{engine} against the witness, the worst of {len(result.tips)} ({result.grade})",
         wide=("distance of the two frames",),

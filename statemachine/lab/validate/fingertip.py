@@ -20,7 +20,7 @@ from ...kinematics import Kinematics
 from ...models import AnyPath
 from ...rotations import Placement, angle_between
 from ...witness import labels
-from ..runs.drive import Progress, silent
+from ..runs.drive import Progress, no_progress
 from ..runs.provenance import provenance
 from ..runs.readings import Tip, tips_of
 from .fingertip_poses import checked_poses, engine_poses, random_qpos, relative
@@ -46,7 +46,7 @@ def certify(
     site: str | None = None,
     witness: AnyPath | None = None,
     witness_frame: str | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> FingertipResult:
     """Compare poses on an engine with Pinocchio's, at random poses within the limits.
 
@@ -74,7 +74,7 @@ def certify(
     tips = tips_of(model, site)
     if witness_frame is not None and len(tips) > 1:
         raise BadInputError("--witness-frame names one frame: say which with --site")
-    asked = _ask(model, tips, witness, witness_frame)
+    asked = _choose_witness(model, tips, witness, witness_frame)
     parts, known = asked.parts, asked.parts.kinematics
     joints = [pair.joint for pair in parts.joints]
     configurations = random_qpos(model, joints, wanted, seed)
@@ -131,7 +131,7 @@ class _Witness:
         return "/".join(self.parts.kinematics.path.parts[-2:])
 
 
-def _ask(
+def _choose_witness(
     model: Model,
     tips: list[Tip],
     file: AnyPath | None,
@@ -147,18 +147,18 @@ def _ask(
     """
     if file is not None:
         parts = witness_parts(model, Kinematics(file))
-        return _matched(parts, _common(parts, tips), witness_frame)
+        return _with_frames(parts, _common_tips(parts, tips), witness_frame)
     try:
-        return _matched(witness_parts(model, Kinematics(model.path)), tips, witness_frame)
+        return _with_frames(witness_parts(model, Kinematics(model.path)), tips, witness_frame)
     except (ModelError, BadInputError, UnknownNameError) as error:
         if witness_frame is not None or model.compiled is None:
             raise
         reason = str(error)
     parts = witness_parts(model, Kinematics.same_reading(model))
-    return replace(_matched(parts, tips, None), reason=reason)
+    return replace(_with_frames(parts, tips, None), reason=reason)
 
 
-def _common(parts: WitnessParts, tips: list[Tip]) -> list[Tip]:
+def _common_tips(parts: WitnessParts, tips: list[Tip]) -> list[Tip]:
     """Return those of several tips that another file has, too; all of them if it has none."""
     if len(tips) == 1:
         return tips
@@ -172,7 +172,7 @@ def _common(parts: WitnessParts, tips: list[Tip]) -> list[Tip]:
     return common if common else tips
 
 
-def _matched(parts: WitnessParts, tips: list[Tip], witness_frame: str | None) -> _Witness:
+def _with_frames(parts: WitnessParts, tips: list[Tip], witness_frame: str | None) -> _Witness:
     """Return a witness with what each tip is for it.
 
     Raises:
@@ -220,11 +220,11 @@ def _gaps(asked: _Witness, configurations: Array, progress: Progress) -> list[Ti
             frames=frame.offset,
             default_pose=default_pose,
         )
-        gaps.append(_measured(gap, places, theirs))
+        gaps.append(_with_differences(gap, places, theirs))
     return gaps
 
 
-def _measured(gap: TipGap, ours: Placement, theirs: Placement) -> TipGap:
+def _with_differences(gap: TipGap, ours: Placement, theirs: Placement) -> TipGap:
     """Return a gap with its differences, if both put the same frame somewhere.
 
     Args:

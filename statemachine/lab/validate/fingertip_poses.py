@@ -14,8 +14,8 @@ from ...show.drawing.scene import posed
 from ..runs.drive import Progress
 from ..runs.readings import Tip
 
-_MOST = 1_000_000
-_WIDE = 100.0  # a range beyond this [m or rad] is not a limit
+_MAX_POSES = 1_000_000
+_UNLIMITED_RANGE = 100.0  # a range beyond this [m or rad] is not a limit
 
 
 def checked_poses(poses: int, seed: int) -> int:
@@ -25,9 +25,9 @@ def checked_poses(poses: int, seed: int) -> int:
         BadInputError: One of them is not a whole number in range.
     """
     wanted = as_count(poses, "poses")
-    if not 2 <= wanted <= _MOST:
+    if not 2 <= wanted <= _MAX_POSES:
         raise BadInputError(
-            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
+            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MAX_POSES:,}; "
             f"got {wanted:,}"
         )
     if seed < 0:
@@ -66,7 +66,7 @@ def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> A
 def _drawn_range(model: Model, joint: int, kind: JointType) -> tuple[float, float]:
     """Return the range in which a hinge [rad] or a slide [m] is drawn."""
     low, high = model.jnt_range[joint]
-    if model.jnt_limited[joint] and high - low <= _WIDE:
+    if model.jnt_limited[joint] and high - low <= _UNLIMITED_RANGE:
         return low, high
     return (-np.pi, np.pi) if kind == JointType.HINGE else (-1.0, 1.0)
 

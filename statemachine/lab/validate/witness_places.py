@@ -22,9 +22,9 @@ from ..runs.readings import Tip
 from .fingertip_result import CommonBody, FrameOffset
 from .witness_parts import JointPair, PartsByName, WitnessFrame, WitnessParts, frame_kind
 
-_ONE_PLACE = 1e-6  # [m] and [rad] within which two frames without a common name are one
-_ODD = 1e-4  # [m] at which a mismatch of a joint's place counts half
-_CLEARLY = 0.5  # by how much another base must fit better
+_SAME_PLACE_TOLERANCE = 1e-6  # [m] and [rad] within which two frames without a common name are one
+_HALF_WEIGHT_DISTANCE = 1e-4  # [m] at which a mismatch of a joint's place counts half
+_MIN_BETTER_FIT = 0.5  # by how much another base must fit better
 
 
 def witness_parts(model: Model, kinematics: Kinematics) -> WitnessParts:
@@ -234,7 +234,7 @@ def _best_base(left: GroupTree, right: GroupTree, bases: Sequence[_Base]) -> tup
     ]
     misfits = [_misfit(matching) for _, matching in fitting]
     least = min(misfits)
-    best = next(k for k, misfit in enumerate(misfits) if misfit <= least + _CLEARLY)
+    best = next(k for k, misfit in enumerate(misfits) if misfit <= least + _MIN_BETTER_FIT)
     return fitting[best]
 
 
@@ -247,13 +247,15 @@ def _misfit(matching: Matching) -> float:
             continue
         hung = pair.right.place.inverse @ above.align @ pair.left.place
         gap = hung.distance(pair.align) + hung.angle(pair.align) / 10
-        sum_of_misfits += gap / (gap + _ODD)
+        sum_of_misfits += gap / (gap + _HALF_WEIGHT_DISTANCE)
     return sum_of_misfits
 
 
 def _are_one_place(frame: Placement, other: Placement) -> bool:
     """Tell whether two frames are one but for rounding."""
-    return frame.distance(other) < _ONE_PLACE and frame.angle(other) < _ONE_PLACE
+    return (
+        frame.distance(other) < _SAME_PLACE_TOLERANCE and frame.angle(other) < _SAME_PLACE_TOLERANCE
+    )
 
 
 def _between(tree: GroupTree, number: int, base: int) -> list[int]:

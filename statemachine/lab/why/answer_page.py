@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from ...engines.description.lines import SourceLine
-from ...measures.text import NONE, quantity
+from ...measures.text import NO_NUMBER, quantity
 from ...show.blocks import Text
 from ...show.markdown import plain_text
 from ...show.templates import PageContent, render_blocks
 from ..compare.stillness import nothing_moved
-from .explanation import Explanation, Share
+from .explanation import Effect, Explanation, Share
 from .gap import FirstTouch
 from .values_page import CauseWording, heading_of, sides_of, texts_of, wording_of
 
@@ -115,6 +115,12 @@ class AnswerSentence(PageContent):
             if row.failure is not None:
                 return row.failure.failure.reason
         return ""
+
+    @property
+    def leads(self) -> Effect | None:
+        """The cause that takes away most, alone and last; None where either could not be run."""
+        known = [each for each in self.result.ranking if None not in (each.alone, each.last)]
+        return known[0] if known else None
 
     @property
     def has_gap(self) -> bool:
@@ -273,7 +279,7 @@ def _switch(result: Explanation, name: str) -> tuple[str, str]:
     for row in result.shares:
         if row.name == name:
             return sides_of(row)
-    return NONE, NONE
+    return NO_NUMBER, NO_NUMBER
 
 
 def refused(result: Explanation) -> list[Share]:

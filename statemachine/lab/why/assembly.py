@@ -109,10 +109,7 @@ def _motion(trials: Trials, matched: Matched) -> MotionExtent:
 
 def _missing(request: WhyRequest) -> tuple[tuple[str, str], ...]:
     """Return what one side has nothing of and the other has, as far as it acts in what is run."""
-    parts = missing_parts(request.left, request.right)
-    if request.scenario.options.get("actuation", True):
-        return parts
-    return tuple((side, part) for side, part in parts if part != "actuators")
+    return missing_parts(request.left, request.right, request.scenario.options)
 
 
 def _shares(search: Search, division: Division) -> tuple[tuple[Share, ...], tuple[FailedSet, ...]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...engines.description.file_changes import AttributeChange
 from ...installed import DEFAULT
-from ...measures.text import NONE
+from ...measures.text import NO_NUMBER
 from ...show.blocks import Block
 from ...show.templates import PageContent, render_blocks
 from .explanation import Explanation, Share
@@ -105,11 +105,11 @@ def steps(result: Explanation) -> list[Block]:
 def _settings_of(row: Share) -> list[SettingChange]:
     """Return what to change for one cause: a row for each quantity."""
     if not row.values:
-        return [SettingChange(_placed(row, row.name), NONE, NONE)]
+        return [SettingChange(_placed(row, row.name), NO_NUMBER, NO_NUMBER)]
     changes: list[SettingChange] = []
     for value in distinct(row.values):
         left, right = texts_of(value)
-        is_lacking = (left, right) == ("there", NONE)
+        is_lacking = (left, right) == ("there", NO_NUMBER)
         changes.append(SettingChange(_placed(row, title_of(row, value)), left, right, is_lacking))
     return changes
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ...errors import BadInputError, EndedEarlyError
 from ..compare.matching import Matched, match_alike, match_models
+from ..compare.prepared_sides import on_left
 from ..runs.reporter import QUIET, Reporter
 from .assembly import explanation_of
 from .deadline import Deadline, TimeIsUp
@@ -49,7 +50,7 @@ def explain(
     """
     deadline = Deadline(request.time_limit, began)
     if not request.recordings:
-        request = replace(request, scenario=request.scenario.on(request.left))
+        request = replace(request, scenario=on_left(request.scenario, request.left, request.right))
     search = _begun(request, deadline, reporter)
     try:
         search.run(ranked=lambda: so_far(explanation_of(search)))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from ...errors import unknown_name
 from ...interface import Model
-from ...measures import OF_A_RUN, Deviation
+from ...measures import RUN_FLOORS, Deviation
 from ..compare.chaos import against_floor
-from ..runs.robot import moved_by_actuators
+from ..runs.robot import actuated_bodies
 from .gap import Measure, size_of, touched_at_start
 from .request import WhyRequest
 from .trials import Trials
@@ -85,7 +85,7 @@ def explained_gap(
         first=first,
         size=size_of(first[quantity], measure),
         floor=floors.get(quantity, 0.0),
-        negligible=OF_A_RUN[trials.ruler.units[quantity]],
+        negligible=RUN_FLOORS[trials.ruler.units[quantity]],
         tolerance=trials.ruler.tolerance(quantity),
     )
 
@@ -105,13 +105,13 @@ def _quantity(
     Where none is beyond, it is the first.
     """
     ruler = trials.ruler
-    robot = frozenset(model.body_names[body] for body in moved_by_actuators(model))
+    robot = frozenset(model.body_names[body] for body in actuated_bodies(model))
     preferred = ruler.default_quantity(touched_at_start(trials.traces[0], robot))
     sizes = {name: size_of(gap, measure) for name, gap in first.items()}
     above = {
         name: size / ruler.tolerance(name)
         for name, size in sizes.items()
-        if size > OF_A_RUN[ruler.units[name]]
+        if size > RUN_FLOORS[ruler.units[name]]
     }
     beyond = above
     for chance in ("beyond", "cannot be told"):

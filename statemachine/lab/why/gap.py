@@ -13,14 +13,14 @@ from ...interface import Array, Ints, JointType, Model
 from ...interface.sites import usual_site
 from ...measures import (
     QUANTITIES,
-    SAME,
+    SAME_MOMENT,
     Deviation,
-    JointPlaces,
+    JointAddresses,
     at_moments,
     common_moments,
     distances,
-    farthest,
-    turns,
+    largest_difference,
+    rotation_angles,
 )
 from ...show.drawing.scene import posed
 from ..compare.matching import Matched
@@ -71,7 +71,7 @@ class _Places:
         base: Where in qpos the pose of the floating base begins; None of a fixed one.
     """
 
-    joints: JointPlaces
+    joints: JointAddresses
     free_bodies: Ints
     tip: int | None
     base: int | None
@@ -89,7 +89,7 @@ class _Places:
         types = model.jnt_type[joints]
         free = joints[types == int(JointType.FREE)]
         return cls(
-            joints=JointPlaces.of(types, model.jnt_qposadr[joints]),
+            joints=JointAddresses.of(types, model.jnt_qposadr[joints]),
             free_bodies=model.jnt_bodyid[free],
             tip=tip,
             base=None if base is None else int(model.jnt_qposadr[base]),
@@ -195,7 +195,7 @@ class Ruler:
             side: 0 for a run of the first Model, 1 for one of the second.
         """
         time = trace.time - trace.time[0]
-        slack = SAME * trace.header.timestep + 1e-9
+        slack = SAME_MOMENT * trace.header.timestep + 1e-9
         if trace.header.ended or time[-1] < self.time[-1] - slack:
             return None
         qpos = at_moments(time, trace.qpos, self.time, slack)
@@ -294,10 +294,10 @@ class Ruler:
             case "body" | "base":
                 return distances(a, b)
             case "body rotation" | "base rotation":
-                return turns(a, b)
+                return rotation_angles(a, b)
         if quantity == BALLS:
-            return turns(a, b).max(axis=1)
-        return farthest(a, b)
+            return rotation_angles(a, b).max(axis=1)
+        return largest_difference(a, b)
 
     def gap(self, quantity: str, left: Curves, right: Curves) -> Deviation:
         """Return how far apart two runs are in one quantity."""
@@ -346,7 +346,7 @@ def _moments_of(left: Trace, right: Trace) -> tuple[Array, bool]:
         return common.time, False
     except TraceError:
         time, end = left.time - left.time[0], right.time[-1] - right.time[0]
-        return time[time <= end + SAME * left.header.timestep], True
+        return time[time <= end + SAME_MOMENT * left.header.timestep], True
 
 
 def touched_at_start(trace: Trace, robot: frozenset[str]) -> frozenset[str]:

@@ -52,7 +52,9 @@ class RewrittenPart(PageContent):
 
     @property
     def more_refusals(self) -> int:
-        """How much of what was not written has no row."""
+        """How much of what was not written has no row, where some has one."""
+        if not self.most:
+            return 0
         return len(self.rewritten.not_written) - len(self.refusals)
 
 

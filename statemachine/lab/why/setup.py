@@ -12,7 +12,7 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.alike import commands_alike, controller_for_right, translated
 from ..compare.matching import Matched
-from ..recordings import Rerun, SideStart, Trace, beginning_with, commands_of, start_of
+from ..recordings import Rerun, SideStart, Trace, controller_of_trace, start_of, with_first_ctrl
 from ..runs.scenarios import Controller
 from .causes import EXTRA_ACTUATOR, Cause, built, causes, differences_of
 from .option_differences import differences_by_option, options_that_equalize
@@ -288,8 +288,10 @@ class Setup:
             return self._own_controller(model, equalized)
         if self._recordings:
             if side and COMMANDS not in equalized:
-                return commands_of(self._recordings[1])
-            controller = commands_of(self._recordings[0])  # in the order of the left's actuators
+                return controller_of_trace(self._recordings[1])
+            controller = controller_of_trace(
+                self._recordings[0]
+            )  # in the order of the left's actuators
         else:
             controller = self.scenario.controller(model if own else self.models[0], self.seed)
         if side == 0:
@@ -333,7 +335,7 @@ class Setup:
         if self._keyframes[0] == self._keyframes[1]:
             return controller
         start = self._starts[1].ctrl
-        return beginning_with(lambda _: start, controller)
+        return with_first_ctrl(lambda _: start, controller)
 
 
 def _keyframes(

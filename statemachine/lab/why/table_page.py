@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...measures.text import NONE, capital, percent
+from ...measures.text import NO_NUMBER, capital, percent
 from ...show.blocks import Block, Section, Table, TableCell
 from .answer_page import amount
 from .explanation import Explanation, Share
@@ -59,7 +59,7 @@ def summary_table(result: Explanation, most: int) -> Table:
         shown.append(_row_of_rest(more, share))
     heads = _SUMMARY_HEADS
     # Where nothing stands in the file; and ranges need the room.
-    if not result.is_complete or all(row[4] == NONE for row in shown):
+    if not result.is_complete or all(row[4] == NO_NUMBER for row in shown):
         heads, shown = heads[:4], [row[:4] for row in shown]
     return Table(heads, shown, words=frozenset({0, 1, 2, 4}))
 
@@ -67,7 +67,7 @@ def summary_table(result: Explanation, most: int) -> Table:
 def _summary_of_cause(result: Explanation, row: Share) -> Row:
     """Return a cause in one row, with the line of the right's file that says it."""
     left, right = sides_of(row, most=1)
-    place = NONE
+    place = NO_NUMBER
     if row.place is not None:
         place = f"{row.place.file}:{row.place.line}"
     elif row.changes:
@@ -77,8 +77,8 @@ def _summary_of_cause(result: Explanation, row: Share) -> Row:
 
 def _summary_of_place(place: Localisation) -> Row:
     """Return what was localised in one row."""
-    left, right = place.values or (NONE, NONE)
-    return f"{capital(place.name)} (localised)", left, right, percent(place.share), NONE
+    left, right = place.values or (NO_NUMBER, NO_NUMBER)
+    return f"{capital(place.name)} (localised)", left, right, percent(place.share), NO_NUMBER
 
 
 def _row_of_rest(count: int, share: float | None) -> Row:
@@ -88,7 +88,7 @@ def _row_of_rest(count: int, share: float | None) -> Row:
         count: How many they are.
         share: What they take away together, as a part of the gap; None where it was not divided.
     """
-    return f"{count} more", NONE, NONE, percent(share), NONE
+    return f"{count} more", NO_NUMBER, NO_NUMBER, percent(share), NO_NUMBER
 
 
 def able(result: Explanation) -> list[Share]:
@@ -109,7 +109,7 @@ def tables(result: Explanation) -> list[Block]:
     if not rows:
         return []
     heads = _HEADS
-    if all({*row[4:]} <= {NONE, _SAME} for row in rows):  # nothing was equalized by itself
+    if all({*row[4:]} <= {NO_NUMBER, _SAME} for row in rows):  # nothing was equalized by itself
         heads, rows = heads[:4], [row[:4] for row in rows]
     most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
     shown = Table(heads, rows[:most], _title(result), words=_WORDS)
@@ -158,7 +158,7 @@ def _rows_of_cause(result: Explanation, row: Share) -> list[Row]:
     """Return a row for each quantity of a cause; the parts stand in the first."""
     parts = _parts(result, row)
     if not row.values:
-        return [(capital(row.name), NONE, NONE, *parts)]
+        return [(capital(row.name), NO_NUMBER, NO_NUMBER, *parts)]
     rows: list[Row] = []
     for value in sorted(distinct(row.values), key=relative_difference, reverse=True):
         left, right = texts_of(value)
@@ -173,10 +173,13 @@ def _parts(result: Explanation, row: Share) -> Row:
     if (
         row.share is not None and abs(row.share) < noise and noise > _SMALL
     ):  # no part is claimed inside the floor
-        return TableCell(f"< {percent(noise)}", share=row.share), NONE, NONE
+        return TableCell(f"< {percent(noise)}", share=row.share), NO_NUMBER, NO_NUMBER
+    if row.share is None and row.alone is not None and row.last is None:
+        return TableCell(f"{percent(row.alone)} alone", share=None), percent(row.alone), NO_NUMBER
     if row.share is None and row.range is not None:
         least, largest = row.range
-        part = TableCell(f"{100 * least:.0f} to {100 * largest:.0f} %", share=None)
+        ends = [f"{100 * round(end, 2) + 0.0:.0f}" for end in (least, largest)]
+        part = TableCell(f"{' to '.join(ends)} %", share=None)
         return part, percent(row.alone), percent(row.last)
     explains = percent(row.share)
     if row.error and math.isfinite(row.error):
@@ -187,13 +190,13 @@ def _parts(result: Explanation, row: Share) -> Row:
 
 def _row_of_place(place: Localisation) -> Row:
     """Return what a feature takes away when it is left out on both sides."""
-    left, right = place.values or (NONE, NONE)
+    left, right = place.values or (NO_NUMBER, NO_NUMBER)
     mark = "†" if place.values else "*"
     part = TableCell(f"{percent(place.share)}{mark}", share=place.share)
-    return capital(place.name), left, right, part, NONE, NONE
+    return capital(place.name), left, right, part, NO_NUMBER, NO_NUMBER
 
 
 def _row_of_small(small: Sequence[Share]) -> Row:
     share = sum(row.share or 0.0 for row in small)
     part = TableCell(percent(share), share=share)
-    return f"{len(small)} more, none above 0.1 %", NONE, NONE, part, NONE, NONE
+    return f"{len(small)} more, none above 0.1 %", NO_NUMBER, NO_NUMBER, part, NO_NUMBER, NO_NUMBER

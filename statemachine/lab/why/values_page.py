@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ...engines.records import TURNED, DifferingQuantity, QuantityValue
-from ...measures.text import NONE, listed, quantity, reading, significant
+from ...measures.text import NO_NUMBER, display_unit, listed, quantity, significant
 
 if TYPE_CHECKING:
     from . import Share
@@ -52,14 +52,14 @@ def heading_of(row: Share) -> str:
 def sides_of(row: Share, most: int = _SHOWN) -> tuple[str, str]:
     """Return what each side has of a cause, in words: "solref 0.02 and solmix 1".
 
-    Both are `NONE` where a side has nothing that a value could tell.
+    Both are `NO_NUMBER` where a side has nothing that a value could tell.
 
     Args:
         row: The cause.
         most: How many of its quantities are told.
     """
     if not row.values:
-        return NONE, NONE
+        return NO_NUMBER, NO_NUMBER
     values = _largest_first(distinct(row.values), most)
     pairs = [_named(value, alone=len(values) == 1) for value in values[:most]]
     left, right = zip(*pairs, strict=True)
@@ -93,7 +93,7 @@ def _named(value: DifferingQuantity, alone: bool) -> tuple[str, str]:
     left, right = texts_of(value)
     if alone:
         return left, right
-    texts = ["" if text == NONE else f"{value.quantity} {text}" for text in (left, right)]
+    texts = ["" if text == NO_NUMBER else f"{value.quantity} {text}" for text in (left, right)]
     return texts[0], texts[1]
 
 
@@ -108,7 +108,7 @@ def wording_of(row: Share) -> CauseWording:
             return "filter on the right"
         if times.right is None:
             return "filter on the left"
-    return "bare" if NONE in sides_of(row) else "values"
+    return "bare" if NO_NUMBER in sides_of(row) else "values"
 
 
 def texts_of(value: DifferingQuantity) -> tuple[str, str]:
@@ -159,9 +159,9 @@ def _text(value: QuantityValue, unit: str, digits: int = 0) -> str:
     """
     match value:
         case None:
-            return NONE
+            return NO_NUMBER
         case tuple():
-            factor, shown = reading(unit)
+            factor, shown = display_unit(unit)
             numbers = (significant(entry * factor, digits or 4) for entry in value)
             return " ".join(numbers) + shown
         case bool():
@@ -169,6 +169,6 @@ def _text(value: QuantityValue, unit: str, digits: int = 0) -> str:
         case str():
             return value
     if digits or not unit:
-        factor, shown = reading(unit)
+        factor, shown = display_unit(unit)
         return f"{significant(float(value) * factor, digits or 4)}{shown}"
     return quantity(float(value), unit)

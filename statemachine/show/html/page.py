@@ -59,11 +59,6 @@ def report(page: Page, interaction: Interaction = NOTHING_MOVES) -> str:
     opening = list(itertools.takewhile(_is_above_sections, page.blocks))
     rest = _all_drawn(page.blocks[len(opening) :], interaction)
     main = tag("main", _header(page, opening, interaction), rest)
-    footer = tag(
-        "footer",
-        tag("p", non_breaking(page.origin)),
-        tag("p", f"statemachine {__version__}; this file asks for nothing but itself."),
-    )
     script = ""
     if interaction.script:
         script = f"(() => {{\n'use strict';\n{interaction.script}\n}})();"
@@ -76,7 +71,9 @@ def report(page: Page, interaction: Interaction = NOTHING_MOVES) -> str:
         "policy": Html(policy),
         "title": page.headline.lead if page.headline else page.title,
         "style": Html(text_of("show/html/page.css")),
-        "body": joined((main, footer)),
+        "main": main,
+        "origin": non_breaking(page.origin),
+        "version": __version__,
         "data": interaction.data,
         "script": Html(script),
     }

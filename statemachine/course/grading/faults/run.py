@@ -21,7 +21,7 @@ from ....engines import raw_engines_with
 from ....errors import BadInputError, MissingEngineError, ModelFileError, check_name, unknown_name
 from ....installed import DEFAULT, engine_version, require
 from ....installing import install_command
-from ....lab.runs.drive import Progress, silent
+from ....lab.runs.drive import Progress, no_progress
 from ....models import AnyPath
 from ....processes import checked_jobs, sandbox
 from ....processes.parallel import in_parallel, unwinding
@@ -43,7 +43,7 @@ def examine(
     only: Sequence[str] = (),
     seconds: float = _SECONDS,
     clock: float = _CLOCK,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     own: Mapping[str, Path] | None = None,
 ) -> Examination:
     """Run a student's tests on the healthy arm and on one with each of the faults.

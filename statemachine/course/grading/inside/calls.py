@@ -12,7 +12,7 @@ import numpy as np
 from ....engines import raw_engine_of
 from ....errors import UnsupportedError
 from ....interface import Model
-from ....lab.runs.controllers import line_of, load_module, misfit, said
+from ....lab.runs.controllers import error_text, last_user_line, load_module, signature_mismatch
 from ....measures.text import count
 from .answers import answer_of, encode
 from .error_hints import hint_of
@@ -68,7 +68,7 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
         raise FaultError(f"the file has no function {name}")
     if not callable(function):
         raise FaultError(f"{name} is not a function: {type(function).__name__}")
-    takes, why = misfit(function, None, *arguments)
+    takes, why = signature_mismatch(function, None, *arguments)
     if takes:
         raise FaultError(
             f"it is called with a model and {count(len(arguments), 'argument')} more, and takes "
@@ -140,12 +140,12 @@ def _remark(error: BaseException, file: Path, model: Model | None = None) -> str
         file: The student's.
         model: What the function got; None where the file is only loaded.
     """
-    place, line, code = line_of(error, file)
+    place, line, code = last_user_line(error, file)
     text = ""
     if model is not None:
         text = hint_of(error, code, model)
     if not text:
-        text = said(error)
+        text = error_text(error)
     if line:
         text = f"line {line}: {text}"
         if place != file:

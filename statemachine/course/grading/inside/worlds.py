@@ -21,7 +21,7 @@ from ....models import resolve
 from ....witness.mjcf_text import parse, with_includes
 from .watch import Nudge
 
-ELSEWHERE = "on a scene with a crate before the arm"
+ELSEWHERE = "in a scene whose file has a crate before the arm"
 _CRATE = """
 <body name="crate" pos="-0.4 0.3 0.05">
   <freejoint name="crate"/>

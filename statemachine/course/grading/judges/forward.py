@@ -99,7 +99,9 @@ def judge(
     if remarks:
         return wrong(*remarks)
     moved = float(np.linalg.norm(right.tip[3] - right.tip[2]))
-    return verified(OfForward.PASSED.says(moved=rounded(moved, "m")))
+    is_commanded = any(end.ctrl.any() for end in answer.ends)
+    passed = OfForward.PASSED_WITH_COMMAND if is_commanded else OfForward.PASSED
+    return verified(passed.says(moved=rounded(moved, "m")))
 
 
 def _returned(answer: Answer) -> Array:

@@ -132,8 +132,12 @@ def _traces(result: Any, size: int) -> list[Array]:
         if len(shape) == 2 and shape[0] == size:
             columns = shape[1]
             raise FaultError(OfGravity.ONE_NUMBER.says(trace=name, columns=columns, joint=LIFT))
-        what = f"{name}, one number at each of 0 … {size - 1} s,"
-        traces.append(numbers(trace, (size,), what))
+        if len(shape) == 1 and shape[0] != size:
+            length = OfGravity.LENGTH.says(
+                trace=name, length=shape[0], needed=size, seconds=size - 1
+            )
+            raise FaultError(length)
+        traces.append(numbers(trace, (size,), name))
     return traces
 
 

@@ -34,6 +34,10 @@ class OfGravity(Remark):
     ONE_NUMBER = (
         "{trace}: you return {columns} numbers for each second; one is needed, that of {joint}"
     )
+    LENGTH = (
+        "{trace}: you return {length} numbers; {needed} are needed, one at each of 0 … {seconds} "
+        "s, where {seconds} is the argument seconds"
+    )
     COMMAND = (
         "you wrote ctrl[{entry}] ({actuator}), which was {value:g} then. Nobody writes ctrl in "
         "this exercise: leave that line out, and the command stays zero"
@@ -76,8 +80,8 @@ class OfGravity(Remark):
         "round(1 / model.timestep)"
     )
     STILL = (
-        "nothing moves in this run, as where there is no gravity; to switch the servos off and "
-        "nothing else, model.replace(actuation=False)"
+        "nothing moves in this run, as if there were no gravity. Leave gravity on: "
+        "model.replace(actuation=False) switches the servos off"
     )
     ZEROS = (
         "the arm moves in this run, and you return zeros, or nearly. Are they its speed, qvel, or "
@@ -102,7 +106,9 @@ class OfGravity(Remark):
         "the model was given back with its servos off (model.raw.opt.disableflags is {now}, it "
         "was {before}): switch the bit back, or use model.replace(actuation=False)"
     )
-    MODEL_CHANGED = "the model was given back with another model.raw.{name}: a Model never changes"
+    MODEL_CHANGED = (
+        "the model was given back with another model.raw.{name}: switch it back before you return"
+    )
 
 
 class OfState(Remark):
@@ -159,10 +165,10 @@ class OfState(Remark):
     TIME_KIND = "time must be a number of seconds; you return {kind}"
     TIME = "time after the reset to keyframe 0 should be {expected:g} s, you return {time:g}"
     TIME_WHY = "{text}: {why}"
-    TIME_NEW = "that is a new Data, or a reset without keyframe=0"
+    TIME_NEW = "that is the time of a new Data, or after a reset without keyframe=0"
     TIME_ZEROED = "data.time was set to zero; return it as the reset leaves it"
-    TIME_OTHER = "that is keyframe {number}"
-    TIME_COURSE = "that is the course's own scene; ask the model that you got"
+    TIME_OTHER = "that is the time of keyframe {number}"
+    TIME_COURSE = "that is the time in the course's own scene; read it with the model that you got"
     TIME_STEPPED = "read it right after the reset, before any step"
 
 
@@ -170,6 +176,10 @@ class OfForward(Remark):
     """What is said of `demo_forward`."""
 
     PASSED = "a write changed nothing derived; forward moved the tip by {moved}"
+    PASSED_WITH_COMMAND = (
+        "a write changed nothing derived; forward moved the tip by {moved} (you wrote ctrl, too, "
+        "which moved nothing: a command acts when step is called)"
+    )
     STEPPED = (
         "{time:g} s passed: step was called. forward recomputes what is derived and takes no time"
     )
@@ -210,8 +220,8 @@ class OfForward(Remark):
     WRITTEN_EARLY = "qpos was written before the first forward: that is the new pose, {away}"
     FORWARD_EARLY = "forward was called before it was read: that is the new pose already, {away}"
     NOT_FRESH = (
-        "forward was called before it; in a new Data nothing is derived yet, and the site is at "
-        "the origin. You are {away}"
+        "forward was called before this reading: in a new Data nothing is derived yet, and every "
+        "site is at the origin, {away}"
     )
     OTHER_ANGLE = "that is the arm at {angle}, {away}: qpos is in radians, write {expected} into it"
     OTHER_ENTRY = (
@@ -259,7 +269,7 @@ class OfReplay(Remark):
     )
     LEFT_OVER = (
         "the two runs ended {apart:.1e} apart though both began at keyframe 0: something of the "
-        "first was left over. sm.reset clears all, or use a new Data"
+        "first run was left over. sm.reset clears everything, or use a new Data"
     )
     ALWAYS_TRUE = (
         "the two runs ended {apart:.1g} apart, and same is True: is True typed in, or a run "
@@ -318,7 +328,7 @@ class OfReplay(Remark):
     )
     TIME = "it began at {time:g} s: write data.time = 0.0 before the first step"
     CTRL_CHANGED = "ctrl was changed after step {step}: it must stay the same"
-    STEPS = "it took {steps} where {nstep} are needed"
+    STEPS = "it took {steps} where {nstep} are needed, the argument nstep"
     CTRL_LATE = (
         "at its first step ctrl was {ctrl}, and it was written only after {steps}: write ctrl "
         "before the first step"
@@ -347,7 +357,7 @@ class OfReplay(Remark):
         "at its first step ctrl[{entry}] ({actuator}) was {value:g}; the command there is "
         "{expected:g}"
     )
-    CTRL_OTHER = "at its first step ctrl was {ctrl}; the command is {expected}"
+    CTRL_OTHER = "at its first step ctrl was {ctrl}; the command is {expected}, the argument ctrl"
     END = "{which} is up to {away:.1e} away from qpos at the end of its run: {why}"
     AT_START = "that is qpos at the start"
     FIRST_TWICE = "the first run was returned twice"

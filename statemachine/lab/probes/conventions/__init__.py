@@ -19,7 +19,7 @@ from ....engines import raw_engine_names, raw_engine_of
 from ....engines.measured import Absent, Measurement, Phrases
 from ....errors import check_name
 from ....installed import ENGINES, engine_version, require, silence
-from ...runs.drive import Progress, silent
+from ...runs.drive import Progress, no_progress
 from . import answers, frames, motion
 from .answers import NO_ANSWER, Answers, EngineAnswer, EngineQuestion, Wording
 
@@ -104,7 +104,7 @@ def _answer_of_absent(absent: Absent) -> EngineAnswer:
 def probe(
     engines: Sequence[str],
     questions: Iterable[str] = QUESTIONS,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Conventions:
     """Ask each engine each question.
 
@@ -200,7 +200,7 @@ class Phrasebook:
     engines: Mapping[str, tuple[Phrase, ...]]
 
 
-def run_phrases(engines: Sequence[str], progress: Progress = silent) -> Phrasebook:
+def run_phrases(engines: Sequence[str], progress: Progress = no_progress) -> Phrasebook:
     """Run every cell of some engines.
 
     Args:

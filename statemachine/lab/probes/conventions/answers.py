@@ -115,7 +115,7 @@ def closest(errors: Mapping[str, float]) -> BestHypothesis:
 
 # What an engine keeps: derived values after a write and a step, a past after a reset, a save.
 
-_SAME = 1e-6  # m; PyBullet tells a link's frame in single precision
+_POSITION_TOLERANCE = 1e-6  # m; PyBullet tells a link's frame in single precision
 
 
 def _stale_or_fresh(readings: Sequence[ReadTwice]) -> Iterator[EngineAnswer]:
@@ -132,9 +132,9 @@ def _stale_or_fresh(readings: Sequence[ReadTwice]) -> Iterator[EngineAnswer]:
 
 def _age(error: float, error_recomputed: float) -> str:
     """Return "fresh" or "stale" by the errors [m] of a reading before and after a recomputation."""
-    if error < _SAME:
+    if error < _POSITION_TOLERANCE:
         return "fresh"
-    if error_recomputed < _SAME:
+    if error_recomputed < _POSITION_TOLERANCE:
         return "stale"
     return UNDECIDED
 
@@ -167,7 +167,7 @@ def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswe
         still_there: By way, whether each quantity that was written before is still there.
     """
     for way, stays in still_there.items():
-        words = f"keeps {_listed(name for name, stayed in stays.items() if stayed)}"
+        words = f"keeps {_join_names(name for name, stayed in stays.items() if stayed)}"
         lost = []
         for name, stayed in stays.items():
             if not stayed:
@@ -175,7 +175,7 @@ def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswe
         yield EngineAnswer(words, (Measurement("sets back", tuple(lost)),), way)
 
 
-def _listed(names: Iterable[str]) -> str:
+def _join_names(names: Iterable[str]) -> str:
     """Return names in a row, or "nothing"."""
     return ", ".join(names) or "nothing"
 
@@ -196,7 +196,7 @@ def save(restored: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineA
         yield EngineAnswer("forgets a Data's past" if restored else NO_ANSWER, (error,))
         return
     for way, comes_back in restored.items():
-        words = f"forgets {_listed(name for name, back in comes_back.items() if not back)}"
+        words = f"forgets {_join_names(name for name, back in comes_back.items() if not back)}"
         kept = tuple(name for name, back in comes_back.items() if back)
         yield EngineAnswer(words, (Measurement("brings back", kept),), way)
 

@@ -76,11 +76,11 @@ def _order_of(numbers: Array) -> str:
     return closest(errors).hypothesis
 
 
-_PLACE = np.array([0.2, -0.1, 0.3])
-_SIX = np.array([0.7, -0.4, 0.9, 0.5, -1.1, 0.8])
-_FOUR = np.array([0.5, 0.1, -0.7, 0.5])  # some turn; which one is read from the marks
-_FOUR = _FOUR / np.linalg.norm(_FOUR)
-_SHORT = 1e-6  # the step [s]; the error of the difference quotient is of its order
+_POSITION = np.array([0.2, -0.1, 0.3])
+_SIX_VELOCITIES = np.array([0.7, -0.4, 0.9, 0.5, -1.1, 0.8])
+_FOUR_NUMBERS = np.array([0.5, 0.1, -0.7, 0.5])  # some turn; which one is read from the marks
+_FOUR_NUMBERS = _FOUR_NUMBERS / np.linalg.norm(_FOUR_NUMBERS)
+_SHORT_STEP = 1e-6  # the step [s]; the error of the difference quotient is of its order
 
 _AXES, _POINTS = ("world", "body"), {"body origin": np.zeros(3), "centre of mass": CENTRE}
 _PARTS = {
@@ -99,7 +99,7 @@ def _predicted(hypothesis: tuple[str, ...], before: Array) -> Array:
     """
     order, linear, angular = hypothesis
     turn = _rotation(before)
-    v, w = _SIX[:3], _SIX[3:]
+    v, w = _SIX_VELOCITIES[:3], _SIX_VELOCITIES[3:]
     if order == "angular first":
         v, w = w, v
     if linear.startswith("body"):
@@ -136,10 +136,10 @@ def _explained(errors: Mapping[str, float], unit: str, part: str) -> EngineAnswe
     "What do the position and the six velocity numbers of a free body mean?",
     "Copied from one engine into another, the same numbers are another motion as soon as the "
     "body is turned, or its centre of mass is not at its origin.",
-    _PLACE,
-    _FOUR,
-    _SIX,
-    _SHORT,
+    _POSITION,
+    _FOUR_NUMBERS,
+    _SIX_VELOCITIES,
+    _SHORT_STEP,
 )
 def velocity(marks: tuple[Array, Array]) -> Iterator[EngineAnswer]:
     """Tell what explains where the marked body is, and how it moved in one short step.
@@ -151,10 +151,10 @@ def velocity(marks: tuple[Array, Array]) -> Iterator[EngineAnswer]:
     before, after = marks
     places: dict[str, float] = {}
     for name, point in _POINTS.items():
-        places[name] = float(np.abs(before[0] + _rotation(before) @ point - _PLACE).max())
+        places[name] = float(np.abs(before[0] + _rotation(before) @ point - _POSITION).max())
     yield _explained(places, "m", "position")
 
-    velocities = (after - before) / _SHORT
+    velocities = (after - before) / _SHORT_STEP
     errors: dict[tuple[str, ...], float] = {}
     for hypothesis in product(*_PARTS.values()):
         errors[hypothesis] = float(np.abs(_predicted(hypothesis, before) - velocities).max())

@@ -13,7 +13,7 @@ from ....engines.samples import RATE, limp
 from ....measures.text import numbers
 from .answers import UNDECIDED, EngineAnswer, closest, question
 
-_SAME = 1e-6  # m/s², s, m/s
+_ROUNDING = 1e-6  # m/s², s, m/s
 
 
 @question(
@@ -29,7 +29,7 @@ def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[Engine
     """
     stated, measured = gravity
     felt = numbers(np.round(measured, 2) + 0.0)
-    if np.allclose(stated, measured, atol=_SAME):
+    if np.allclose(stated, measured, atol=_ROUNDING):
         words = felt
     else:
         words = f"told {numbers(np.round(stated, 2) + 0.0)}, felt {felt}"
@@ -46,7 +46,7 @@ def timestep(step: OneStep) -> Iterator[EngineAnswer]:
     """Tell the step by how far a body at 1 m/s comes in it, and the engine's clock."""
     stated, moved, clock, ticked = step
     moved_ms = f"{moved * 1e3:.4g} ms"
-    if abs(stated - moved) < _SAME:
+    if abs(stated - moved) < _ROUNDING:
         words = moved_ms
     else:
         words = f"told {stated * 1e3:.4g} ms, moves {moved_ms}"
@@ -104,7 +104,7 @@ def command(speeds: Mapping[str, Sequence[float]]) -> Iterator[EngineAnswer]:
         yield EngineAnswer(words, figures, kind)
 
 
-_FAST = 200.0  # rad/s
+_INITIAL_SPEED = 200.0  # rad/s
 
 
 @question(
@@ -112,7 +112,7 @@ _FAST = 200.0  # rad/s
     "Energy that an engine takes away by default looks like friction of the robot. What is cut "
     "off at some speed looks like a motor's limit.",
     1.0,  # s
-    _FAST,
+    _INITIAL_SPEED,
 )
 def damping(speeds: tuple[float, float]) -> Iterator[EngineAnswer]:
     """Tell what is left of each speed.
@@ -121,9 +121,9 @@ def damping(speeds: tuple[float, float]) -> Iterator[EngineAnswer]:
         speeds: Of a body that began at 1 m/s, after 1 s [m/s]; of a joint, one step after [rad/s].
     """
     left, joint = speeds
-    body = "keeps it" if abs(left - 1) < _SAME else f"loses {100 * (1 - left):.1f} % in 1 s"
+    body = "keeps it" if abs(left - 1) < _ROUNDING else f"loses {100 * (1 - left):.1f} % in 1 s"
     yield EngineAnswer(body, (Measurement("left after 1 s", left),), "a body at 1 m/s")
-    turns = "keeps it" if abs(joint / _FAST - 1) < 1e-3 else f"cut to {joint:.3g} rad/s"
+    turns = "keeps it" if abs(joint / _INITIAL_SPEED - 1) < 1e-3 else f"cut to {joint:.3g} rad/s"
     after = Measurement("one step after", joint, "rad/s")
     yield EngineAnswer(turns, (after,), "a joint at 200 rad/s")
 
@@ -139,11 +139,11 @@ def _geometric_mean(block: float, floor: float) -> float:
     return math.sqrt(block * floor)
 
 
-def _of_block(block: float, floor: float) -> float:
+def _block_friction(block: float, floor: float) -> float:
     return block
 
 
-def _of_floor(block: float, floor: float) -> float:
+def _floor_friction(block: float, floor: float) -> float:
     return floor
 
 
@@ -153,12 +153,12 @@ _RULES: dict[str, Callable[[float, float], float]] = {
     "their product": operator.mul,
     "their mean": _mean,
     "their geometric mean": _geometric_mean,
-    "the block's": _of_block,
-    "the floor's": _of_floor,
+    "the block's": _block_friction,
+    "the floor's": _floor_friction,
 }
 # A block that MuJoCo holds creeps, by millimetres a second; one that slides gains more.
-_SLIDES = 0.02  # m/s
-_HALVINGS = 10
+_SLIDING_SPEED = 0.02  # m/s
+_BISECTIONS = 10
 
 
 @question(
@@ -191,9 +191,9 @@ def friction(speeds: Mapping[str, Sliding]) -> Iterator[EngineAnswer]:
 def _slope(speed: Sliding, block: float, floor: float) -> float:
     """Return the tangent of the slope from which on a block slides: its friction, by halving."""
     low, high = 0.0, 1.0
-    for _ in range(_HALVINGS):
+    for _ in range(_BISECTIONS):
         middle = (low + high) / 2
-        if speed(block, floor, middle) > _SLIDES:
+        if speed(block, floor, middle) > _SLIDING_SPEED:
             high = middle
         else:
             low = middle

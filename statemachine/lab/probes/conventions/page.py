@@ -8,12 +8,12 @@ from html import escape
 from typing import Literal
 
 from ....engines.measured import Measurement
-from ....measures.text import reading, significant, versions_of
+from ....measures.text import display_unit, significant, versions_of
 from ....show.blocks import Page, Table
 from ....show.templates import PageContent, render
 from . import CONCEPTS, Convention, Conventions, Phrasebook
 
-_ZERO = 1e-12
+_SHOWN_AS_ZERO = 1e-12
 
 
 @dataclass(frozen=True)
@@ -152,13 +152,13 @@ def _table(answered: Convention) -> Table:
 def _text(figure: Measurement) -> str:
     """Return the name of a measurement and its values, in the unit that is read."""
     values = figure.value if isinstance(figure.value, tuple) else (figure.value,)
-    factor, unit = reading(figure.unit)
+    factor, unit = display_unit(figure.unit)
     largest = max((abs(value) for value in values if not isinstance(value, str)), default=0.0)
     words: list[str] = []
     for value in values:
         if isinstance(value, str):
             words.append(value)
-        elif abs(value) <= _ZERO * largest:
+        elif abs(value) <= _SHOWN_AS_ZERO * largest:
             words.append("0")  # beside a large number, one that is only rounding is nothing
         else:
             digits = 3 if abs(factor * value) >= 1e-3 else 2
@@ -170,7 +170,7 @@ def _text(figure: Measurement) -> str:
 
 
 # With this library, concept by concept: a program, as the engines' own cells are.
-OURS = {
+CALLS_OF_THIS_LIBRARY = {
     "load": 'import statemachine as sm\nm = sm.load("so101/scene")\nd = sm.make_data(m)',
     "state": "d.qpos[0], d.qvel[0] = 0.4, 0",
     "command": "d.ctrl[0] = 1.0",
@@ -182,10 +182,10 @@ OURS = {
     "many worlds": "worlds = [sm.make_data(m) for _ in range(3)]",
 }
 # What each lesson of the path shows, in a line.
-REMEMBER = (
+REMINDERS = (
     ("objects", "A Model never changes. A Data is everything that does."),
     ("state", "A joint's slots in qpos and in qvel differ: jnt_qposadr, jnt_dofadr."),
-    ("write", "data.qpos is the array itself; a copy is data.qpos.copy()."),
+    ("forward", "data.qpos is the array itself; a copy is data.qpos.copy()."),
     ("forward", "A write changes nothing that is derived. forward recomputes it; no time passes."),
     ("forward", "step computes, then moves: what you read is of the state before. Call forward."),
     ("hold", "ctrl has your commands, one number an actuator: of a servo, an angle [rad]."),
@@ -202,7 +202,7 @@ def cheat_sheet(table: Phrasebook) -> str:
     Args:
         table: The engines' own cells, as they were run; those that did not work are left out.
     """
-    columns = {"statemachine": OURS}
+    columns = {"statemachine": CALLS_OF_THIS_LIBRARY}
     for engine, phrases in table.engines.items():
         working = {phrase.concept: phrase.code for phrase in phrases if phrase.works}
         if working:
@@ -216,7 +216,7 @@ def cheat_sheet(table: Phrasebook) -> str:
             cells.append(f"<td>{code}</td>")
         rows.append(f"<tr>{''.join(cells)}</tr>")
     versions = versions_of(table.versions)
-    lines = "\n".join(f"- {text} (`lesson {lesson}`)" for lesson, text in REMEMBER)
+    lines = "\n".join(f"- {text} (`lesson {lesson}`)" for lesson, text in REMINDERS)
     body = "\n".join(rows)
     return (
         "# Cheat sheet\n\n"

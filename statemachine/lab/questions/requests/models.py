@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
@@ -14,7 +14,9 @@ from ....errors import BadInputError
 from ....interface import Model
 from ....models import AnyPath, resolve
 from ....show.blocks import Page
+from ....show.first_screen import first_that_fits
 from ...model_differences import ModelsComparison, Value, compare
+from ...model_differences.page import ever_shorter
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 from ...why.rewriting import RewriteRequest, RewrittenFile, check_target, rewrite
@@ -77,11 +79,20 @@ class ModelsResult(ShownResult, ModelsComparison):
 
     def page(self, details: bool = False) -> Page:
         """Return the page, with what was written at its end."""
+        rewritten = self.rewritten
+        if rewritten is None:
+            return super().page(details)
+        if not details:
+            return first_that_fits(self._ever_shorter(rewritten))
         page = super().page(details)
-        if self.rewritten is None:
-            return page
-        blocks = rewritten_blocks(self.rewritten, None if details else _MOST_ROWS)
-        return replace(page, blocks=[*page.blocks, *blocks])
+        return replace(page, blocks=[*page.blocks, *rewritten_blocks(rewritten)])
+
+    def _ever_shorter(self, rewritten: RewrittenFile) -> Iterator[Page]:
+        """Yield the page with ever fewer rows of differences, then of what was not written."""
+        for refusals in range(_MOST_ROWS, -1, -1):
+            blocks = rewritten_blocks(rewritten, refusals)
+            for page in ever_shorter(self):
+                yield replace(page, blocks=[*page.blocks, *blocks])
 
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each quantity of an element that is not the same in both.

@@ -16,7 +16,7 @@ from ...compare.known_changes import known_changes
 from ...compare.prepared_sides import read_otherwise
 from ...compare.sides import Request
 from ...compare.two_sides import SidesRun, run_sides
-from ...runs.drive import Progress, part_of, silent
+from ...runs.drive import Progress, no_progress, progress_of_stage
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 from .gap import COLUMNS
@@ -119,7 +119,7 @@ def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> VersionsResu
     """
 
     def comparison_of(backends: tuple[str, str]) -> Comparison:
-        return _run(request, backends, silent)[1]
+        return _run(request, backends, no_progress)[1]
 
     if request.bisect:
         backends = releases.around_a_change(
@@ -131,7 +131,7 @@ def answer(request: VersionsRequest, reporter: Reporter = QUIET) -> VersionsResu
     pairs: list[ReleasePair] = []
     with reporter.stage("versions") as progress:
         for number, pair in enumerate(neighbours):
-            part = part_of(progress, number / len(neighbours), 1 / len(neighbours))
+            part = progress_of_stage(progress, number / len(neighbours), 1 / len(neighbours))
             pairs.append(_compared(request, pair, part))
     return VersionsResult(request, tuple(pairs))
 

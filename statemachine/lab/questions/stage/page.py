@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....interface import Array, Ints
-from ....measures.text import figure, on, reading, short_time
+from ....measures.text import display_unit, figure, on_label, short_time
 from ....show import html
 from ....show.blocks import Interactive, Items, Page, Section
 from ....show.html.geometry import packed
@@ -143,8 +143,8 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
     if scene.data is None:
         still = joined(tag("p", note) for note in scene.notes)
     share = now / until if until else 0.0
-    on_left = non_breaking(f"{until:g} s {on(left)}")
-    on_right = on(right)
+    on_left = non_breaking(f"{until:g} s {on_label(left)}")
+    on_right = on_label(right)
     spoken_time = short_time(now)
     return {
         "left": left,
@@ -167,7 +167,7 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
 def _quantity_data(chart: QuantityChart, rows: Ints) -> dict[str, Any]:
     """What the script shows of a quantity at each moment shown: figures that were compared."""
     curve = chart.curve
-    scale, unit = reading(curve.unit)
+    scale, unit = display_unit(curve.unit)
     data: dict[str, Any] = {
         "name": chart.title,
         "unit": unit.replace(" ", "\u00a0"),

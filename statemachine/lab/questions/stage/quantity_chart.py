@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....interface import Array
-from ....measures import distances, same_pairs
-from ....measures.text import figure, quantity, reading, short_time
+from ....measures import distances, with_left_pair_names
+from ....measures.text import display_unit, figure, quantity, short_time
 from ....show import report_template as template
 from ....show.blocks import Interactive
 from ....show.pictures import Traces
@@ -49,7 +49,7 @@ class QuantityChart(Interactive):
     @property
     def unit(self) -> str:
         """What it is drawn in."""
-        return reading(self.curve.unit)[1].strip()
+        return display_unit(self.curve.unit)[1].strip()
 
     @property
     def said(self) -> str:
@@ -69,7 +69,7 @@ class QuantityChart(Interactive):
 
     def values(self) -> Traces | None:
         """Return both sides: a position as the way from where the first began; None without."""
-        curve, scale = self.curve, reading(self.curve.unit)[0]
+        curve, scale = self.curve, display_unit(self.curve.unit)[0]
         if not curve.left.size:
             return None
         title, left, right = self.title, curve.left, curve.right
@@ -87,7 +87,7 @@ class QuantityChart(Interactive):
 
     def gap(self) -> Traces:
         """Return how far apart they are, with the tolerance and the chaos floor."""
-        time, scale = self.curve.time, reading(self.curve.unit)[0]
+        time, scale = self.curve.time, display_unit(self.curve.unit)[0]
         verdict = "DIFFERS" if self.agreement.verdict == "differs" else self.agreement.verdict
         title = f"{verdict}, {quantity(self.agreement.max, self.agreement.unit)}"
         if not self.curve.left.size:  # this is the only chart of the quantity
@@ -182,7 +182,7 @@ def foot_of(curve: Series, comparison: Comparison) -> str:
 def _strongest(pair: str, left: Mapping[str, Array], right: Mapping[str, Array]) -> tuple[str, str]:
     """Return the largest force between two bodies on the left and on the right, as text."""
     texts = []
-    for forces in (left, same_pairs(left, right)):
+    for forces in (left, with_left_pair_names(left, right)):
         strongest = float(forces[pair].max()) if pair in forces else 0.0
         texts.append(figure(strongest))
     return texts[0], texts[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....measures import largest
-from ....measures.text import figure, reading
+from ....measures.text import display_unit, figure
 from ....show.blocks import Table
 from ....show.html.blocks import badge, table
 from ....show.html.chart import chart_figure
@@ -50,7 +50,7 @@ def data_table(quantity: QuantityChart) -> Html:
     values = quantity.values()
     columns = {} if values is None else dict(values.curves)
     columns |= quantity.gap().curves
-    scale = reading(quantity.curve.unit)[0]
+    scale = display_unit(quantity.curve.unit)[0]
     cells = []
     for row in rows.tolist():
         figures = [_number(float(y[row]), tolerance * scale) for _, y in columns.values()]

@@ -1,4 +1,4 @@
-"""What two Models are called so that they can be told apart."""
+"""Labels that tell two Models apart."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .model import Model
 from .records import READ_OPTIONS
 
 
-def told_apart(left: Model, right: Model) -> tuple[str, str]:
-    """Return what two Models are called: file, backend, and whatever else is not the same.
+def distinct_labels(left: Model, right: Model) -> tuple[str, str]:
+    """Return a label for each of two Models: file, backend, and whatever else differs.
 
-    Two that are alike in all that is known of them are told apart by their `id`.
+    Where nothing that is known of them differs, the labels have their `id`.
     """
     names = [_file(left, right), _file(right, left)]
     alike = names[0] == names[1]
@@ -48,12 +48,14 @@ def _engine(model: Model, other: Model) -> str:
 
 def _options(model: Model, other: Model) -> str:
     """Return the options that are not those of the other; without a value, those of the file."""
-    own, others = _all_options(model), _all_options(other)
+    options, others = _all_options(model), _all_options(other)
     texts: list[str] = []
-    for name in dict.fromkeys((*own, *others)):
-        if name in own and name in others and _short(own[name]) == _short(others[name]):
+    for name in dict.fromkeys((*options, *others)):
+        if name in options and name in others and _short(options[name]) == _short(others[name]):
             continue
-        texts.append(f"{name}={_short(own[name])}" if name in own else f"{name} of the file")
+        texts.append(
+            f"{name}={_short(options[name])}" if name in options else f"{name} of the file"
+        )
     return f" ({', '.join(texts)})" if texts else ""
 
 

@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from .drive import Progress, silent
+from .drive import Progress, no_progress
 
-FEWEST = 5  # rounds; the middle half of fewer says nothing
+MIN_ROUNDS = 5  # rounds; the middle half of fewer says nothing
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ class Ratio:
 
     def differs_from(self, null: Ratio) -> bool:
         """Tell whether the middle halves of the rounds lie apart."""
-        if min(self.rounds, null.rounds) < FEWEST:
+        if min(self.rounds, null.rounds) < MIN_ROUNDS:
             return False
         return self.low > null.high or self.high < null.low
 
 
-def in_turns(
+def time_interleaved(
     ways: Mapping[str, Callable[[], object]],
     rounds: int,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     seed: int = 0,
 ) -> dict[str, list[float]]:
     """Call every way once a round, in an order that is shuffled each round.

@@ -1,0 +1,134 @@
+"""What the servos of a robot exert in a run, and how much of what they can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...errors import UnsupportedError
+from ...interface import Array, Data, Ints, Model
+from ...measures import largest
+from ...measures.text import NO_NUMBER, fixed
+from ...show.blocks import Block, Table
+from ...show.lesson_template import Words
+
+_ALL = 1e-9  # of its limit; a servo that is so near exerts all that it can
+
+
+@dataclass(frozen=True)
+class Torques:
+    """What the k servos of a robot exert in the n steps of a run.
+
+    Attributes:
+        joints: (k,) names of the joints that they drive.
+        slides: (k,) which of these are slides; forces on a slide are in N.
+        exerted: (n, k) in each step [N·m; of a slide, N].
+        limit: (k,) what each can exert at most [N·m; of a slide, N]; infinity without a limit.
+    """
+
+    joints: tuple[str, ...]
+    slides: tuple[bool, ...]
+    exerted: Array = field(metadata={"json": False})
+    limit: Array
+
+    @property
+    def most(self) -> Array:
+        """(k,) the largest in the run [N·m; of a slide, N]."""
+        return np.abs(self.exerted).max(axis=0)
+
+    @property
+    def last(self) -> Array:
+        """(k,) that in the last step [N·m; of a slide, N]."""
+        return self.exerted[-1]
+
+    @property
+    def steps_at_limit(self) -> int:
+        """In how many steps a servo exerted all that it can."""
+        at_limit = np.abs(self.exerted) >= self.limit * (1 - _ALL)
+        return int(at_limit.any(axis=1).sum())
+
+    @property
+    def common_limit(self) -> float | None:
+        """What each of them can exert at most [N·m]; None where they differ, or have no limit."""
+        limit = float(self.limit[0])
+        is_common = bool((self.limit == limit).all()) and not any(self.slides)
+        return limit if is_common and 0 < limit < np.inf else None
+
+
+def exerted_by(data: Data, dofs: Ints) -> Array | None:
+    """Read what the actuators exert on some degrees of freedom (k,); None where it is not told."""
+    try:
+        return data.qfrc_actuator[dofs].copy()
+    except UnsupportedError:
+        return None
+
+
+def torques_of(
+    model: Model,
+    servos: Ints,
+    joints: tuple[str, ...],
+    slides: tuple[bool, ...],
+    rows: Sequence[Array | None],
+) -> Torques | None:
+    """Return what some servos exert in a run; None where the backend does not tell it.
+
+    Args:
+        model: Of the run.
+        servos: (k,) their numbers.
+        joints: (k,) names of the joints that they drive.
+        slides: (k,) which of these are slides.
+        rows: (n) of (k,) what they exert in each step.
+    """
+    told = [row for row in rows if row is not None]
+    if not told:
+        return None
+    limits = np.abs(model.actuator_forcerange[servos] * model.actuator_gear[servos, None])
+    return Torques(joints, slides, np.array(told), limits.max(axis=1))
+
+
+def torque_slots(torques: Torques | None) -> dict[str, Any]:
+    """Return what the page's slots take of what the servos exert."""
+    limit = None if torques is None else torques.common_limit
+    if torques is None or limit is None:
+        return {"limited": False}
+    most = float(torques.most.max())
+    last, joint = largest(np.abs(torques.last))
+    steps = torques.steps_at_limit
+    slots: dict[str, Any] = {"limited": True, "at_limit": steps > 0}
+    slots["most_allowed"] = f"{limit:.3g} N·m"
+    slots["most"] = f"{most:.3g} N·m"
+    slots["most_part"] = f"{most / limit:.0%}"
+    slots["limit_steps"] = f"{steps} of {len(torques.exerted)} steps"
+    slots["last_joint"] = torques.joints[joint]
+    slots["last"] = f"{last:.3g} N·m"
+    slots["last_part"] = f"{last / limit:.0%}"
+    return slots
+
+
+def torque_table(results: Mapping[str, Torques | None], say: Words) -> list[Block]:
+    """Show the most that each servo exerted in the run, and what it exerts at the end.
+
+    Args:
+        results: By backend.
+        say: The words of the lesson.
+    """
+    first = next(iter(results.values()))
+    if first is None:
+        return []
+    rows: list[tuple[str, ...]] = []
+    for k, joint in enumerate(first.joints):
+        cells = [
+            NO_NUMBER if torques is None else _cell(torques, k) for torques in results.values()
+        ]
+        rows.append((joint, *cells))
+    return [Table(("joint", *results), rows, say("torque"))]
+
+
+def _cell(torques: Torques, joint: int) -> str:
+    """Write the most that the servo of a joint exerted, and what it exerts at the end."""
+    unit = "N" if torques.slides[joint] else "N·m"
+    last = fixed(float(torques.last[joint]), 2)
+    return f"{torques.most[joint]:.2f} {unit}, then {last} {unit}"

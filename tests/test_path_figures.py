@@ -1,0 +1,130 @@
+"""Figures of the path against plain MuJoCo, which knows nothing of this package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.models import models_dir
+
+from .support.pages import lesson_result
+
+_HOLD = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
+
+
+def _raw(scene: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Load a scene of the arm as MuJoCo's own users do."""
+    model = mujoco.MjModel.from_xml_path(str(models_dir() / "so101" / f"{scene}.xml"))
+    return model, mujoco.MjData(model)
+
+
+def test_the_arm_is_nowhere_until_forward() -> None:
+    found = lesson_result("nowhere", sm.load("so101/scene"))
+    model, data = _raw("scene")
+    assert found.first.tolist() == data.site("gripperframe").xpos.tolist() == [0, 0, 0]
+    mujoco.mj_forward(model, data)
+    assert found.second.tolist() == data.site("gripperframe").xpos.tolist()
+    assert found.second.round(4).tolist() == [0.3914, -0.0010, 0.2463]
+
+
+@pytest.mark.usefixtures("pinocchio")
+def test_another_library_computes_the_same_fingertip() -> None:
+    found = lesson_result("nowhere", sm.load("so101/scene"), further=True)
+    assert found.witness.gap < 1e-12
+    assert found.witness.fingertip == pytest.approx(found.second, abs=1e-12)
+
+
+def test_what_the_servos_exert() -> None:
+    torques = lesson_result("hold", sm.load("so101/scene")).torques
+    model, data = _raw("scene")
+    data.ctrl[:] = _HOLD
+    rows = []
+    for _ in range(400):
+        mujoco.mj_step(model, data)
+        rows.append(data.qfrc_actuator.copy())
+    assert torques.exerted.tolist() == np.array(rows).tolist()
+    assert torques.most.max() == torques.common_limit == 2.94
+    assert torques.last[model.joint("wrist_flex").dofadr[0]] == -2.94  # it presses on the floor
+    assert torques.steps_at_limit == 400
+
+
+def test_how_much_of_it_holds_the_arm_up() -> None:
+    found = lesson_result("gravity", sm.load("so101/scene"), seconds=1.0)
+    model, data = _raw("scene")
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    assert found.servos_on.forces.actuator == data.qfrc_actuator[1]
+    assert found.limit == model.actuator_forcerange[1, 1] == 2.94
+    assert abs(found.servos_on.forces.actuator) / found.limit == pytest.approx(0.194, abs=1e-3)
+
+
+def _swing(change: Callable[[int, mujoco.MjModel, mujoco.MjData, np.ndarray], None]) -> np.ndarray:
+    """Run the swing of the lesson, and return qpos after each step.
+
+    Args:
+        change: Called before each step with its number and the command.
+    """
+    model, data = _raw("scene_box")
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.time = 0
+    command = data.ctrl.copy()
+    command[:2] += (0.4, -0.2)
+    rows = [data.qpos.copy()]
+    for k in range(600):
+        change(k, model, data, command)
+        if k == 0:
+            rows[0] = data.qpos.copy()
+        mujoco.mj_step(model, data)
+        rows.append(data.qpos.copy())
+    return np.array(rows)
+
+
+def test_a_gap_of_one_step_grows_and_shrinks() -> None:
+    def whole(k: int, _model: object, data: mujoco.MjData, command: np.ndarray) -> None:
+        data.ctrl[:] = command
+
+    def extra(k: int, model: mujoco.MjModel, data: mujoco.MjData, command: np.ndarray) -> None:
+        data.ctrl[:] = command
+        if k == 0:
+            mujoco.mj_step(model, data)
+
+    def late(k: int, _model: object, data: mujoco.MjData, command: np.ndarray) -> None:
+        if k == 1:
+            data.ctrl[:] = command
+
+    found = lesson_result("replay", sm.load("so101/scene_box"))
+    first = _swing(whole)
+    assert found.identical
+    for run, change in zip(found.breaks, (extra, late), strict=True):
+        second = _swing(change)
+        gap = np.abs(first - second).max(axis=1)
+        assert run.gap.tolist() == gap.tolist()
+        assert run.course == "shrinks"
+        assert run.close == np.allclose(first[-1], second[-1])
+        assert not np.array_equal(first[-1], second[-1])
+    assert all(run.close for run in found.breaks)  # close enough misses both
+
+
+def test_time_is_a_sum() -> None:
+    found = lesson_result("time", sm.load("so101/scene_box"), steps=400)
+    model, data = _raw("scene_box")
+    for _ in range(400):
+        mujoco.mj_step(model, data)
+    assert found.end == data.time != 2.0
+    assert (found.passed, found.moved, found.exact, found.identical) == (0, False, True, True)
+
+
+def test_the_summary_shows_what_each_lesson_did() -> None:
+    found = lesson_result("summary", sm.load("so101/scene_box"))
+    model, data = _raw("scene_box")
+    mujoco.mj_step(model, data, 100)
+    assert found.sagged == data.qpos[1]
+    assert (found.nq, found.nv) == (model.nq, model.nv) == (13, 12)
+    assert found.restart == model.key_time[0] == 6.0
+    assert found.same
+    assert set(found.changed) <= {"time"}
