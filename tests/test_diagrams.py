@@ -98,8 +98,9 @@ def inside(box: Box, diagram: Diagram) -> str:
     """Return what stands in a box."""
     words: list[str] = [box.title]
     for shape in diagram.shapes:
-        is_inside = isinstance(shape, Label) and box.top < shape.row < box.bottom
-        if is_inside and box.left < shape.column < box.right:
+        if not isinstance(shape, Label):
+            continue
+        if box.top < shape.row < box.bottom and box.left < shape.column < box.right:
             words.append(shape.text)
     return "\n".join(words)
 
@@ -412,7 +413,7 @@ def test_nothing_lies_outside_of_the_svg(drawn: Sequence[Diagram]) -> None:
         tree = ElementTree.fromstring(svg(diagram))
         left, top, width, height = map(float, tree.get("viewBox").split())
         for frame in tree.iter(f"{SVG}rect"):
-            x, y, wide, high = (float(frame.get(n)) for n in ("x", "y", "width", "height"))
+            x, y, wide, high = (float(frame.get(n, "")) for n in ("x", "y", "width", "height"))
             assert left < x < x + wide < left + width
             assert top < y < y + high < top + height
         for line in (*tree.iter(f"{SVG}polyline"), *tree.iter(f"{SVG}polygon")):
