@@ -38,10 +38,7 @@ def as_called(text: str) -> str:
     Args:
         text: In which the program is called `statemachine`.
     """
-    if NAME not in text:
-        return text
-    words = program()
-    return _COMMAND.sub(lambda _: words, text)
+    return _COMMAND.sub(lambda _: program(), text)
 
 
 def command_as_called(command: str) -> str:

@@ -234,8 +234,8 @@ def test_output_that_cannot_be_written(command: str) -> None:
         # At 0.1 s the joint is slow and about to move: that its forces do not cancel is right.
         (("lesson", "gravity", "--seconds", "0.1"), ("still moves",)),
         (
-            ("lesson", "hold", "--target", "100,0,0,0,0,0"),
-            ("asked for", "5729.58°", "110.00°"),
+            ("lesson", "hold", "--ctrl", "100,0,0,0,0,0"),
+            ("command", "5729.58°", "110.00°"),
         ),
         (
             ("lesson", "replay", "--break", "late-ctrl", "--ctrl", "0,-0.6,0.5,1.6,1.57,0.28"),

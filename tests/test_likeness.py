@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
@@ -123,8 +124,7 @@ def test_functions_of_another_file_count_where_they_are_called(tmp_path: Path) -
 def test_what_is_handed_out_does_not_count(tmp_path: Path) -> None:
     """Two who use the same function that is handed out have nothing in common by that."""
     text = TEMPLATE.read_text("utf-8")
-    todo = '    raise NotImplementedError("TODO(you): tell which slots each joint owns")\n'
-    assert todo in text
+    (todo,) = re.findall(r"def demo_state.*?(    raise NotImpl[^\n]*\n)", text, re.DOTALL)
     bodies = {
         "ann.py": "    demo_hold(model)\n    return model.nq - 7, {'a': 1}\n",
         "bob.py": "    rows = [k**2 for k in demo_hold(model)]\n    return rows, sum(rows)\n",

@@ -121,7 +121,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("lesson --from time hold", "statemachine lesson --from time, or statemachine lesson hold"),
         ("lesson --from hold questions", "statemachine lesson questions"),
         ("lesson time --seconds 3", "--seconds goes with --realtime"),
-        ("lesson hold --target=nan,0,0,0,0,0", "target[0] = nan is not a finite number"),
+        ("lesson hold --ctrl=nan,0,0,0,0,0", "ctrl[0] = nan is not a finite number"),
         ("lesson replay --ctrl=0,inf,0,0,0,0", "ctrl[1] = inf is not a finite number"),
         ("conventions gravty", "Did you mean 'gravity'?"),
         ("conventions --backend mujcoo", "Did you mean 'mujoco'?"),

@@ -56,6 +56,7 @@ class Copy:
             file = self.folder / path
             if not where:
                 assert not file.exists()
+                file.parent.mkdir(exist_ok=True)
                 file.write_text(body)
             elif where == "at the end":
                 file.write_text(f"{file.read_text()}\n\n{body}")
@@ -129,3 +130,36 @@ def test_a_backend(copy: Copy) -> None:
     assert "mine" in copy.run(
         "compare", "hold", "--seconds", "0.3", "--backend", "mujoco", "--backend", "mine"
     )
+
+
+@pytest.mark.slow
+def test_the_first_hour(copy: Copy) -> None:
+    copy.follow("A first hour")
+    here = {"PYTHONPATH": str(copy.folder)}
+    of_python("-m", "pytest", "-q", "tests/test_micrometres.py", folder=copy.folder, code=0, **here)
+
+
+def joint_that_coasts() -> str:
+    """Return the code of the recipe that holds both engines against a closed form."""
+    _, coasts = code(recipe("Find and mend a fault in PyBullet's joint dynamics"))
+    return coasts
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
+def test_a_joint_coasts_as_its_closed_form_says(copy: Copy) -> None:
+    of_python("-c", joint_that_coasts(), folder=copy.folder, code=0, PYTHONPATH=str(copy.folder))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
+def test_the_closed_form_notices_the_fault_to_try_out(copy: Copy) -> None:
+    file = copy.folder / "statemachine" / "backends" / "bullet" / "joint_dynamics.py"
+    right = "-self._dry_damping * speed[self._dry_joints]"
+    text = file.read_text()
+    assert text.count(right) == 1
+    assert right in recipe("Find and mend a fault in PyBullet's joint dynamics")
+    file.write_text(text.replace(right, "0.0 * speed[self._dry_joints]"))
+    here = {"PYTHONPATH": str(copy.folder)}
+    done = of_python("-c", joint_that_coasts(), folder=copy.folder, code=1, **here)
+    assert "AssertionError" in done.stderr

@@ -336,13 +336,14 @@ UNSEEN = {
         "for each in gc.get_objects():\n"
         "    if type(each).__name__ == 'Guard':\n"
         "        each._open = ('/',)\n"
-        "return 'GOT ' + open({secret!r}).read()"
+        "raise ValueError('GOT ' + open({secret!r}).read())"
     ),
     "C code that opens files": (
         "import mujoco\n"
         'xml = \'<mujoco><asset><hfield name="h" size="1 1 1 1" file="\' + {heights!r} + \'" \'\n'
         "xml += 'content_type=\"image/vnd.mujoco.hfield\"/></asset></mujoco>'\n"
-        "return 'GOT', mujoco.MjModel.from_xml_string(xml).hfield_data.tolist()"
+        "heights = mujoco.MjModel.from_xml_string(xml).hfield_data\n"
+        "raise ValueError('GOT ' + str(heights))"
     ),
 }
 
@@ -503,7 +504,7 @@ def test_a_record_of_his_own_making_with_the_right_numbers_passes(tmp_path: Path
             end = other.qpos.copy()
             if k and world.nudge:
                 place = world.nudge.place
-                end[place] = np.nextafter(end[place], world.nudge.towards)
+                end[place] = world.nudge.pushed(end[place])
 """
     assert made_up in FORGED
     forged = FORGED.replace(made_up, worked_out)

@@ -205,7 +205,8 @@ def _titled_grids(block: Table, plain: bool, width: int) -> list[RenderableType]
         return [*lines, _grid(block, plain, width)]
     from .narrow_tables import parts_of
 
-    for part in parts_of(block, least_widths([block.headers, *block.rows], block.words), width):
+    least = least_widths([block.headers, *block.rows], block.words)
+    for part in parts_of(block, least, width, _GAP):
         lines += [_grid(part, plain, width), ""]
     return lines[:-1]
 
@@ -255,7 +256,7 @@ def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) ->
     """Widths of columns, which break no number, and of names the longest, as far as they can."""
     columns = list(zip(*rows, strict=True))
     least = least_widths(rows, words)
-    free = width - sum(least) - GAP * (len(least) - 1)
+    free = width - sum(least) - _GAP * (len(least) - 1)
 
     for _ in range(min(-free, sum(least) - len(least))):  # names give way first, to a width
         name = [k in words and size > _NARROWEST for k, size in enumerate(least)]
@@ -329,5 +330,5 @@ def _hanging(mark: str | RichText, text: RichText) -> RenderableType:
 
 
 _NARROWEST = 8  # characters of a column whose names are broken before numbers are
-GAP = 3  # characters between columns
+_GAP = 3  # characters between columns
 _USUAL = 80  # characters of a window that is not narrow

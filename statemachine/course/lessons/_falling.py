@@ -98,7 +98,7 @@ class Droop:
         most_acceleration: The largest of the whole model [rad/s² or m/s²].
         touches: When each contact of what the joint carries was first found [s]; the longer
             runs look at their end only.
-        contact_names: Those that are there at the end.
+        touching: Those that are there at the end.
         ctrl_untouched: Whether ctrl still is what it was at the start.
     """
 
@@ -112,7 +112,7 @@ class Droop:
     acceleration: float = np.nan
     most_acceleration: float = np.nan
     touches: dict[str, float] = field(default_factory=dict[str, float])
-    contact_names: Sequence[str] = ()
+    touching: Sequence[str] = ()
     ctrl_untouched: bool = True
 
     def at(self, row: int, slide: bool, decimals: int = 2) -> str:
@@ -192,7 +192,7 @@ def droop(
         _with_dynamics(run, data, dof),
         qpos=data.qpos.copy(),
         touches=first,
-        contact_names=pairs_at_end,
+        touching=pairs_at_end,
         ctrl_untouched=np.array_equal(data.ctrl, ctrl),
     )
 

@@ -66,8 +66,12 @@ def on_older_release(model: Model, ctrl: Array, qpos: Array) -> OlderRelease | N
     )
 
 
-def slots_of_older(older: OlderRelease) -> dict[str, Any]:
-    """Return what the page's slots take of the older release."""
+def slots_of_older(older: OlderRelease | None) -> dict[str, Any]:
+    """Return what the page's slots take of the older release; of none, that there is none."""
+    if older is None:
+        texts = ("older_version", "older_joint", "older_at", "older_gap")
+        switches = {"older": False, "older_right": None, "older_recorded": False}
+        return dict.fromkeys(texts, "") | switches
     limits = np.radians(1e-3), np.radians(1)  # of the choices
     return {
         "older": True,

@@ -20,7 +20,7 @@ from ...lab.runs.robot import (
     is_servo,
 )
 from ...lab.runs.usual_commands import hold_ctrl
-from ...measures import largest, together
+from ...measures import contacts_in_words, largest
 from ...measures.text import position, short_time
 from ...show.blocks import Block, Table
 from ...show.lesson_template import Blocks, Results, Words, differences, largest_gap, where
@@ -227,9 +227,7 @@ def slots(result: HoldResult) -> dict[str, Any]:
     slots["free"] = result.without_contacts is not None
     slots["free_worst"] = _farthest(result, np.abs(result.ends_without_contacts() - result.target))
     slots["installed"] = result.provenance.versions[result.provenance.backend]
-    slots["older"] = result.older is not None
-    if result.older is not None:
-        slots |= slots_of_older(result.older)
+    slots |= slots_of_older(result.older)
     return slots | _slots_of_touches(result) | torque_slots(result.torques)
 
 
@@ -244,8 +242,8 @@ def _slots_of_touches(result: HoldResult) -> dict[str, Any]:
     """Fill the slots about what the robot touches."""
     steps = len(result.time) - 1
     slots: dict[str, Any] = {"touches": result.first_contact is not None}
-    slots["touched"] = together(result.touched)
-    slots["touching"] = together(result.touching) if result.touching else "nothing"
+    slots["touched"] = contacts_in_words(result.touched)
+    slots["touching"] = contacts_in_words(result.touching) if result.touching else "nothing"
     slots["contact_steps"] = f"{result.contact_steps} of {steps} steps"
     if result.first_contact is not None:
         slots["touched_at"] = short_time(result.first_contact)

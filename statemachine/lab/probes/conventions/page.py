@@ -183,6 +183,7 @@ CALLS_OF_THIS_LIBRARY = {
 }
 # What each lesson of the path shows, in a line.
 REMINDERS = (
+    ("nowhere", "make_data computes nothing: forward does, or step."),
     ("objects", "A Model never changes. A Data is everything that does."),
     ("state", "A joint's slots in qpos and in qvel differ: jnt_qposadr, jnt_dofadr."),
     ("forward", "data.qpos is the array itself; a copy is data.qpos.copy()."),
