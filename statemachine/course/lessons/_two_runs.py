@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...interface import Array, Data, Model, get_state, make_data, reset, set_st
 from ...measures import largest
 from ...measures.text import millimetres
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Words, where
+from ...show.lesson_template import Words, by_engine, where
 from ...show.pictures import Traces
 
 BREAKS = ("extra-step", "late-ctrl")
@@ -255,6 +256,41 @@ def of_its_own(results: Mapping[str, Sequence[WayBack]], say: Words) -> list[Tab
         for name, ways in results.items()
         if ways
     ]
+
+
+@dataclass(frozen=True)
+class Touching:
+    """What touched in the steps of a run.
+
+    Attributes:
+        contacts: (n,) Number of contacts that each step found.
+        pairs: By the names of two bodies, in how many steps they touched.
+    """
+
+    contacts: Array
+    pairs: Mapping[str, int]
+
+
+def touching_table(results: Mapping[str, Touching], say: Words) -> Table:
+    """Show how many contacts the steps of a run found, and which pairs touched.
+
+    Args:
+        results: By backend.
+        say: The words of the lesson.
+    """
+    rows: dict[str, Callable[[Touching], str]] = {}
+    rows[say("fewest")] = lambda result: str(result.contacts.min())
+    rows["most"] = lambda result: str(result.contacts.max())
+    rows["on average"] = lambda result: f"{result.contacts.mean():.1f}"
+    for result in results.values():
+        for pair in result.pairs:
+            rows[pair] = partial(_steps_of_pair, pair)
+    return by_engine(results, rows, say("touched"))
+
+
+def _steps_of_pair(pair: str, result: Touching) -> str:
+    """Say in how many of the steps a pair of bodies touched."""
+    return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
 def _exactly(difference: float, say: Words) -> str:

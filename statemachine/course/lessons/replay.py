@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from ...show.lesson_template import Blocks, Results, Words, by_engine, differenc
 from ._two_runs import (
     BREAKS,
     BrokenRun,
+    Touching,
     broken,
     broken_table,
     course_of,
@@ -32,6 +32,7 @@ from ._two_runs import (
     of_its_own,
     restore_methods,
     through_us,
+    touching_table,
 )
 from .session import CodeRun, Options
 
@@ -341,7 +342,8 @@ def tables(results: Results[ReplayResult], first: ReplayResult) -> Blocks:
     """Show whether the runs are equal, what touched on the way, and the ways back."""
     blocks: dict[str, Table | Sequence[Block]] = {}
     blocks["outcome"] = _outcome(results)
-    blocks["touched"] = _touched(results)
+    touching = {name: Touching(result.contacts, result.pairs) for name, result in results.items()}
+    blocks["touched"] = touching_table(touching, _SAY)
     blocks["growth"] = []
     if first.broken_by:
         gaps = {name: result.difference for name, result in results.items()}
@@ -369,23 +371,6 @@ def _outcome(results: Results[ReplayResult]) -> Table:
     rows[_SAY("on_the_way")] = lambda result: f"{result.difference.max():.1e}"
     rows[_SAY("turn")] = lambda result: degrees(result.travel, 1)
     return by_engine(results, rows, _SAY("outcome"))
-
-
-def _touched(results: Results[ReplayResult]) -> Table:
-    """Show how many contacts the steps of the first run found, and which pairs touched."""
-    rows: dict[str, Callable[[ReplayResult], str]] = {}
-    rows[_SAY("fewest")] = lambda result: str(result.contacts.min())
-    rows["most"] = lambda result: str(result.contacts.max())
-    rows["on average"] = lambda result: f"{result.contacts.mean():.1f}"
-    for result in results.values():
-        for pair in result.pairs:
-            rows[pair] = partial(_steps_of_pair, pair)
-    return by_engine(results, rows, _SAY("touched"))
-
-
-def _steps_of_pair(pair: str, result: ReplayResult) -> str:
-    """Say in how many of the steps a pair of bodies touched."""
-    return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
 def _hinges_apart(left: ReplayResult, right: ReplayResult) -> str:
