@@ -14,7 +14,7 @@ from typing import Any
 import statemachine as sm
 from statemachine import releases
 from statemachine.backends import BackendChoice
-from statemachine.course.lessons.hold import OLDER
+from statemachine.course.lessons._older_release import OLDER
 from statemachine.lab.recordings import Trace, record_scenario, write
 from statemachine.lab.runs.scenarios import SCENARIOS
 
