@@ -156,7 +156,12 @@ def test_a_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.Monke
     huge = tmp_path / "huge.py"
     with huge.open("wb") as file:
         file.truncate(10**9)
-    monkeypatch.setattr(Path, "read_bytes", lambda _: pytest.fail("it was read"))
+    read = Path.read_bytes
+
+    def read_others(path: Path) -> bytes:
+        return pytest.fail("it was read") if path == huge else read(path)
+
+    monkeypatch.setattr(Path, "read_bytes", read_others)
     (entry,) = judge_all([Submission("huge.py", huge)], "mujoco")
     assert "far too large" in entry.refusal
     assert entry.sha256 == ""

@@ -71,7 +71,7 @@ def test_bits_do_not_depend_on_the_kernels_of_numpy() -> None:
 
 
 # A part of what they find is rounded, or only compared with a limit.
-_ROUNDED = {"_worst", "_padding_at", "Surfaces._solve", "Surfaces._turning"}
+_ROUNDED = {"_worst", "_padding_at", "Surfaces._solve", "Surfaces._frictions_of_solids"}
 # Vertices of hulls are rounded when they are written.
 _ROUNDED |= {"Hull.__init__", "roughness", "_planes", "_inset", "_sphere"}
 

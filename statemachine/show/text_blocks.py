@@ -262,7 +262,9 @@ def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) ->
         name = [k in words and size > _NARROWEST for k, size in enumerate(least)]
         least[max(range(len(least)), key=lambda k: (name[k], least[k]))] -= 1
     free = max(free, 0)
-    wants = [max(map(_longest, cells)) - size for cells, size in zip(columns, least, strict=True)]
+    wants: list[int] = []
+    for cells, size in zip(columns, least, strict=True):
+        wants.append(max(0, max(map(_longest, cells)) - size))  # a column may be empty
     shared, in_turn = (_widened(least, wants, free, share) for share in (True, False))
     return min((shared, in_turn), key=lambda widths: _height(rows, widths))
 

@@ -315,6 +315,7 @@ def slots(result: ReplayResult) -> dict[str, Any]:
 def _slots_of_breaks(breaks: Sequence[BrokenRun]) -> dict[str, Any]:
     """Fill the slots about second runs that were made to differ."""
     slots: dict[str, Any] = {"broken": False, "fooled": False, "shrinks_all": False}
+    slots["all_differ"] = False
     if not breaks:
         return slots
     first, fooled = breaks[0], [run.close and run.end > 0 for run in breaks]
@@ -323,6 +324,8 @@ def _slots_of_breaks(breaks: Sequence[BrokenRun]) -> dict[str, Any]:
     slots["gap_peak"] = f"{first.peak:.1e}"
     slots["gap_peak_step"] = first.peak_step
     slots["gap_end"] = f"{first.end:.1e}"
+    # A late command changes nothing of a robot without actuators.
+    slots["all_differ"] = all(run.peak > 0 for run in breaks)
     slots["notices"] = all(run.end > 0 for run in breaks)
     slots["shrinks_all"] = all(run.course == "shrinks" for run in breaks)
     return slots
