@@ -256,7 +256,7 @@ def test_what_is_counted() -> None:
         ),
         "docs/exercises.md": (
             f"{word[len(JUDGES)]} functions",
-            f"fault is put into the arm at a time, {word[len(FAULTS)]} in all",
+            f"{word[len(FAULTS)].capitalize()} faults are put into the arm",
         ),
         "docs/index.md": (f"{word[len(PATH)]} lessons",),
         "docs/audit.md": (f"{word[len(QUESTIONS)]} questions",),
