@@ -484,8 +484,8 @@ def test_a_record_of_runs_that_never_were_does_not_pass(tmp_path: Path) -> None:
     judgement = grade.functions[-1]
     assert not judgement.passed
     assert judgement.remarks == (
-        "first run: it did not end where 600 steps of this command take this arm: nothing but "
-        "ctrl may act on it",
+        "first run: it did not end where 600 steps under this command take this arm: nothing "
+        "but ctrl may act on it",
     )
 
 
