@@ -573,11 +573,11 @@ def test_a_folder_of_something_else_and_an_extra_that_is_missing(
     refused(
         (BadInputError, r"holds thesis.tex and no sweep\.json", partial(run, tmp_path)),
         (FileExistsError, "", partial(run, thesis)),
-        (MissingEngineError, r"statemachine-sim\[cluster\]", cluster),
+        (MissingEngineError, r"\[cluster\]", cluster),
     )
     monkeypatch.setitem(sys.modules, "joblib", None)
     refused(
-        (MissingEngineError, r"statemachine-sim\[sweep\]", lambda: prepare_sweep(small("hold")))
+        (MissingEngineError, r"\[sweep\]", lambda: prepare_sweep(small("hold")))
     )
 
 

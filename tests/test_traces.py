@@ -341,7 +341,7 @@ def test_without_pyarrow_one_line_names_the_extra(
     refused(
         (
             MissingEngineError,
-            r"statemachine-sim\[parquet\]",
+            r"\[parquet\]",
             lambda: write(box, tmp_path / "box.parquet"),
         )
     )

@@ -30,8 +30,8 @@ PUBLIC = (
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
     *PUBLIC, "_models", "atomic_files", "engines", "freshness", "gym", "installed", "installing",
-    "measures", "model_files", "processes", "program", "release_names", "releases", "robot_packages", "show",
-    "typed_numbers", "witness",
+    "measures", "model_files", "processes", "program", "release_names", "releases",
+    "robot_packages", "show", "typed_numbers", "witness",
 )  # fmt: skip
 
 _PROCESS, _PROGRAM = "it starts another process", "it starts another program"
