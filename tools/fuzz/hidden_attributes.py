@@ -21,7 +21,7 @@ import numpy as np
 from ._against_raw import SAME, SHARE, TIMESTEP, asked_why, raw_joints, raw_shares
 from ._tally import Tally
 
-TRIES = 40
+TRIES = 100
 _EDITS = 3
 _NOTHING = 1e-12  # of the gap: it has no effect
 
