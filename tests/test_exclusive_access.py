@@ -145,7 +145,12 @@ INTERRUPTED: dict[str, Use] = {
 @pytest.mark.parametrize("verb", INTERRUPTED)
 @pytest.mark.parametrize(
     "mid_contact",
-    ["mujoco", "pybullet", pytest.param("pybullet as it comes", marks=pytest.mark.slow), "hidden"],
+    [
+        "mujoco",
+        pytest.param("pybullet", marks=pytest.mark.slow),
+        pytest.param("pybullet as it comes", marks=pytest.mark.slow),
+        "hidden",
+    ],
     indirect=True,
 )
 def test_an_interrupted_verb_completes_or_undoes_or_refuses(

@@ -60,7 +60,13 @@ def is_brought(found: Explanation) -> bool:
     return found.brought is not None and found.brought <= 1e-9 * found.gap + 1e-12
 
 
-@pytest.mark.parametrize("name", ALONE)
+_QUICK_CAUSES = ("mass", "damping", "gains", "softness")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=() if n in _QUICK_CAUSES else pytest.mark.slow) for n in ALONE],
+)
 def test_one_cause_is_found_and_explains_all(name, tmp_path):
     case = ALONE[name]
     idle = (
@@ -268,6 +274,7 @@ def test_what_an_engine_leaves_out_is_said(tmp_path: Path) -> None:
     assert found.gap == 0.0
 
 
+@pytest.mark.slow
 def test_the_robot_of_a_urdf_is_that_of_the_mjcf():
     files = "so101/so101", ROOT / "models/so101/so101.urdf"
     left, right = (sm.load(file, contacts=False) for file in files)

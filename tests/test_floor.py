@@ -59,6 +59,7 @@ def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) ->
     assert band.end < band.most
 
 
+@pytest.mark.slow
 def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 20.0, qpos=np.array([2.5, 1.0]))
     band = band_of(run, "lower")

@@ -71,7 +71,9 @@ def names(changes: tuple[KnownChange, ...]) -> list[str]:
     return [change.name for change in changes]
 
 
-@pytest.mark.parametrize("integrator", ["implicit", "implicitfast"])
+@pytest.mark.parametrize(
+    "integrator", [pytest.param("implicit", marks=pytest.mark.slow), "implicitfast"]
+)
 def test_kv_of_a_servo_at_its_limit_is_told_with_the_part_that_plain_mujoco_has_of_it(
     tmp_path: Path, old_releases: None, integrator: str
 ) -> None:
@@ -99,6 +101,7 @@ def test_nothing_is_told_of_servos_where_the_run_has_none_at_its_limit(
     assert pair.comparison.agrees
 
 
+@pytest.mark.slow
 def test_a_turned_inertial_of_a_urdf_is_told(tmp_path: Path, old_releases: None) -> None:
     file = written(tmp_path / "m.urdf", urdf(rpy="0 0 0.9"))
     pair = pair_of(file, "fall")
@@ -117,6 +120,7 @@ def test_a_turned_inertial_of_a_urdf_is_told(tmp_path: Path, old_releases: None)
     assert [change.left, change.right] == pytest.approx(products, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_mimic_of_a_urdf_is_told(tmp_path: Path, old_releases: None) -> None:
     text = urdf(mimic='<mimic joint="a_j" multiplier="-1"/>', mass="3")
     file = written(tmp_path / "m.urdf", text)
@@ -161,7 +165,11 @@ BOXES = """<mujoco><worldbody><geom type="plane" size="2 2 0.1"/>
 
 
 @pytest.mark.parametrize(
-    ("shape", "name"), [("box", "boxes in contact"), ("cylinder", "cylinders in contact")]
+    ("shape", "name"),
+    [
+        ("box", "boxes in contact"),
+        pytest.param("cylinder", "cylinders in contact", marks=pytest.mark.slow),
+    ],
 )
 def test_shapes_with_other_contact_points_are_told_by_the_bodies_that_touch(
     tmp_path: Path, old_releases: None, shape: str, name: str

@@ -388,6 +388,7 @@ def test_print_shows_what_the_command_prints(light: str, heavy: str) -> None:
     assert "\x1b" not in str(result)
 
 
+@pytest.mark.slow
 def test_details_are_the_page_of_that_option(light: str, heavy: str) -> None:
     words = ("compare", "hold", light, heavy, "--seconds", "0.1", "--no-chaos", "--details")
     printed = of_python("-m", "statemachine", *words, code=1).stdout

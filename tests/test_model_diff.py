@@ -202,6 +202,7 @@ def test_our_own_urdf_holds_all_that_a_urdf_can() -> None:
     assert result.mass[0] == pytest.approx(float(raw.body_mass.sum()), rel=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [9, 6])
 def test_rounded_figures_are_equal_and_the_largest_is_stated(tmp_path: Path, digits: int) -> None:
     file = models_dir() / "so101" / "so101.urdf"
@@ -537,6 +538,7 @@ def test_an_mjcf_goes_on_without_its_meshes(pair: Pair) -> None:
     refused((ModelError, "nonsense", lambda: compare(one, two)))
 
 
+@pytest.mark.slow
 def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
     links = "".join(f'<link name="l{k}"/>' for k in range(1500))
     joints = "".join(

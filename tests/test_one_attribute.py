@@ -34,7 +34,7 @@ from .support.schema import (
 )
 
 SEED, COUNT = 47, 78
-FURTHER_SEEDS = (1, 2, 3)
+FURTHER_SEEDS = (3,)  # 1 and 2 were run when the rules were written; any other one may be
 # What is less is the order in which numbers are added, which an edit can change, too.
 _ROUNDING = 1e-9  # [m, rad, m/s, rad/s]
 # MuJoCo itself ends here: it says that a tendon equality cannot sleep yet.

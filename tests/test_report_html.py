@@ -508,6 +508,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert "never touches" in page_of(never)
 
 
+@pytest.mark.slow
 def test_what_was_commanded(hold: Made) -> None:
     table = commands_table(hold[0])
     for row, value in zip(table.rows, hold[1].ctrl[0], strict=True):
@@ -1003,6 +1004,7 @@ def test_a_mesh_keeps_its_surface_and_too_many_triangles_are_made_fewer() -> Non
         assert end(fewer.vertices, 0) == pytest.approx(end(whole.vertices, 0), abs=0.02)
 
 
+@pytest.mark.slow
 def test_normals_are_those_of_the_faces(tab: Tab) -> None:
     mesh = mesh_of(drawing_of(sm.load("so101/scene")))
     code = (ROOT / "statemachine" / "show" / "html" / "gl.js").read_text("utf-8")

@@ -106,6 +106,7 @@ def values(folder: Path) -> Any:
     return read_cells(folder).drop_columns(["wall_seconds"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_an_engine_as_it_comes_is_a_backend_of_a_sweep(tmp_path: Path) -> None:
     """Its cells are those of `load(defaults="engine")`, in a folder that Windows takes, too."""
@@ -576,9 +577,7 @@ def test_a_folder_of_something_else_and_an_extra_that_is_missing(
         (MissingEngineError, r"\[cluster\]", cluster),
     )
     monkeypatch.setitem(sys.modules, "joblib", None)
-    refused(
-        (MissingEngineError, r"\[sweep\]", lambda: prepare_sweep(small("hold")))
-    )
+    refused((MissingEngineError, r"\[sweep\]", lambda: prepare_sweep(small("hold"))))
 
 
 def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:
@@ -624,6 +623,7 @@ def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> Non
     write_or_check_manifest(tmp_path, sweep.manifest(), extend=False)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")
 def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> None:
     code = (

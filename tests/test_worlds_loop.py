@@ -128,8 +128,10 @@ def test_ctrl_c_ends_a_step_at_once_and_each_world_is_whole(
     interrupted_after(0.8, lambda: step(worlds, 3000))
     assert time.monotonic() - began < 2.5  # of 3 s that world 2 would have taken
     assert not worlds.diverged
-    assert worlds.time.tolist() == pytest.approx([15.0, 15.0, 0, 0, 0])
     times = worlds.time.copy()
+    assert times[2:].tolist() == [0, 0, 0]
+    for time_of_world in times[:2]:  # a busy machine may not come to one of them before the signal
+        assert time_of_world == 0 or time_of_world == pytest.approx(15.0)
     worlds.ctrl[:] = 0
     step(worlds, 2)
     assert worlds.time == pytest.approx(times + 0.01)
