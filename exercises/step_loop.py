@@ -180,6 +180,8 @@ def show_gravity(model, result):
     print("   time    servos on   servos off")
     for second, (one, two) in enumerate(zip(on, off, strict=True)):
         print(f"{second:5d} s  {one:10.3f}°  {two:10.3f}°")
+    if len(on) != 5:
+        print(f"You return {len(on)} of each; 5 are asked for: at 0, 1, 2, 3 and 4 s")
 
 
 def show_state(model, result):

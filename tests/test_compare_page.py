@@ -292,6 +292,19 @@ def test_the_last_line_is_a_command_that_asks_about_the_lead(heavier: CompareRes
     assert words[-3:] == ["--why", "--quantity", heavier.finding.lead.name]
 
 
+def test_the_first_screen_says_over_which_time_its_last_figures_are_a_mean(
+    hold: tuple[Trace, Trace],
+) -> None:
+    one, other = hold
+    result = result_of(compare(one, other))
+    window = 0.1 * (one.time[-1] - one.time[0])
+    assert f"is the mean of the last {window:.3g} s." in " ".join(shown(page(result)).split())
+    (wrist,) = (a for a in result.comparison.agreements if a.name == "wrist_flex")
+    last = one.time >= one.time[-1] - window
+    gap = np.degrees(np.abs(one.qpos - other.qpos)[last, 3].mean())
+    assert wrist.settled == pytest.approx(np.radians(gap))
+
+
 def test_the_lead_comes_first_and_then_what_is_worse(heavier: CompareResult) -> None:
     worst = worst_of(heavier.comparison, heavier.finding, None)
     first, *others = worst.agreements

@@ -201,7 +201,7 @@ def test_a_free_joint_has_seven_slots_above_six_and_a_ball_four_above_three(
             for row in (of_qpos, of_qvel)
         ]
         assert tuple(counted) == lengths
-        assert f"≠  {lengths[0]} above {lengths[1]}" in texts(diagram)
+        assert f"≠  {lengths[0]} and {lengths[1]} slots" in texts(diagram)
     assert texts(diagram).count("quaternion") == 2
 
 

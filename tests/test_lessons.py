@@ -29,6 +29,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from rich.cells import cell_len
+from rich.console import Console
 
 import statemachine as sm
 from statemachine.cli import lesson as lesson_command
@@ -445,7 +446,7 @@ def test_the_code_of_time_counts_the_steps_that_the_page_does() -> None:
     ("part", "change"),
     [
         ("forward", lambda r: with_figures(r, equal=())),
-        ("state", lambda r: with_figures(r, joints=r.joints[:6])),
+        ("state", lambda r: with_figures(r, joints=(with_figures(r.joints[0], qvel_start=1),))),
         ("replay", lambda r: with_figures(r, second_run=r.first_run + 1)),
         ("gravity", lambda r: with_figures(r, servos_on=r.servos_off)),
         ("objects", lambda r: with_figures(r, alone=False)),
@@ -653,7 +654,7 @@ _LATER = r"Go on later with: [^\n]*statemachine lesson --from "
             "",
         ),
         ("state", [(_ASKED, "x\n"), (_ASKED, "a\n")], {}, "You predicted a; it is c", ""),
-        ("state", [(_ASKED, "\n")], {}, "", "You predicted"),  # passed
+        ("state", [(_ASKED, "\n")], {}, r"Answer: c\) ", "You predicted"),  # passed
         ("state --no-questions", [], {}, "", _ASKED),
         ("state --no-questions", [], {"lines": 9}, "", _MORE),
         ("state", [(_ASKED, "\x03")], {}, "", "13 12 6"),
@@ -764,6 +765,12 @@ def test_nothing_scrolls_away_unread(lesson: str, columns: int, lines: int) -> N
     assert re.search(r"You\s+predicted", seen)
 
 
+def test_a_verdict_has_no_blanks_behind_it_in_a_terminal() -> None:
+    console = Console(force_terminal=True, width=80, file=io.StringIO())
+    text = terminal._text(console, [Verdict("It is so.", True)])
+    assert re.sub(r"\x1b\[[0-9;]*m", "", text) == "\n✓ It is so.\n"
+
+
 @pytest.mark.parametrize(
     ("rows", "blocks", "ends"),
     [
@@ -778,6 +785,25 @@ def test_nothing_scrolls_away_unread(lesson: str, columns: int, lines: int) -> N
 )
 def test_windows_are_filled_evenly(rows: list[int], blocks: set[int], ends: list[int]) -> None:
     assert quiz.windows(rows, blocks, 23) == ends
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        ["    import time\n", "\n", *["    step()\n"] * 8],
+        [" ┌──┐  title\n", *[" │  │\n"] * 8, " └──┘\n"],
+        [" +--+\n", *[" |  |\n"] * 8, " +--+\n"],
+    ],
+)
+def test_a_program_and_a_diagram_stay_on_one_screen(figure: list[str]) -> None:
+    lines = [*["text\n"] * 9, "\n", *figure, "\n", *["text\n"] * 9]
+    begin, end = 10, 10 + len(figure)
+    ends = quiz.windows([1] * len(lines), {0}, 15, quiz.cuts(lines))
+    assert not {*range(begin + 1, end)} & {*ends}
+    # Where it has no room it is cut, and nothing is lost.
+    ends = quiz.windows([1] * len(lines), {0}, 5, quiz.cuts(lines))
+    assert {*range(begin + 1, end)} & {*ends}
+    assert ends[-1] == len(lines)
 
 
 def test_a_bar_of_progress_takes_nothing_of_what_is_printed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import mujoco
@@ -110,6 +111,59 @@ def test_a_gap_of_one_step_grows_and_shrinks() -> None:
     assert all(run.close for run in found.breaks)  # close enough misses both
 
 
+def test_what_a_step_leaves_is_one_step_old() -> None:
+    found = lesson_result("forward", sm.load("so101/scene"))
+    model, data = _raw("scene")
+    tip = data.site("gripperframe").xpos
+    data.qpos[1] = found.value
+    mujoco.mj_forward(model, data)
+    before = tip.copy()
+    mujoco.mj_step(model, data)
+    left = tip.copy()
+    mujoco.mj_forward(model, data)
+    assert found.stepped.of_before
+    assert left.tolist() == before.tolist()
+    assert found.stepped.behind == float(np.linalg.norm(tip - left)) > 0
+
+
+@pytest.mark.filterwarnings("ignore:Attach")
+def test_a_crate_before_the_arm_parts_the_addresses() -> None:
+    found = lesson_result("questions", sm.load("so101/scene_box"))
+    here, _ = _raw("scene_box")
+    assert here.jnt_qposadr.tolist() == here.jnt_dofadr.tolist()
+    assert len(found.answers.state.joints) == here.njnt == 7
+    spec = mujoco.MjSpec.from_file(str(models_dir() / "so101" / "scene_box.xml"))
+    while spec.keys:  # a keyframe has one length of qpos
+        spec.delete(spec.keys[0])
+    crate = mujoco.MjSpec.from_string(
+        "<mujoco><worldbody><body name='crate'><freejoint/><geom size='.05'/></body>"
+        "<site name='rest'/></worldbody></mujoco>"
+    )
+    arm = crate.site("rest").attach_body(spec.body("base"), "", "")
+    assert arm.name == "base"
+    behind = crate.compile().joint(found.behind_crate.name)
+    assert found.behind_crate.qpos_start == behind.qposadr[0] == 7
+    assert found.behind_crate.qvel_start == behind.dofadr[0] == 6
+
+
+def test_the_time_in_sleep_is_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+    sleep = time.sleep
+
+    def timed(seconds: float) -> None:
+        began = time.perf_counter()
+        sleep(seconds)
+        slept.append(time.perf_counter() - began)
+
+    monkeypatch.setattr(time, "sleep", timed)
+    model = sm.load("so101/scene_box")
+    found = lesson_result("time", model, steps=20, realtime=True, seconds=0.5)
+    paced = [one for one in slept if one < 0.15]  # the other is the nap of the run without waiting
+    assert len(slept) >= 100
+    assert found.waited == pytest.approx(sum(paced), rel=0.02, abs=0.01)
+    assert found.waited <= found.paced
+
+
 def test_time_is_a_sum() -> None:
     found = lesson_result("time", sm.load("so101/scene_box"), steps=400)
     model, data = _raw("scene_box")
@@ -126,5 +180,8 @@ def test_the_summary_shows_what_each_lesson_did() -> None:
     assert found.sagged == data.qpos[1]
     assert (found.nq, found.nv) == (model.nq, model.nv) == (13, 12)
     assert found.restart == model.key_time[0] == 6.0
+    path = "nowhere objects state forward hold gravity reset replay time"
+    assert list(found.lines) == path.split()
+    assert found.lines["gravity"].startswith(f"{np.degrees(data.qpos[1]):.3f} degrees")
     assert found.same
     assert set(found.changed) <= {"time"}

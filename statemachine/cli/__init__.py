@@ -81,10 +81,11 @@ class _Parser(argparse.ArgumentParser):
             given = message.split()[2].partition("=")[0]
             known = self._option_string_actions
             from ..course.lessons import LESSONS
+            from ..measures.text import listed
 
             others = [x.name for x in LESSONS.values() if given.removeprefix("--") in x.defaults]
             if "lesson" in sys.argv and others:
-                message += f"; it is an option of {PROGRAM} lesson {' and '.join(others)}"
+                message += f"; it is an option of {PROGRAM} lesson {listed(others)}"
             else:
                 plain = given == "--model" and "; type the model without it"
                 message += plain or did_you_mean(given, known, 0.6)

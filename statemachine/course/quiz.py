@@ -26,6 +26,9 @@ from .grading import KIND, answers_in
 
 _WIDTH_MOST = 100
 _SPLIT = 0.25  # what it costs to split a block: as much as half of a window that stays empty
+_CUT = 10.0  # what it costs to cut a figure: so much that one is cut only where it has no room
+_DRAWN = re.compile(r"[│┌╭]|^ *[|+]")  # in a line of a diagram, also in ASCII
+_PROGRAM = " " * 4  # how a line of a program begins
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -63,7 +66,7 @@ class Reader:
         rows = [self._rows, *map(_rows, lines[1:])]
         blocks = {*itertools.accumulate(map(len, self._new), initial=1)}
         self._new, begin = [], 0
-        for end in windows(rows, blocks, _room()):
+        for end in windows(rows, blocks, _room(), cuts(lines)):
             if begin:
                 self.go_on()
             self._rows = sum(rows[begin:end])
@@ -187,7 +190,35 @@ def _forget_typed_ahead() -> None:
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
-def windows(rows: Sequence[int], blocks: Container[int], room: int) -> list[int]:
+def cuts(lines: Sequence[str]) -> set[int]:
+    """Return the lines before which a window must not end: it would cut a diagram or a program.
+
+    A diagram is some lines without an empty one between them of which one is drawn. A program may
+    have empty lines.
+    """
+    found: set[int] = set()
+    plain = [_COLOUR.sub("", line).rstrip() for line in lines]
+    begin = 0
+    for is_empty, group in itertools.groupby(plain, key=lambda line: not line):
+        run = list(group)
+        end = begin + len(run)
+        if is_empty:
+            is_between = 0 < begin < end < len(plain)
+            if is_between and _is_program(plain[begin - 1]) and _is_program(plain[end]):
+                found |= set(range(begin, end + 1))
+        elif _is_program(run[0]) or any(_DRAWN.search(line) for line in run):
+            found |= set(range(begin + 1, end))
+        begin = end
+    return found
+
+
+def _is_program(line: str) -> bool:
+    return line.startswith(_PROGRAM)
+
+
+def windows(
+    rows: Sequence[int], blocks: Container[int], room: int, figures: Container[int] = ()
+) -> list[int]:
     """Split lines into windows that are filled evenly, so that none has a line or two alone.
 
     The sum over all windows of the square of the rows that stay empty is least.
@@ -197,6 +228,7 @@ def windows(rows: Sequence[int], blocks: Container[int], room: int) -> list[int]
         blocks: Lines with which a block begins, by number; a block is split only where windows
             would stay emptier otherwise.
         room: Rows of a window.
+        figures: Lines before which a window ends only where a figure has no room in one.
 
     Returns:
         For each window the line before which it ends.
@@ -210,6 +242,8 @@ def windows(rows: Sequence[int], blocks: Container[int], room: int) -> list[int]
             cost = best[begin].cost + empty**2
             if splits_block:
                 cost += _SPLIT * room**2
+            if end in figures:
+                cost += _CUT * room**2
             layouts.append(_Layout(cost, (*best[begin].ends, end)))
         best.append(min(layouts))
     return list(best[-1].ends)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
@@ -13,6 +14,7 @@ from .blocks import (
     Code,
     Heading,
     Headline,
+    Items,
     Page,
     Printed,
     Question,
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 WIDTH_PIPED = 80
 UNDECIDED = "it cannot be told on this machine now"  # of a question that the runs do not decide
 _WIDTH_MOST = 100
+# Blanks at the end of a line, before a colour ends.
+_PADDED = re.compile(r" +((?:\x1b\[[0-9;]*m)*)$", re.MULTILINE)
 
 
 class Audience(Protocol):
@@ -141,9 +145,12 @@ class Printer:
             self._predicted.append(judged(question, choice))
             if not question.undecided:
                 self._answered.append(choice == question.right)
-        elif question.always:
-            answer = Text(f"Answer: {lettered_answer(question)}. {question.because}")
+            return
+        answer = Text(f"Answer: {lettered_answer(question)}. {question.because}")
+        if question.always:
             self.write([answer] if self._reader else [question, answer])
+        elif self._reader:  # who passed
+            self._predicted.append(answer)
 
     def show(self, block: Block, following: Block | None) -> None:
         """Print a block, with what became of the prediction before it."""
@@ -208,11 +215,14 @@ def _text(console: Console, blocks: Sequence[Page | Block]) -> str:
     """Return blocks as a console draws them."""
     piped = not console.is_terminal
     plain = console.legacy_windows or console.options.ascii_only
-    with console.capture() as captured:
-        for block in _unfolded(blocks):
+    shown: list[str] = []
+    for block in _unfolded(blocks):
+        with console.capture() as captured:
             for line in drawn(block, plain, piped, console.width):
                 console.print(line, soft_wrap=isinstance(block, Code | Printed))
-    text = captured.get().replace(NO_BREAK, " ")
+        text = captured.get().replace(NO_BREAK, " ")
+        shown.append(_PADDED.sub(r"\1", text) if isinstance(block, Verdict | Items) else text)
+    text = "".join(shown)
     if piped and text:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
     return text

@@ -13,7 +13,7 @@ from ...interface import Array, Data, Ints, Model
 from ...measures import largest
 from ...measures.text import NO_NUMBER, fixed
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Words
+from ...show.lesson_template import Words, where
 
 _ALL = 1e-9  # of its limit; a servo that is so near exerts all that it can
 
@@ -118,17 +118,22 @@ def torque_table(results: Mapping[str, Torques | None], say: Words) -> list[Bloc
     first = next(iter(results.values()))
     if first is None:
         return []
+    most, last = say("most"), say("last")
+    headers = ["joint"]
+    for name in results:
+        prefix = where(results, name)
+        headers += [f"{prefix}{most}", f"{prefix}{last}"]
     rows: list[tuple[str, ...]] = []
     for k, joint in enumerate(first.joints):
-        cells = [
-            NO_NUMBER if torques is None else _cell(torques, k) for torques in results.values()
-        ]
-        rows.append((joint, *cells))
-    return [Table(("joint", *results), rows, say("torque"))]
+        row = [joint]
+        for torques in results.values():
+            row += [NO_NUMBER, NO_NUMBER] if torques is None else _cells(torques, k)
+        rows.append(tuple(row))
+    return [Table(headers, rows, say("torque"))]
 
 
-def _cell(torques: Torques, joint: int) -> str:
+def _cells(torques: Torques, joint: int) -> list[str]:
     """Write the most that the servo of a joint exerted, and what it exerts at the end."""
     unit = "N" if torques.slides[joint] else "N·m"
     last = fixed(float(torques.last[joint]), 2)
-    return f"{torques.most[joint]:.2f} {unit}, then {last} {unit}"
+    return [f"{torques.most[joint]:.2f} {unit}", f"{last} {unit}"]

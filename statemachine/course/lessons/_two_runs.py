@@ -11,7 +11,18 @@ from typing import Literal
 import numpy as np
 
 from ...engines.records import WayBack
-from ...interface import Array, Data, Model, get_state, make_data, reset, set_state, step
+from ...interface import (
+    Array,
+    Data,
+    Ints,
+    JointType,
+    Model,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
 from ...measures import largest
 from ...measures.text import millimetres
 from ...show.blocks import Block, Table
@@ -120,7 +131,7 @@ def _growth_tables(runs: Mapping[str, BrokenRun], say: Words) -> list[Table]:
         rows = list(zip(*columns.values(), strict=True))
         drawn = frozenset(range(2, len(columns), 2))
         headers = [name if k not in drawn else "" for k, name in enumerate(columns)]
-        tables.append(Table(headers, rows, say("grown"), drawn))
+        tables.append(Table(headers, rows, say("drawn"), drawn))
     return tables
 
 
@@ -150,14 +161,26 @@ def _drawn(gaps: Sequence[float], width: int) -> list[str]:
     return ["█" * max(length, int(gap > 0)) for length, gap in zip(lengths, gaps, strict=True)]
 
 
+def free_body(model: Model) -> str:
+    """Return the name of the first free body, or what else to call it."""
+    for body in model.jnt_bodyid[model.jnt_type == int(JointType.FREE)].tolist():
+        if model.body_names[body]:
+            return model.body_names[body]
+    return "free body"
+
+
 def growth(
-    differences: Mapping[str, Array], bodies: Mapping[str, Array | None], say: Words
+    differences: Mapping[str, Array],
+    bodies: Mapping[str, Array | None],
+    body: str,
+    say: Words,
 ) -> list[Block]:
     """Show the difference after some of the steps, and after all of them as curves.
 
     Args:
         differences: By backend, the largest |qpos difference| after each step (n+1,).
         bodies: By backend, the distance of the free body's positions (n+1,) [m], if there is one.
+        body: Name of that body.
         say: The words of the lesson.
     """
     nstep = len(next(iter(differences.values()))) - 1
@@ -167,7 +190,7 @@ def growth(
         prefix, distance = where(differences, name), bodies[name]
         columns[f"{prefix}|Δqpos|"] = [f"{difference[step]:.1e}" for step in steps]
         if distance is not None:
-            columns[f"{prefix}free body"] = [millimetres(distance[step], 4) for step in steps]
+            columns[f"{prefix}{body}"] = [millimetres(distance[step], 4) for step in steps]
     title = say("grown")
     every_step = list(range(nstep + 1))
     curves = {name: (every_step, gap.tolist()) for name, gap in differences.items()}
@@ -267,7 +290,7 @@ class Touching:
         pairs: By the names of two bodies, in how many steps they touched.
     """
 
-    contacts: Array
+    contacts: Ints
     pairs: Mapping[str, int]
 
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ...interface import Array, Model
+from ...interface import Array, Model, forward, make_data, step
 from ...interface.checks import as_scalar
 from ...lab.runs.drive import Progress, number_of_steps
 from ...lab.runs.provenance import Provenance, provenance
-from ...lab.runs.readings import tips_of, usual_tip
+from ...lab.runs.readings import Tip, tips_of, usual_tip
 from ...measures import largest
 from ...measures.text import count, millimetres, short_time, vector
 from ...show.blocks import Block, Table
@@ -78,6 +78,19 @@ class WrittenEntry:
 
 
 @dataclass(frozen=True)
+class AfterStep:
+    """The fingertip after one step from the written state.
+
+    Attributes:
+        of_before: Whether it reads as `forward` computed it before the step, bit for bit.
+        behind: Distance by which `forward` moves it after the step [m].
+    """
+
+    of_before: bool
+    behind: float
+
+
+@dataclass(frozen=True)
 class Further:
     """What else is looked at after the four readings.
 
@@ -108,6 +121,8 @@ class ForwardResult:
         contacts: How many were found after the second `forward`.
         deepest: How far the two surfaces of the worst of them are inside each other [m].
         written: The entry of qpos that was written.
+        stepped: What one step from there leaves; None with an integrator that leaves values of
+            neither moment.
         further: What else was looked at; None where what goes further was not asked for.
         provenance: What it was computed with.
     """
@@ -121,6 +136,7 @@ class ForwardResult:
     contacts: int
     deepest: float
     written: WrittenEntry
+    stepped: AfterStep | None
     further: Further | None
     provenance: Provenance
 
@@ -176,6 +192,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
     contacts = play.names["data"].contacts
     deepest = max(0.0, -float(contacts.dist.min(initial=0.0)))
     moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
+    stepped = _after_step(model, at.place, value, tip)
     further = _further(model, options, progress) if options["further"] else None
     return ForwardResult(
         joint=joint,
@@ -187,9 +204,34 @@ def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
         contacts=len(contacts),
         deepest=deepest,
         written=written,
+        stepped=stepped,
         further=further,
         provenance=provenance(model),
     )
+
+
+def _after_step(model: Model, place: int, value: float, tip: Tip) -> AfterStep | None:
+    """Take one step from the written state, and compare the fingertip with `forward`'s.
+
+    Args:
+        model: Of the lesson.
+        place: Index in qpos that is written.
+        value: What is written there [rad or m].
+        tip: What is read.
+    """
+    if model.capabilities.behaviours["stale after a step"].support == "unsupported":
+        return None
+    with make_data(model) as data:
+        data.qpos[place] = value
+        forward(model, data)
+        before = tip.read(data)
+        step(model, data)
+        left = tip.read(data)
+        forward(model, data)
+        return AfterStep(
+            of_before=bool(np.array_equal(left, before)),
+            behind=float(np.linalg.norm(tip.read(data) - left)),
+        )
 
 
 def _further(model: Model, options: Options, progress: Progress) -> Further:
@@ -238,6 +280,11 @@ def slots(result: ForwardResult) -> dict[str, Any]:
     slots["moved"] = millimetres(result.moved, 1)
     slots["moves"] = result.moved > 0
     slots["no_time_passed"] = len({reading.time for reading in result.readings}) == 1
+    stepped = result.stepped
+    slots["stepped"] = stepped is not None and stepped.behind > 0
+    if stepped is not None:
+        slots["of_before_step"] = stepped.of_before
+        slots["behind_after_step"] = millimetres(stepped.behind)
     slots["inside"] = result.deepest > _INSIDE
     slots["contacts"] = count(result.contacts, "contact")
     slots["deepest"] = millimetres(result.deepest, 1)

@@ -244,6 +244,9 @@ def _slots_of_touches(result: HoldResult) -> dict[str, Any]:
     slots: dict[str, Any] = {"touches": result.first_contact is not None}
     slots["touched"] = contacts_in_words(result.touched)
     slots["touching"] = contacts_in_words(result.touching) if result.touching else "nothing"
+    ends = [result.qpos[-1], result.ends_without_contacts()]
+    gap, free_gap = (float(np.abs(end - result.target).max()) for end in ends)
+    slots["pressed"] = bool(result.touching) and gap > max(_AT_TARGET, free_gap)
     slots["contact_steps"] = f"{result.contact_steps} of {steps} steps"
     if result.first_contact is not None:
         slots["touched_at"] = short_time(result.first_contact)

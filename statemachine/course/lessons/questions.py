@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ...errors import BadInputError
@@ -11,6 +13,7 @@ from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.robot import is_so101
 from ...measures.text import degrees, duration
+from ..grading.inside.worlds import Scenes
 from . import LESSONS, forward, gravity, objects, replay, state, time
 from ._falling import SERVO
 from .session import CodeRun, LessonModule, Options, fitted, load_line, slots_of
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
     from .gravity import GravityResult
     from .objects import ObjectsResult
     from .replay import ReplayResult
-    from .state import StateResult
+    from .state import JointSlots, StateResult
     from .time import TimeResult
 
 R = TypeVar("R")  # the result of a lesson
@@ -56,10 +59,13 @@ class QuestionsResult:
 
     Attributes:
         answers: By the names of the lessons.
+        behind_crate: Slots of the arm's first joint, where a crate with a free joint comes before
+            the arm.
         provenance: What it was computed with.
     """
 
     answers: Answers
+    behind_crate: JointSlots
     provenance: Provenance
 
 
@@ -89,7 +95,14 @@ def run(play: CodeRun, options: Options, progress: Progress) -> QuestionsResult:
         objects=measured(objects, "objects"),
         time=measured(time, "time"),
     )
-    return QuestionsResult(answers, provenance(model))
+    return QuestionsResult(answers, _behind_crate(model), provenance(model))
+
+
+def _behind_crate(model: Model) -> JointSlots:
+    """Return the slots of the arm's first joint in the scene that has a crate before the arm."""
+    with TemporaryDirectory() as folder:
+        crowded = Scenes(model.backend, Path(folder)).crowded("so101/scene_box")
+    return state.slots_of_joint(crowded, crowded.joint_id("shoulder_pan"))
 
 
 def _result_of(lesson: LessonModule[R], name: str, model: Model, progress: Progress) -> R:
@@ -116,10 +129,12 @@ def slots(result: QuestionsResult) -> dict[str, Any]:
     """
     answers = result.answers
     slots: dict[str, Any] = {}
-    for name, holds in _verdicts(answers).items():
+    for name, holds in _verdicts(result).items():
         slots[name] = slots_of(name, getattr(answers, name))
         slots[name]["holds"] = holds
         slots[name]["right"] = _RIGHT[name] if holds else None
+    slots["state"]["joint_count"] = len(answers.state.joints)
+    slots["crate"] = vars(result.behind_crate) | {"joint": result.behind_crate.name}
     on, off = _ends(answers.gravity)
     slots["finer"] = _differs_with_half_the_timestep(answers.replay)
     slots["sagged"] = degrees(on, 3)
@@ -131,11 +146,12 @@ def slots(result: QuestionsResult) -> dict[str, Any]:
     return slots
 
 
-def _verdicts(answers: Answers) -> dict[str, bool]:
+def _verdicts(result: QuestionsResult) -> dict[str, bool]:
     """Return whether each run bears out the right choice, by the name of the lesson."""
+    answers = result.answers
     return {
         "forward": _waits_for_forward(answers.forward),
-        "state": _slots_differ(answers.state),
+        "state": _fails_behind_crate(answers.state, result.behind_crate),
         "replay": _repeats_without_being_true(answers.replay),
         "gravity": _servo_carries_the_load(answers.gravity),
         "objects": _worlds_share_a_model(answers.objects),
@@ -148,9 +164,10 @@ def _waits_for_forward(result: ForwardResult) -> bool:
     return (1, 2) in result.equal and result.moved > 0
 
 
-def _slots_differ(result: StateResult) -> bool:
-    """Tell whether a joint has other slots in qvel than in qpos."""
-    return any(state.is_shifted(joint) for joint in result.joints)
+def _fails_behind_crate(result: StateResult, behind_crate: JointSlots) -> bool:
+    """Tell whether each joint here has one address, and a joint behind a crate has two."""
+    same_here = all(joint.qpos_start == joint.qvel_start for joint in result.joints)
+    return same_here and behind_crate.qpos_start != behind_crate.qvel_start
 
 
 def _repeats_without_being_true(result: ReplayResult) -> bool:

@@ -28,6 +28,7 @@ from ._two_runs import (
     broken,
     broken_table,
     course_of,
+    free_body,
     growth,
     of_its_own,
     restore_methods,
@@ -67,6 +68,7 @@ class ReplayResult:
         second_run: (n+1, nq) qpos of the second run.
         hinges: Where in qpos the hinges are.
         free: Where in qpos a free body's position is; None without one.
+        body: Name of that body; "free body" where there is none, or it has no name.
         contacts: (n,) contacts that each step of the first run found.
         pairs: For each pair of bodies, in how many steps it touched.
         keyframe: Name of the keyframe, its time was set to zero; None for the default state.
@@ -86,6 +88,7 @@ class ReplayResult:
     second_run: Array = field(metadata={"json": False})
     hinges: tuple[int, ...]
     free: tuple[int, int, int] | None
+    body: str
     contacts: Ints
     pairs: Mapping[str, int]
     keyframe: str | None
@@ -221,6 +224,7 @@ def _compared(play: CodeRun, options: Options, progress: Progress) -> ReplayResu
     steps_of_pair = Counter(pair for pairs in touches for pair in pairs)
     _, data = play.worlds[0]
     ctrl, hinges, free = data.ctrl.copy(), _hinges(model), _free_position(model)
+    body = free_body(model)
     state = [name for name, size in get_state(model, data).layout if size]
     keyframe = model.keyframes[0].name if model.keyframes else None
     ways: tuple[WayBack, ...] = ()
@@ -235,6 +239,7 @@ def _compared(play: CodeRun, options: Options, progress: Progress) -> ReplayResu
         second_run=second_run,
         hinges=hinges,
         free=free,
+        body=body,
         contacts=contacts,
         pairs=steps_of_pair,
         keyframe=keyframe,
@@ -351,14 +356,14 @@ def tables(results: Results[ReplayResult], first: ReplayResult) -> Blocks:
     if first.broken_by:
         gaps = {name: result.difference for name, result in results.items()}
         bodies = {name: result.apart for name, result in results.items()}
-        blocks["growth"] = growth(gaps, bodies, _SAY)
+        blocks["growth"] = growth(gaps, bodies, first.body, _SAY)
     blocks["ways"] = through_us({name: result.ways for name, result in results.items()}, _SAY)
     blocks["own"] = of_its_own({name: result.own_ways for name, result in results.items()}, _SAY)
     breaks = {name: result.breaks for name, result in results.items()}
     blocks["broken_runs"] = broken_table(breaks, _SAY)
     rows: dict[str, Callable[[ReplayResult, ReplayResult], str]] = {
         _SAY("hinges_apart"): _hinges_apart,
-        _SAY("bodies_apart"): _bodies_apart,
+        _SAY("bodies_apart", body=first.body): _bodies_apart,
         _SAY("contacts_apart"): _contacts_apart,
     }
     blocks["differences"] = differences(results, rows)

@@ -326,10 +326,16 @@ def _later_rows(body: str, scenes: Sequence[KeyframeScene]) -> list[tuple[str, .
     """Return what becomes of a body after a keyframe, a scene a column."""
     by_robot = [str(scene.robot_steps) for scene in scenes]
     by_world = [str(scene.world_steps) for scene in scenes]
-    rises = [millimetres(scene.rise) for scene in scenes]
+    moves = [_moved(scene.rise) for scene in scenes]
     steps = scenes[0].nstep
     return [
         (_SAY("robot_steps", steps=steps, body=body), *by_robot),
         (_SAY("world_steps", steps=steps, body=body), *by_world),
-        (_SAY("rises", steps=steps, body=body), *rises),
+        (_SAY("moves", steps=steps, body=body), *moves),
     ]
+
+
+def _moved(rise: float) -> str:
+    """Write how far a body rises or sinks [m]."""
+    height = millimetres(abs(rise))
+    return _SAY("sinks", height=height) if rise < 0 else _SAY("rises", height=height)

@@ -103,7 +103,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> StateResult:
     """Read the layout off the Model, and the time off a Data at keyframe 0."""
     play()
     model = play.model
-    joints = tuple(_slots_of(model, joint) for joint in range(model.njnt))
+    joints = tuple(slots_of_joint(model, joint) for joint in range(model.njnt))
     keyframe = keyframe_time = None
     with make_data(model) as data:
         fresh_time = data.time
@@ -130,7 +130,7 @@ def _terms_of(model: Model) -> tuple[Term, ...]:
     return tuple(Term(term.thing, term.ours, term.engine) for term in terms)
 
 
-def _slots_of(model: Model, joint: int) -> JointSlots:
+def slots_of_joint(model: Model, joint: int) -> JointSlots:
     """Return the slots of a joint."""
     kind = JointType(int(model.jnt_type[joint]))
     place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])

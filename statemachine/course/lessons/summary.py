@@ -22,7 +22,10 @@ def code(model: Model, options: Options, load: str) -> str:
     """Write one line for each lesson of the path."""
     joint = usual_joint(model)
     tip = tips_of(model, usual_tip(model, joint))[0]
-    slot, value = coordinate(model, joint).slot, usual_value(model, joint)
+    at, value = coordinate(model, joint), usual_value(model, joint)
+    slot, sagged = at.slot, 'np.degrees(other.qpos[slot]).round(3), "degrees"'
+    if at.slide:
+        sagged = 'other.qpos[slot].round(6), "metres"'
     keyframe = ", keyframe=0" if model.keyframes else ""
     return f"""\
 import time
@@ -47,12 +50,13 @@ print("objects:", data.time, other.time)
 print("state:", model.nq, model.nv, slot)
 data.qpos[slot] = {value:g}
 print("forward:", data.qpos[slot], data.{tip.array}[tip].round(4))
-print("gravity:", other.ctrl.any(), other.qpos[slot].round(4))
-first, second = command(data), command(other)
+first = command(data)
 print("hold:", data.qpos[0].round(3))
-print("replay:", np.array_equal(first, second))
+print("gravity:", {sagged})
 sm.reset(model, data{keyframe})
 print("reset:", data.time)
+second = command(other)
+print("replay:", np.array_equal(first, second))
 began = time.perf_counter()
 sm.step(model, data, 1000)
 wall = time.perf_counter() - began

@@ -65,7 +65,7 @@ data = sm.make_data(model)
 {stepping}
 wall = time.perf_counter() - began
 print(data.time)
-time.sleep({_NAP})  # the world goes on; the simulation does not
+time.sleep({_NAP})
 print(data.time)
 print(f"{{data.time / wall:.0f}} times real time")
 """
@@ -107,7 +107,7 @@ class TimeResult:
         simulated: Their simulated time [s].
         free: Wall time of them without waiting [s].
         paced: Wall time of them with waiting [s].
-        waited: How much of that was waiting [s].
+        waited: How much of that it slept [s]; a sleep is longer than what was asked for.
         latest: How far behind the clock a step was at worst, after its waiting [s].
         identical: Whether both end in the same bits.
         further: What a loop of single steps costs; None where that was not asked for.
@@ -150,7 +150,7 @@ class _PacedRun:
 
     Attributes:
         wall: Its wall time [s].
-        waited: How much of it was waiting [s].
+        waited: How much of it was slept [s].
         latest: How far behind the clock a step was at worst, after its waiting [s].
     """
 
@@ -265,8 +265,11 @@ def _run_paced(play: CodeRun, steps: int, progress: Progress) -> _PacedRun:
 
     def note(data: Data) -> None:
         if "ahead" in play.names:
-            delays.append(time.perf_counter() - play.names["began"] - data.time)
-            waits.append(max(0.0, play.names["ahead"]))
+            delay = time.perf_counter() - play.names["began"] - data.time
+            ahead: float = play.names["ahead"]
+            # A sleep takes longer than it was asked to: it took what was asked, and the delay.
+            waits.append(ahead + delay if ahead > 0 else 0.0)
+            delays.append(delay)
             progress(len(waits) / steps)
 
     def each_step(model: Model, data: Data) -> None:
@@ -294,6 +297,7 @@ def slots(result: TimeResult) -> dict[str, Any]:
     slots["timestep"] = f"{result.provenance.timestep:g}"
     slots["rounds"] = count(result.rate.rounds, "round")
     slots["rate"] = f"{result.rate.median:.0f}"
+    slots["paced_steps"] = count(result.paced_steps, "step")
     slots["paced_time"] = f"{result.simulated:g} s"
     slots |= _clock_slots(result)
     if result.further is not None:
@@ -335,8 +339,9 @@ def tables(results: Results[TimeResult], first: TimeResult) -> Blocks:
 
 def _speed(results: Results[TimeResult], first: TimeResult) -> Table:
     """Return how many times real time the run is, by engine."""
+    wall = _SAY("wall_unpaced") if first.realtime else _SAY("wall")
     rows: dict[str, Callable[[TimeResult], str]] = {
-        _SAY("wall"): lambda result: duration(result.wall),
+        wall: lambda result: duration(result.wall),
         _SAY("rate"): lambda result: result.rate.spread(" ×", 1),
     }
     simulated = f"{first.nstep * first.provenance.timestep:g} s"

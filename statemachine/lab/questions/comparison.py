@@ -14,6 +14,7 @@ from ..compare import Comparison
 from ..compare.base_frame_page import base_frame_blocks
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.matched import Matched
+from ..compare.series import SETTLED
 from ..runs.floating import Bases
 from .compare_details import details_of
 from .compare_verdict import headline_of, sentence_labels
@@ -120,6 +121,11 @@ class ComparePage(PageContent):
     def until(self) -> float:
         """How long the comparison is [s]."""
         return self.result.comparison.until
+
+    @property
+    def window(self) -> float:
+        """What the figures of the end are a mean over [s]."""
+        return SETTLED * self.until
 
     @property
     def total(self) -> int:

@@ -154,7 +154,7 @@ class LocationNote(PageContent):
 
 def what_is_apart(result: Explanation) -> str:
     """Return what is up to so far apart, in words."""
-    return _SINGULAR.get(result.quantity, result.quantity)
+    return _SINGULAR.get(result.quantity, f"quantity {result.quantity}")
 
 
 def nothing_differs(result: Explanation) -> bool:

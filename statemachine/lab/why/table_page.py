@@ -29,7 +29,7 @@ _WORDS = frozenset({0, 1, 2})  # columns
 _TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
 _MEASURES = {
     "worst": "each run at its largest",
-    "end": "in the end",
+    "end": "at the last moment",
     "rms": "as a root mean square",
 }
 

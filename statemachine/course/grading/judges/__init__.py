@@ -135,7 +135,7 @@ def judged(
     if len(passed) < len(worlds):
         return None
     (remark,) = passed[0].remarks
-    others = count(len(worlds) - 1, "further call")
+    others = count(len(worlds) - 1, "hidden call")
     return Judgement(function, True, True, (OfResult.PASSED.says(remark=remark, others=others),))
 
 

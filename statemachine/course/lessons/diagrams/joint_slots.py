@@ -251,7 +251,7 @@ def _between(piece: _Piece, left: int, top: int, rows: int, pitch: int) -> Itera
     mark = "=" if piece.look == "state" else "≠"
     of_qpos, of_qvel = (slots[1] - slots[0] for slots in (piece.qpos, piece.qvel))
     if piece.joints == 1 and of_qpos != of_qvel:
-        mark = f"≠  {of_qpos} above {of_qvel}"
+        mark = f"≠  {of_qpos} and {of_qvel} slots"
     yield Label(mark, left + width // 2, middle, width - 1, piece.look, is_centered=True)
     if piece.joints > 1:
         return
