@@ -112,7 +112,8 @@ def demo_forward(model):
         model: A Model of the arm. Ask it where a joint begins in qpos.
 
     Returns:
-        The four positions [m], in this order: a list of four, or an array of shape (4, 3).
+        The four positions [m], in this order: a list of four, or an array of shape (4, 3). Do not
+        round them.
     """
     raise NotImplementedError("TODO(you): read the fingertip four times")
 
@@ -130,8 +131,8 @@ def demo_replay(model, ctrl, nstep=600):
         nstep: How many steps each run takes.
 
     Returns:
-        (same, first, second): whether the two copies are equal, True or False; and the two
-        copies, each of shape (nq,).
+        (same, first, second): whether the two copies are equal, as the bool True or False, not
+        1 or 0; and the two copies, each of shape (nq,), not rounded.
     """
     raise NotImplementedError("TODO(you): run twice, and compare exactly")
 

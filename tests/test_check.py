@@ -353,14 +353,14 @@ def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
     )
     for name in ("gravity", "state", "forward"):
         assert not found[name].judged
-        assert _one(found[name]).startswith("not graded: it reads ")
+        assert _one(found[name]).startswith("not graded: it tried to open ")
     assert "solutions/step_loop.py, which was not handed in with it" in _one(found["gravity"])
     for name in ("state", "forward"):
         assert f"{(tmp_path / 'bob.py').as_posix()}, which" in _one(found[name])
     # Any other file is not there either, and somebody is to look.
     assert re.match("line 14: (FileNotFoundError|PermissionError)", found["replay"].remarks[0])
     assert found["replay"].remarks[1:] == (
-        f"please look at this: it reads {(tmp_path / 'notes.txt').as_posix()}",
+        f"please look at this: it tried to open {(tmp_path / 'notes.txt').as_posix()}",
     )
 
 
@@ -414,13 +414,16 @@ def test_it_reaches_neither_us_nor_the_files(
     [
         ("def demo_gravity(model:\n", "be loaded: line 1: SyntaxError: '(' was never closed"),
         ("import sys\nsys.exit(0)\n", "the file cannot be loaded: line 2: it ends the program"),
+        ("import sys\nsys.exit(0)\n", 'below `if __name__ == "__main__":`'),
         ("x = 1 / 0\n", "line 1: ZeroDivisionError: division by zero (in `x = 1 / 0`)"),
         ("import not_there\n", "No module named 'not_there'"),
         ("x = '\\udc80'.encode()\n", "UnicodeEncodeError"),
         ("# caf\xe9\n", "loaded: line 1: this is not UTF-8, and Python refuses the file. Save"),
         ("import os\n\nx = '\xe9'\n", "the file cannot be loaded: line 3: this is not UTF-8"),
-        ("# -*- coding: latin-1 -*-\nx = '\xe9'\n", "the file has no function demo_gravity"),
-        ("", "the file has no function demo_gravity"),
+        ("# -*- coding: latin-1 -*-\nx = '\xe9'\n", "the file has none of the functions"),
+        ("", "the file is empty"),
+        ("x = 1\n", "none of the functions demo_gravity, demo_state, demo_forward, demo_replay"),
+        ("def demo_state(model): pass\n", "the file has no function demo_gravity"),
         ("demo_gravity = 4\n", "demo_gravity is not a function: int"),
         ("def demo_gravity(): pass\n", "too many positional arguments"),
         ("def demo_gravity(model, /, *, seconds): pass\n", "with a model and 1 argument more"),
@@ -434,6 +437,19 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
     worlds, rights = prepared("demo_gravity", "mujoco")
     answers = answers_of_file(file, "demo_gravity", worlds)
     assert message in _one(judged("demo_gravity", worlds, rights, answers))
+
+
+def test_a_file_that_is_saved_as_utf_16_is_told_as_any_other_encoding(
+    tmp_path: Path, prepared: Prepare
+) -> None:
+    file = tmp_path / "student.py"
+    file.write_text("def demo_gravity(model, seconds): pass\n", encoding="utf-16")
+    worlds, rights = prepared("demo_gravity", "mujoco")
+    answers = answers_of_file(exercise._python_file(file), "demo_gravity", worlds)
+    judgement = judged("demo_gravity", worlds, rights, answers)
+    assert "it is saved as UTF-16" in _one(judgement)
+    assert judgement is not None
+    assert judgement.judged
 
 
 def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from statemachine.course.grading.alike import AlikeGroup
+from statemachine.course.grading.alike import AlikeGroup, AlikePair
 from statemachine.course.grading.class_page import (
     class_page,
-    class_report,
+    class_table,
     mistakes_table,
     remarks_table,
 )
-from statemachine.course.grading.class_table import NOTHING, ClassEntry
+from statemachine.course.grading.class_table import NOTHING, ClassEntry, rows_of
 from statemachine.course.grading.exercise import LOOK
 from statemachine.course.grading.judges import JUDGES, Judgement
 from statemachine.course.grading.overview import (
@@ -188,19 +188,21 @@ def test_all_of_it_is_in_the_json(result: ClassResult) -> None:
     assert [each["name"] for each in document["entries"]] == [each.name for each in ENTRIES]
 
 
-def test_in_a_terminal_the_overview_is_last_and_on_html_the_remarks_are(
-    result: ClassResult,
-) -> None:
-    tables = blocks(class_page(result), Table)
-    assert [table.headers[-1] for table in tables[:4]] == [
-        "what is not right", "replay", "not judged ?", "who",
-    ]  # fmt: skip
-    page = class_report(result)
+def test_the_answer_and_the_table_are_first_and_the_remarks_last(result: ClassResult) -> None:
+    page = class_page(result)
     assert page.headline is not None
     assert page.headline.lead == "0 of 8 files have all functions right"
+    assert isinstance(page.blocks[0], Table)
+    assert page.blocks[0].headers[0] == "file"
+    tables = blocks(page, Table)
+    assert [table.headers[-1] for table in tables] == ["replay", "not judged ?", "who"]
     last = page.blocks[-1]
     assert isinstance(last, Section)
-    assert last.folded
+    assert [table.headers[-1] for table in last.blocks if isinstance(table, Table)] == [
+        "what is not right"
+    ]
+    text = shown(page)
+    assert text.index("0 of 8 files") < text.index("ann") < text.index("4.5 mm away")
     html = report(page)
     for text in ("reading 2: 4.5 mm away", "reading …: … mm away", "which short functions", "eve"):
         assert text in html.replace("\u00a0", " ")
@@ -211,3 +213,74 @@ def test_a_row_of_the_class_fits_80_columns(result: ClassResult) -> None:
     page = class_page(class_result([replace(entry, nearest="b", likeness=0.5)]))
     (line,) = [line for line in shown(page).splitlines() if line.startswith("a" * 30)]
     assert line.split() == ["a" * 30, "4/4", "✓", "✓", "✓", "✓"]
+
+
+def test_a_mistake_in_both_runs_is_one() -> None:
+    said = [f"servos {word}: you return 2 at 1 s" for word in ("on", "off")]
+    entries = [_entry(name, " | ".join(said), RIGHT, RIGHT, RIGHT) for name in ("ann", "bob")]
+    (mistake,) = class_result(entries).mistakes
+    assert (mistake.remark, mistake.count) == ("servos …: you return 2 at 1 s", 2)
+
+
+def test_remarks_that_the_same_students_got_on_a_function_are_a_line() -> None:
+    names = ("ann", "bob")
+    entries = [_entry(name, RIGHT, "time is 6 | no box | no base", RIGHT, "x") for name in names]
+    mistakes = class_result(entries).mistakes
+    assert [mistake.remark for mistake in mistakes] == ["time is 6", "x"]
+    assert mistakes[0].others == ("no box", "no base")
+    assert [row[2] for row in mistakes_table(mistakes).rows] == [
+        "time is 6 (and 2 other remarks)", "x",
+    ]  # fmt: skip
+
+
+def test_the_same_remark_on_several_functions_is_a_row() -> None:
+    rows = remarks_table([_entry("ann", "no step", RIGHT, "no step", "no step | no step")]).rows
+    assert rows == [["ann", "gravity, forward, replay", "no step"]]
+
+
+def test_a_function_without_a_verdict_leaves_those_of_the_others() -> None:
+    entry = _entry("ann", "? it sleeps", RIGHT, RIGHT, RIGHT)
+    (row,) = class_table([entry]).rows
+    assert row[:2] == ["ann", "3/4 ?"]
+    head, cells = rows_of([entry])
+    assert dict(zip(head, cells, strict=True))["right"] == 3
+
+
+def test_a_file_without_any_verdict_has_no_number() -> None:
+    entries = [_entry("ann", *["? it sleeps"] * 4), _entry("bob", refusal="a notebook")]
+    assert [row[1] for row in class_table(entries).rows] == ["?", "?"]
+    for _, right, *_more in list(rows_of(entries))[1:]:
+        assert right == ""
+
+
+def test_files_of_nobody_on_the_roster_stand_below_a_heading() -> None:
+    entries = [
+        _entry("x1.py", RIGHT, RIGHT, RIGHT, RIGHT, student="Ann"),
+        _entry("x2.py", RIGHT, RIGHT, RIGHT, RIGHT),
+    ]
+    page = class_page(class_result(entries))
+    (section,) = [each for each in blocks(page, Section) if each.name == "strangers"]
+    assert section.heading == "Not on the roster (1 file)"
+    assert [row[0] for table in blocks(page, Table)[:1] for row in table.rows] == ["Ann"]
+    (strangers,) = [block for block in section.blocks if isinstance(block, Table)]
+    assert [row[0] for row in strangers.rows] == ["x2.py"]
+
+
+def test_without_a_roster_nobody_is_a_stranger(result: ClassResult) -> None:
+    assert result.strangers == ()
+    assert "Not on the roster" not in shown(class_page(result))
+
+
+def test_whom_one_is_most_like_is_told_from_85_percent_on() -> None:
+    entry = _entry("ann", RIGHT, RIGHT, RIGHT, RIGHT)
+    cells = []
+    for likeness in (0.849, 0.85):
+        table = class_table([replace(entry, nearest="b", likeness=likeness)])
+        cells.append("most like" in table.headers)
+    assert cells == [False, True]
+
+
+def test_nearly_alike_is_told_without_a_group() -> None:
+    pairs = (AlikePair(("ann", "bob"), 0.8999),)
+    text = " ".join(shown(class_page(class_result(ENTRIES, nearly_alike=pairs))).split())
+    assert "Nearly alike, 89%: ann, bob." in text

@@ -24,6 +24,8 @@ from statemachine.course.grading.faults.examination import Examination, FailedTe
 from statemachine.course.grading.judges import JUDGES, Judgement
 from statemachine.course.grading.overview import class_result
 from statemachine.course.grading.page import gradescope_results
+from statemachine.course.grading.recording import digest
+from statemachine.course.grading.request import ClassRequest, answer_class
 from statemachine.course.grading.roster import enrolled
 from statemachine.course.grading.submissions import (
     Submission,
@@ -133,6 +135,28 @@ def test_a_class_beside_the_template_stays_a_class(folder: Path) -> None:
 
 def test_of_several_files_the_exercises_own_name_counts(tmp_path: Path) -> None:
     written_all(tmp_path, dict.fromkeys(("step_loop.py", "mine.py"), TEMPLATE.read_text()))
+    assert submission_in(tmp_path) == tmp_path / "step_loop.py"
+
+
+@pytest.mark.parametrize("names", [("step_loop.py", "final.py"), ("final.py", "mine.py")])
+def test_several_files_with_written_functions_are_not_chosen_from(
+    tmp_path: Path, names: tuple[str, str]
+) -> None:
+    text = SOLUTION.read_text()
+    written_all(tmp_path / "ann", {names[0]: text.replace("0.8", "0.7"), names[1]: text})
+    (found,) = submissions([tmp_path])
+    assert found.path is None
+    assert found.refusal == f"2 files in it have the functions: {', '.join(names)}"
+
+
+def test_the_template_beside_a_written_file_does_not_count(tmp_path: Path) -> None:
+    texts = {"step_loop.py": TEMPLATE.read_text(), "mine.py": SOLUTION.read_text()}
+    written_all(tmp_path, texts)
+    assert submission_in(tmp_path) == tmp_path / "mine.py"
+
+
+def test_copies_of_one_file_are_one_submission(tmp_path: Path) -> None:
+    written_all(tmp_path, dict.fromkeys(("a.py", "step_loop.py"), SOLUTION.read_text()))
     assert submission_in(tmp_path) == tmp_path / "step_loop.py"
 
 
@@ -454,3 +478,18 @@ def test_the_json_of_a_class_has_the_overview(
     assert {each["name"] for each in document["entries"]} >= {"ann", "bob", "eve.py"}
     assert [each["students"] for each in document["alike"]] == [["ann", "fay.py"]]
     assert [each["right"] for each in document["functions"]] == [2] * 4
+
+
+def test_what_was_not_judged_last_time_is_told(
+    tmp_path: Path, judged: list[str], recwarn: pytest.WarningsRecorder
+) -> None:
+    (ann,) = submissions([written_all(tmp_path / "class", {"ann.py": "return 1\n"})])
+    table = tmp_path / "t.csv"
+    told: list[int] = []
+    for is_judged in (True, False):
+        verdicts = tuple(Judgement(name, True, True, ("a",), judged=is_judged) for name in JUDGES)
+        entry = ClassEntry(ann.name, digest(ann.own), verdicts, "", "mujoco")
+        replace_csv(table, rows_of([entry]))
+        answer_class(ClassRequest((tmp_path / "class",), table=table))
+        told.append(sum("not judged last time" in str(each.message) for each in recwarn.list))
+    assert told == [0, 1]

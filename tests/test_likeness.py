@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from statemachine.course.grading import course_code
-from statemachine.course.grading.alike import ALIKE, SHORT, compare_submissions
+from statemachine.course.grading.alike import ALIKE, NEARLY_ALIKE, SHORT, compare_submissions
 from statemachine.course.grading.judges import JUDGES
 from statemachine.course.grading.likeness import OwnCode, code_of_trees, likeness, own_code
 from statemachine.course.grading.roster import enrolled
@@ -189,6 +189,17 @@ def test_students_are_named_by_the_roster(tmp_path: Path) -> None:
     compared = compare_submissions(enrolled(submissions([tmp_path / "class"]), roster))
     assert compared.groups[0].students == ("Ann Lee", "Bo Wu")
     assert compared.nearest["x_41001.py"].student == "Bo Wu"
+
+
+def test_a_copy_with_lines_added_in_each_function_is_nearly_alike(tmp_path: Path) -> None:
+    """With two that are a group, it is told once, with the nearest of them."""
+    copy = re.sub(r"^(    return .*)$", r"    unused = 4 - 3\n\1", TEXT, flags=re.M)
+    written_all(tmp_path, {"a.py": TEXT, "b.py": renamed(TEXT, 1), "c.py": copy, "d.py": CEM})
+    compared = compare_submissions(submissions([tmp_path]))
+    assert [group.students for group in compared.groups] == [("a.py", "b.py")]
+    (pair,) = compared.nearly
+    assert pair.students == ("a.py", "c.py")
+    assert NEARLY_ALIKE <= pair.likeness < ALIKE
 
 
 def test_a_chain_of_copies_is_one_group(tmp_path: Path) -> None:

@@ -78,15 +78,19 @@ SEEN_BY_THE_WATCH: Attacks = {
         "from statemachine.course.lessons import gravity\nreturn 'GOT', gravity",
         r"it imports statemachine\.course\.lessons",
     ),
-    "a file of the teacher's": ("return 'GOT', open({secret!r}).read()", "it reads {secret}"),
+    "a file of the teacher's": (
+        "return 'GOT', open({secret!r}).read()",
+        "it tried to open {secret}",
+    ),
     "by NumPy": (
         "import numpy\nreturn 'GOT', bytes(numpy.fromfile({secret!r}, dtype='u1'))",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "by the lines of a traceback": (
         "import linecache\nlines = linecache.getlines({secret!r})\n"
         "return ('GOT', lines) if lines else 1",
-        "it reads {secret}|it returns an int: 1",  # it asks whether the file is there, and no more
+        # It asks whether the file is there, and no more.
+        "it tried to open {secret}|it returns an int: 1",
     ),
     "run as a program": (
         "import runpy\nreturn 'GOT', runpy.run_path({judge!r})",
@@ -145,7 +149,7 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "a second name for a file": (
         "import os\nos.link({secret!r}, 'mine.txt')\nreturn 'GOT', open('mine.txt').read()",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "a socket": (
         "import socket\nsocket.socket().connect(('127.0.0.1', 9))\nreturn 'GOT'",
@@ -155,7 +159,7 @@ SEEN_BY_THE_WATCH: Attacks = {
         "import threading\nfound = []\n"
         "thread = threading.Thread(target=lambda: found.append(open({secret!r}).read()))\n"
         "thread.start(); thread.join()\nreturn ('GOT', found) if found else 1",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "by an object that has two names": (
         "import io\nnames = iter([{secret!r}, 'mine.txt'])\n"
@@ -167,18 +171,18 @@ SEEN_BY_THE_WATCH: Attacks = {
         "class Text(str):\n    def startswith(self, *_): return True\n"
         "    def partition(self, *_): return '', '', ''\n"
         "return 'GOT', open(Text({secret!r})).read()",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "with functions of os.path replaced": (
         "import os\nos.path.realpath = os.path.abspath = lambda name, **_: '/usr/lib'\n"
         "return 'GOT', open({secret!r}).read()",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "as if by a package": (
         "text = 'def read(name): return open(name).read()'\n"
         "code = compile(text, '/site-packages/x.py', 'exec')\n"
         "names = {{}}\nexec(code, names)\nreturn 'GOT', names['read']({secret!r})",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "by a function of this package": (
         "import statemachine.models as own\n"
@@ -189,7 +193,7 @@ SEEN_BY_THE_WATCH: Attacks = {
     "as a database": (
         "import sqlite3\nfile = sqlite3.connect({secret!r})\n"
         "return 'GOT', file.execute('select 1').fetchall()",
-        "it reads {secret}",
+        "it tried to open {secret}",
     ),
     "everything in /proc": (
         "import glob\nfound = []\nfor name in glob.glob('/proc/[0-9]*/environ'):\n"
@@ -511,6 +515,23 @@ def test_a_record_of_his_own_making_with_the_right_numbers_passes(tmp_path: Path
     forged = forged.replace("runs, ends = [], []", "runs, ends = [], []; data.time = 0.0")
     grade = exercise.run(written(tmp_path / "step_loop.py", forged))
     assert grade.functions[-1].passed, grade.functions[-1].remarks
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no /etc")
+def test_a_file_of_the_system_is_no_reason_to_look(tmp_path: Path) -> None:
+    """docs/teaching.md says so; what lies in another folder is one."""
+    written_all(tmp_path, {"other/notes.txt": "hello"})
+    elsewhere = tmp_path / "other" / "notes.txt"
+    reads = "def demo_state(model):\n"
+    for name in ("/etc/passwd", elsewhere.as_posix()):
+        reads += f"    try:\n        open({name!r}).read()\n    except OSError:\n        pass\n"
+    text = SOLUTION.read_text("utf-8").replace("def demo_state(model):\n", reads)
+    written_all(tmp_path, {"ann/step_loop.py": text})
+    grade = exercise.run(tmp_path / "ann" / "step_loop.py")
+    assert grade.passed
+    looks = [remark for remark in grade.functions[1].remarks if remark.startswith(exercise.LOOK)]
+    assert len(looks) == 1
+    assert "notes.txt" in looks[0]
 
 
 # Links that lead out of what was handed in.

@@ -159,7 +159,11 @@ PROOFS = {
     'is "not graded", with the name of that file': (
         "test_check.test_what_reads_somebody_s_answers_is_not_graded",
     ),
-    "to import a judge, to start a program or to look into another process": (
+    "A file outside, but for the system's (`/etc`, `/usr`)": (
+        "test_check.test_what_reads_somebody_s_answers_is_not_graded",
+        "test_shut_in.test_a_file_of_the_system_is_no_reason_to_look",
+    ),
+    "to import a judge, to start a program, to use the network or to look into another process": (
         "test_shut_in.test_who_is_watched_is_refused",
         "test_check.test_what_is_handed_in_is_judged",
     ),
@@ -175,7 +179,7 @@ PROOFS = {
         "test_class_of_students.test_a_class_of_41_is_judged",
     ),
     "a copy that was rewritten;": ("test_likeness.test_a_copy_that_was_rewritten_is_not_seen",),
-    "- a record of runs of a student's own making that has the right numbers;": (
+    "- a record that code forges in place of a run, with the right numbers;": (
         "test_shut_in.test_a_record_of_his_own_making_with_the_right_numbers_passes",
     ),
     "- a hard link, which cannot be told from a file;": (

@@ -231,7 +231,7 @@ def _run_one(options: argparse.Namespace) -> int:
 def _run_class(options: argparse.Namespace) -> int:
     """Judge the files of a class."""
     from ..course.grading import judged_before
-    from ..course.grading.class_page import class_page, class_report
+    from ..course.grading.class_page import class_page
     from ..course.grading.request import answer_class
     from ..show.html import check_target, report, write_report
 
@@ -242,7 +242,7 @@ def _run_class(options: argparse.Namespace) -> int:
     with resumable(kept_in, "judged"):
         result = answer_class(request, TerminalReporter())
     if options.html is not None:
-        target = write_report(options.html, report(class_report(result)))
+        target = write_report(options.html, report(class_page(result)))
         print(f"wrote {target}", file=sys.stderr)
     show(class_page(result), result, options.json)
     return 0 if result.complete else SAYS_NO

@@ -11,6 +11,7 @@ from .likeness import NO_CODE, OwnCode, likeness, own_code
 from .submissions import Submission
 
 ALIKE = 0.95  # from this likeness on two submissions belong to one group
+NEARLY_ALIKE = 0.85  # from this one on two are told, too: a copy that was changed
 # Shingles: fewer are one function, which two who work alone may write alike. The four functions of
 # the course's solution have 59 to 75 each.
 SHORT = 100
@@ -38,6 +39,19 @@ class AlikeGroup:
 
 
 @dataclass(frozen=True)
+class AlikePair:
+    """Two submissions that are nearly alike.
+
+    Attributes:
+        students: Who handed them in, or the names of the files.
+        likeness: How much they are alike, 0 to 1.
+    """
+
+    students: tuple[str, str]
+    likeness: float
+
+
+@dataclass(frozen=True)
 class Nearest:
     """The submission that another one is most like.
 
@@ -58,10 +72,13 @@ class ClassLikeness:
         nearest: By the name of a submission, the one that it is most like; none where it has no
             code of its own, or nothing in common with any.
         groups: Of submissions that are alike, the largest first.
+        nearly: Submissions that are nearly alike and in no group together, the most alike first;
+            with those of a group, only the nearest of it.
     """
 
     nearest: Mapping[str, Nearest]
     groups: tuple[AlikeGroup, ...]
+    nearly: tuple[AlikePair, ...]
 
 
 def compare_submissions(submitted: Sequence[Submission]) -> ClassLikeness:
@@ -80,12 +97,15 @@ def compare_submissions(submitted: Sequence[Submission]) -> ClassLikeness:
             if share > 0 and (one not in nearest or share > nearest[one].likeness):
                 nearest[one] = Nearest(labels[other], share)
     groups: list[AlikeGroup] = []
-    for names in _groups_of(codes, pairs):
+    names_of_groups = _groups_of(codes, pairs)
+    for names in names_of_groups:
         shares = [pairs[pair] for pair in itertools.combinations(names, 2)]
         students = tuple(labels[name] for name in names)
         groups.append(_group(students, [codes[name] for name in names], shares))
     groups.sort(key=lambda group: -len(group.students))
-    return ClassLikeness(nearest, tuple(groups))
+    near = _near_pairs(pairs, names_of_groups)
+    nearly = [AlikePair((labels[left], labels[right]), pairs[left, right]) for left, right in near]
+    return ClassLikeness(nearest, tuple(groups), tuple(nearly))
 
 
 def _group(
@@ -139,3 +159,23 @@ def _groups_of(
         if len(group) > 1 and group not in groups:
             groups.append(group)
     return groups
+
+
+def _near_pairs(
+    pairs: Mapping[tuple[str, str], float], groups: Sequence[Sequence[str]]
+) -> list[tuple[str, str]]:
+    """Return the pairs that are nearly alike, the most alike first.
+
+    With the members of a group, only the most alike pair counts.
+    """
+    first_of = {name: group[0] for group in groups for name in group}
+    told: set[frozenset[str]] = set()
+    near: list[tuple[str, str]] = []
+    for left, right in sorted(pairs, key=lambda pair: -pairs[pair]):
+        between = frozenset((first_of.get(left, left), first_of.get(right, right)))
+        if pairs[left, right] < NEARLY_ALIKE:
+            break
+        if len(between) == 2 and between not in told:
+            told.add(between)
+            near.append((left, right))
+    return near

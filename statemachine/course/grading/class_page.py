@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ...measures.text import count
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render, with_answer
-from .alike import ALIKE, AlikeGroup
+from .alike import ALIKE, NEARLY_ALIKE, AlikeGroup
 from .class_table import ClassEntry, verdicts_of
 from .judges import JUDGES
 from .overview import COMMON, ClassResult, FunctionCount, Mistake
@@ -30,7 +30,7 @@ class _Look:
 
 @dataclass(frozen=True)
 class _Remark:
-    """What is not right in one function of one student."""
+    """What is not right in a function of a student, or the same in several."""
 
     student: str
     function: str
@@ -43,13 +43,13 @@ class ClassPage(PageContent):
 
     Attributes:
         result: What came of the class.
-        entries: Table with a row for each submission.
+        entries: Table with a row for each submission that counts.
         functions: Table with a row for each function.
         mistakes: Table of the commonest mistakes.
-        remarks: Table of what is not right, with a row for each student and function.
-        is_report: Whether it begins with the answer, and the remarks are last and folded; in a
-            terminal the end stays in sight.
+        remarks: Table of what is not right, with a row for each student and remark.
+        strangers: Table with a row for each submission of nobody on the roster.
         threshold: Likeness from which on submissions are called alike.
+        near_threshold: Likeness from which on they are called nearly alike.
         only_watched: What is said where code is only watched.
     """
 
@@ -59,8 +59,9 @@ class ClassPage(PageContent):
     functions: Table
     mistakes: Table
     remarks: Table
-    is_report: bool = False
+    strangers: Table
     threshold: str = f"{ALIKE:.0%}"
+    near_threshold: str = f"{NEARLY_ALIKE:.0%}"
     only_watched: str = ONLY_WATCHED
 
     @property
@@ -97,6 +98,27 @@ class ClassPage(PageContent):
         """Groups of submissions that are alike."""
         return [_Group(group) for group in self.result.alike]
 
+    @property
+    def pairs(self) -> list[_Pair]:
+        """Submissions that are nearly alike, two by two."""
+        return [_Pair(each.students, _percent(each.likeness)) for each in self.result.nearly_alike]
+
+    @property
+    def has_likeness(self) -> bool:
+        """Whether any two submissions are alike, or nearly."""
+        return bool(self.result.alike) or bool(self.result.nearly_alike)
+
+    @property
+    def strangers_size(self) -> str:
+        """How many files are of nobody on the roster; "" for none."""
+        number = len(self.result.strangers)
+        return count(number, "file") if number else ""
+
+    @property
+    def strangers_heading(self) -> str:
+        """What stands above them."""
+        return f"Not on the roster ({self.strangers_size})"
+
 
 @dataclass(frozen=True)
 class _Group:
@@ -111,28 +133,42 @@ class _Group:
     @property
     def percent(self) -> str:
         """How much they are alike, rounded down so that 100 % is the same code."""
-        least, most = (math.floor(100 * part) for part in (self.group.least, self.group.most))
-        return f"{least}%" if least == most else f"{least} to {most}%"
+        least, most = _percent(self.group.least), _percent(self.group.most)
+        return most if least == most else f"{least.removesuffix('%')} to {most}"
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two submissions that are nearly alike, as the page names them.
+
+    Attributes:
+        students: Who handed them in.
+        percent: How much they are alike.
+    """
+
+    students: tuple[str, str]
+    percent: str
+
+
+def _percent(share: float) -> str:
+    """Return a likeness in percent, rounded down."""
+    return f"{math.floor(100 * share)}%"
 
 
 def class_page(result: ClassResult) -> Page:
-    """Make the page of a class for a terminal."""
-    return render(_content(result))
-
-
-def class_report(result: ClassResult) -> Page:
-    """Make the page of a class for HTML, with its answer."""
-    return with_answer(render(replace(_content(result), is_report=True)))
+    """Make the page of a class: its answer and the table first, all remarks last."""
+    return with_answer(render(_content(result)))
 
 
 def _content(result: ClassResult) -> ClassPage:
     """Return the content of the page of a class."""
     return ClassPage(
         result,
-        class_table(result.entries),
+        class_table(result.counted),
         functions_table(result.functions),
         mistakes_table(result.mistakes),
         remarks_table(result.entries),
+        class_table(result.strangers),
     )
 
 
@@ -145,7 +181,7 @@ def class_table(entries: Sequence[ClassEntry]) -> Table:
         columns[_short(name)] = _marker_of(name)
     columns["tests"] = lambda entry: entry.tests.partition(";")[0]
     columns["predictions"] = lambda entry: entry.predictions
-    columns["most like"] = lambda entry: _unbroken(entry.alike)
+    columns["most like"] = _most_like
     filled = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
     return Table.of(entries, filled, words=filled, wide={"predictions", "most like"})
 
@@ -166,18 +202,24 @@ def mistakes_table(mistakes: Sequence[Mistake]) -> Table:
     for mistake in mistakes[:_COMMONEST]:
         if mistake.count >= COMMON:
             students = ", ".join(map(_unbroken, mistake.students))
-            rows.append([str(mistake.count), _functions_of(mistake), mistake.remark, students])
+            text = mistake.remark
+            if mistake.others:
+                text += f" (and {count(len(mistake.others), 'other remark')})"
+            rows.append([str(mistake.count), _functions_of(mistake), text, students])
     return Table(("students", "function", "mistake", "who"), rows, words=frozenset(range(4)))
 
 
 def remarks_table(entries: Sequence[ClassEntry]) -> Table:
-    """Make the table of what is not right: all of it, a row for each student and function."""
+    """Make the table of what is not right: all of it, a row for each student and remark."""
     remarks: list[_Remark] = []
     for entry in entries:
         reasons = entry.reasons_not_judged
+        functions: dict[str, list[str]] = {}  # by what is said of them
         for remark in entry.remarks:
-            if remark.text not in reasons:  # which stand below, once
-                remarks.append(_Remark(entry.label, _short(remark.function), remark.text))
+            if remark.text not in reasons:  # which stand above, once
+                functions.setdefault(remark.text, []).append(_short(remark.function))
+        for text, names in functions.items():
+            remarks.append(_Remark(entry.label, ", ".join(names), text))
     columns: dict[str, Callable[[_Remark], str]] = {
         "student": lambda remark: remark.student,
         "function": lambda remark: remark.function if remark.function else "file",
@@ -204,8 +246,16 @@ def _unbroken(name: str) -> str:
 
 
 def _right_of(entry: ClassEntry) -> str:
-    """Return how many functions are right; "?" where the file was not judged."""
-    return f"{entry.right}/{len(JUDGES)}" if entry.judged else "?"
+    """Return how many functions are right, with "?" where one or all were not judged."""
+    right = f"{entry.right}/{len(JUDGES)}"
+    if entry.judged:
+        return right
+    return f"{right} ?" if entry.partly_judged else "?"
+
+
+def _most_like(entry: ClassEntry) -> str:
+    """Return the submission that one is at least nearly alike to; below that it says nothing."""
+    return _unbroken(entry.alike) if entry.likeness >= NEARLY_ALIKE else ""
 
 
 def _marker_of(function: str) -> Callable[[ClassEntry], str]:

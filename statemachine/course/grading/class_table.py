@@ -79,6 +79,13 @@ class ClassEntry:
 
     @property
     @only_on_pages
+    def partly_judged(self) -> bool:
+        """Whether there is a verdict on some function, and none on another."""
+        verdicts = {judgement.judged for judgement in self.functions}
+        return len(verdicts) > 1
+
+    @property
+    @only_on_pages
     def reasons_not_judged(self) -> tuple[str, ...]:
         """Why there is no verdict on it, or on some of its functions, each reason once."""
         if self.judged:
@@ -124,7 +131,8 @@ class ClassEntry:
         """Return all that is said of a function that is not right."""
         if not judgement.written:
             return verdict_word(judgement)
-        return "; ".join(text for text in judgement.remarks if text not in self.looks)
+        texts = dict.fromkeys(text for text in judgement.remarks if text not in self.looks)
+        return "; ".join(texts)
 
 
 @dataclass(frozen=True)
@@ -171,7 +179,8 @@ def verdicts_of(entry: ClassEntry) -> dict[str, str]:
 
 def _first_cells(entry: ClassEntry) -> list[object]:
     """Return the cells up to the remarks."""
-    right = entry.right if entry.judged else ""
+    is_counted = entry.judged or entry.partly_judged
+    right = entry.right if is_counted else ""
     return [entry.name, right, len(JUDGES), *verdicts_of(entry).values(), _remarks_of(entry)]
 
 

@@ -8,6 +8,7 @@ the answers and the runs that are asked for. They must be right, so he has to wo
 
 from __future__ import annotations
 
+import codecs
 import re
 import shutil
 import sys
@@ -264,8 +265,8 @@ class ExerciseJudge(ExitStack):
         others = copy.others(recording.reads)
         if borrowed := ", ".join(other for other, matters in others.items() if matters):
             text = (
-                f"not graded: it reads {borrowed}, which was not handed in with it. Is that your "
-                "own? Put it into this file"
+                f"not graded: it tried to open {borrowed}, which was not handed in with it. Is "
+                "that your own? Put it into this file"
             )
             return Judgement(name, True, False, (text,), judged=False)
         judgement = None
@@ -279,7 +280,7 @@ class ExerciseJudge(ExitStack):
                 recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         if judgement is None:
             judgement = _without_answers(copy, name, recording)
-        looks = tuple(f"{LOOK}: it reads {other}" for other in others)
+        looks = tuple(f"{LOOK}: it tried to open {other}" for other in others)
         return replace(judgement, remarks=judgement.remarks + looks)
 
 
@@ -339,7 +340,9 @@ def _python_file(path: Path) -> Path:
             content = file.read(LARGEST + 1)
     except OSError as error:
         raise BadInputError(f"{path.name} cannot be read: {error.strerror}") from None
-    if len(content) > LARGEST or b"\0" in content:
+    is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    # Of UTF-16 Python says itself that it is not UTF-8, and so of each other encoding.
+    if len(content) > LARGEST or (b"\0" in content and not is_utf16):
         raise BadInputError(f"{path.name} is not a Python file, or far too large for one")
     if re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content):
         raise BadInputError(

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...show.blocks import only_on_pages
-from .alike import AlikeGroup
+from .alike import AlikeGroup, AlikePair
 from .class_table import ClassEntry, verdicts_of
 from .judges import JUDGES
 
 COMMON = 2  # students, from whom on a mistake is a common one
-# What may differ between two remarks on the same mistake: a number, a line of code, a function.
-_VARIES = re.compile(r"`[^`]*`|\bdemo_\w+|(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# What may differ between two remarks on the same mistake: a number, a line of code, a function,
+# and in which run of demo_gravity it was seen.
+_VARIES = re.compile(
+    r"`[^`]*`|\bdemo_\w+|(?<=\bservos )(?:on|off)\b|(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+)
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,14 @@ class Mistake:
             all of them.
         functions: Functions in which it was made.
         students: Who made it, or the names of the files.
+        others: Further remarks that just these students, if there are several, got on just these
+            functions: most often one cause has them all.
     """
 
     remark: str
     functions: tuple[str, ...]
     students: tuple[str, ...]
+    others: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:
@@ -78,6 +84,7 @@ class ClassResult:
         functions: How many students have each function right.
         mistakes: The commonest first.
         alike: Groups of submissions that are alike, the largest first.
+        nearly_alike: Submissions that are nearly alike, two by two.
         unjudged: What was not judged, by the reason.
         ignored: Names of files in the folders that nobody hands in.
     """
@@ -86,6 +93,7 @@ class ClassResult:
     functions: tuple[FunctionCount, ...]
     mistakes: tuple[Mistake, ...]
     alike: tuple[AlikeGroup, ...]
+    nearly_alike: tuple[AlikePair, ...]
     unjudged: tuple[Unjudged, ...]
     ignored: tuple[str, ...]
 
@@ -94,6 +102,14 @@ class ClassResult:
     def counted(self) -> Sequence[ClassEntry]:
         """Submissions that count: with a roster, files of nobody on it do not."""
         return counted(self.entries)
+
+    @property
+    @only_on_pages
+    def strangers(self) -> Sequence[ClassEntry]:
+        """Submissions of nobody on the roster; none without a roster."""
+        if not any(entry.student for entry in self.entries):
+            return ()
+        return [entry for entry in self.entries if not entry.student]
 
     @property
     def complete(self) -> bool:
@@ -105,6 +121,7 @@ def class_result(
     entries: Sequence[ClassEntry],
     alike: Sequence[AlikeGroup] = (),
     ignored: Sequence[str] = (),
+    nearly_alike: Sequence[AlikePair] = (),
 ) -> ClassResult:
     """Return what came of the files of a class, with what is counted of it.
 
@@ -112,12 +129,14 @@ def class_result(
         entries: One for each submission.
         alike: Groups of submissions that are alike.
         ignored: Names of files that nobody hands in.
+        nearly_alike: Submissions that are nearly alike, two by two.
     """
     return ClassResult(
         entries=tuple(entries),
         functions=_function_counts(counted(entries)),
         mistakes=_mistakes(counted(entries)),
         alike=tuple(alike),
+        nearly_alike=tuple(nearly_alike),
         unjudged=_unjudged(entries),
         ignored=tuple(ignored),
     )
@@ -161,7 +180,24 @@ def _mistakes(entries: Sequence[ClassEntry]) -> tuple[Mistake, ...]:
         students = tuple(dict.fromkeys(entry.label for entry, _, _ in same))
         mistakes.append(Mistake(text, in_order, students))
     mistakes.sort(key=lambda mistake: -mistake.count)
-    return tuple(mistakes)
+    return tuple(_merged(mistakes))
+
+
+def _merged(mistakes: Sequence[Mistake]) -> list[Mistake]:
+    """Return mistakes, those as one that the same students made in the same functions."""
+    merged: dict[tuple[tuple[str, ...], frozenset[str]], Mistake] = {}
+    alone: list[Mistake] = []
+    for mistake in mistakes:
+        if mistake.count < COMMON:
+            alone.append(mistake)
+            continue
+        key = (mistake.functions, frozenset(mistake.students))
+        if key in merged:
+            first = merged[key]
+            merged[key] = replace(first, others=(*first.others, mistake.remark))
+        else:
+            merged[key] = mistake
+    return [*merged.values(), *alone]
 
 
 def _wrong_remarks(entry: ClassEntry) -> Iterator[tuple[str, str]]:

@@ -11,15 +11,18 @@ from ...backends import parse_backend
 from ...errors import BadInputError, check_name
 from ...installed import DEFAULT
 from ...lab.runs.reporter import QUIET, Reporter
+from ...measures.text import count
 from ...models import AnyPath
 from ...processes import checked_jobs
 from . import exercise
 from .alike import compare_submissions
+from .class_table import read
 from .classroom import judge_all
 from .faults import FAULTS
 from .faults.examination import Examination
 from .faults.run import examine
 from .overview import ClassResult, class_result
+from .recording import digest
 from .roster import enrolled
 from .submissions import Submission, not_looked_at, submission_in, submissions
 
@@ -122,8 +125,10 @@ def answer_class(request: ClassRequest, reporter: Reporter = QUIET) -> ClassResu
     """
     submitted: Sequence[Submission] = submissions(request.paths)
     if request.roster is not None:
-        submitted = enrolled(submitted, request.roster)
+        submitted = enrolled(submitted, request.roster, reporter)
     jobs = checked_jobs(request.jobs)
+    if request.table is not None:
+        _note_judged_again(submitted, request.table, reporter)
     comparison = compare_submissions(submitted)
     with reporter.stage(f"{len(submitted)} files", jobs) as progress:
         entries = judge_all(
@@ -136,7 +141,24 @@ def answer_class(request: ClassRequest, reporter: Reporter = QUIET) -> ClassResu
             progress=progress,
             comparison=comparison,
         )
-    return class_result(entries, comparison.groups, not_looked_at(request.paths))
+    ignored = not_looked_at(request.paths)
+    return class_result(entries, comparison.groups, ignored, comparison.nearly)
+
+
+def _note_judged_again(submitted: Sequence[Submission], table: Path, reporter: Reporter) -> None:
+    """Note how many files the table has no verdict on: they are judged again, and may be slow."""
+    if not table.exists():
+        return
+    contents = {digest(each.own) for each in submitted if each.path is not None}
+    again = 0
+    for (content, _), entry in read(table).items():
+        if content in contents and not entry.judged:
+            again += 1
+    if again:
+        reporter.note(
+            f"{count(again, 'file')} not judged last time: judged again, up to "
+            f"{exercise.WALL_LIMIT:.0f} s each"
+        )
 
 
 def answer_faults(request: FaultsRequest, reporter: Reporter = QUIET) -> Examination:

@@ -9,7 +9,7 @@ from pathlib import Path
 from ...errors import BadInputError
 from ...models import AnyPath
 from .links import leads_out, refusal_of
-from .recording import has_functions, in_folder, refused_links
+from .recording import has_functions, has_solutions, in_folder, refused_links, start_of
 
 EXERCISE_FILES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 # What is handed in and cannot be judged as it is, by the end of its name.
@@ -122,7 +122,7 @@ def _skipped(entry: Path) -> bool:
 def submission_in(folder: Path) -> Path:
     """Return the one file in a student's folder that has functions of the exercise.
 
-    Where there are several it is the one that is called `step_loop.py`.
+    Files in which nothing is written yet do not count beside one in which something is.
 
     Raises:
         BadInputError: There is none, or more than one.
@@ -171,10 +171,7 @@ def _in_folder_of_one(folder: Path) -> Submission:
     """Return a student's folder as a submission."""
     if refusal := refused_links(folder):
         return Submission(folder.name, None, refusal)
-    files = [file for file in sorted(folder.rglob("*.py")) if has_functions(file)]
-    called_right = [file for file in files if file.name == EXERCISE_FILES[0]]
-    if called_right:
-        files = called_right
+    files = _to_choose_from(folder)
     if len(files) == 1:
         return Submission(folder.name, files[0], folder=folder)
     if files:
@@ -187,3 +184,20 @@ def _in_folder_of_one(folder: Path) -> Submission:
     if (tests := folder / EXERCISE_FILES[1]).is_file():
         text += f". Did you mean statemachine check --faults {tests.as_posix()}?"
     return Submission(folder.name, None, text, folder)
+
+
+def _to_choose_from(folder: Path) -> list[Path]:
+    """Return the files in a student's folder one of which is to be judged.
+
+    These are the files with functions that are written; where nothing is written, all with the
+    functions. Where all of them are the same, the one with the exercise's own name stands for them.
+    """
+    files = [file for file in sorted(folder.rglob("*.py")) if has_functions(file)]
+    written = [file for file in files if has_solutions(file)]
+    if written:
+        files = written
+    files.sort(key=lambda file: file.name != EXERCISE_FILES[0])
+    contents = {start_of(file) for file in files}
+    if len(contents) == 1 and files[0].name == EXERCISE_FILES[0]:
+        return files[:1]
+    return files

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,7 +18,7 @@ from ....measures.text import count
 from .answers import answer_of, encode
 from .error_hints import hint_of
 from .watch import engine_watched, watching
-from .worlds import AnyWorld
+from .worlds import FUNCTIONS, AnyWorld
 
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
@@ -39,22 +40,37 @@ def load_file(path: Path) -> dict[str, Any]:
     """Return the names that a student's file defines.
 
     Raises:
-        FaultError: It does not compile, or ends with an error.
+        FaultError: It does not compile, ends with an error, or has none of the functions.
     """
     content = path.read_bytes()
     try:
         importlib.util.decode_source(content)  # which compiling bytes does not ask of comments
     except (UnicodeDecodeError, SyntaxError):
+        if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise FaultError(
+                "the file cannot be loaded: it is saved as UTF-16, and Python refuses the file. "
+                "Save it as UTF-8"
+            ) from None
         lines = enumerate(content.split(b"\n"), start=1)
         line = next((k for k, text in lines if text.decode(errors="ignore").encode() != text), 1)
         raise FaultError(
             f"the file cannot be loaded: line {line}: this is not UTF-8, and Python refuses the "
             "file. Save it as UTF-8"
         ) from None
+    if not content.strip():
+        raise FaultError("the file is empty")
     try:
-        return vars(load_module(_MODULE, path))
+        names = vars(load_module(_MODULE, path))
+    except SystemExit as error:
+        raise FaultError(
+            f"the file cannot be loaded: {_remark(error, path)}. What runs the program belongs "
+            'below `if __name__ == "__main__":`'
+        ) from error
     except BaseException as error:
         raise FaultError(f"the file cannot be loaded: {_remark(error, path)}") from error
+    if names.keys().isdisjoint(FUNCTIONS):
+        raise FaultError(f"the file has none of the functions {', '.join(FUNCTIONS)}")
+    return names
 
 
 def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function:

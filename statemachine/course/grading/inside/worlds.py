@@ -228,3 +228,4 @@ _WORLDS: dict[str, Callable[[Scenes], Sequence[AnyWorld]]] = {
     "demo_forward": _forward,
     "demo_replay": _replay,
 }
+FUNCTIONS = tuple(_WORLDS)  # of the exercise
