@@ -31,10 +31,12 @@ from statemachine.lab.why import (
     explain,
     search,
 )
+from statemachine.lab.why.answer_page import answer as sentence_of_answer
 from statemachine.lab.why.deadline import Deadline, TimeIsUp
 from statemachine.lab.why.shapley import shapley
 from statemachine.lab.why.trials import Trials
 from statemachine.lab.why.verdict import Facts, verdict_of
+from statemachine.measures.text import percent
 from statemachine.processes.parallel import forks_for, in_forks
 
 from .support.claims import refused
@@ -233,6 +235,18 @@ def test_what_is_known_when_the_time_is_up_is_a_part_of_the_whole_answer(
         assert (row.range is None) == (row.alone is None and row.last is None)
     measured = sum((row.alone is not None) + (row.last is not None) for row in found.shares)
     assert measured <= min(runs, 2 * len(CHANGES))
+
+
+@pytest.mark.parametrize("runs", [3, 2 * len(CHANGES) + 1])
+def test_what_is_known_early_leads_with_the_best_candidate(
+    sides: tuple[sm.Model, sm.Model], monkeypatch: pytest.MonkeyPatch, runs: int
+) -> None:
+    _after(runs, TimeIsUp(), monkeypatch)
+    found = explain(_asked(sides, time_limit=1e6))
+    best = next(each for each in found.ranking if each.alone is not None)
+    assert best.alone is not None
+    expected = f"Best candidate so far: {best.name}, {percent(best.alone)} alone"
+    assert sentence_of_answer(found).startswith(expected)
 
 
 def test_a_range_reaches_from_what_a_difference_takes_away_alone_to_what_it_takes_away_last(

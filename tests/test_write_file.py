@@ -454,7 +454,21 @@ def test_a_file_that_is_read_is_not_overwritten(tmp_path: Path) -> None:
     for target in (left, right, part):
         with pytest.raises(BadInputError, match="would overwrite a file that is read"):
             check_target(target, left, right)
-    check_target(written(tmp_path / "other.xml", ARM), left, right)
+    check_target(tmp_path / "other.xml", left, right)
+
+
+def test_a_file_that_is_there_stays_as_it_is(tmp_path: Path) -> None:
+    left = written(tmp_path / "left.xml", ARM)
+    right = written(tmp_path / "right.xml", edited(ARM, ('kp="30"', 'kp="36"')))
+    existing = written(tmp_path / "existing.xml", "keep")
+    link, dangling = tmp_path / "link.xml", tmp_path / "dangling.xml"
+    link.symlink_to(existing)
+    dangling.symlink_to(tmp_path / "nothing.xml")
+    for target in (existing, link, dangling):
+        with pytest.raises(BadInputError, match="is there already"):
+            compare_models(ModelsRequest((left, right), write=target))
+    assert existing.read_text() == "keep"
+    assert link.is_symlink()
 
 
 @pytest.mark.parametrize(

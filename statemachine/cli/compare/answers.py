@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,11 +58,28 @@ def run(options: argparse.Namespace) -> int:
             return _run_compare(options, request)
 
 
+@contextmanager
+def _stop_is_said() -> Iterator[None]:
+    """Compute an answer; of a Ctrl-C before anything is known that is said.
+
+    Raises:
+        SystemExit: A Ctrl-C came.
+        InterruptedExplanation: A Ctrl-C came, and something is known.
+    """
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        if type(stop) is not KeyboardInterrupt:
+            raise
+        raise SystemExit(complain("stopped before anything is known", INTERRUPTED)) from None
+
+
 def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     """Compare two files."""
     from ...lab.questions.requests.models import answer
 
-    result = answer(request, TerminalReporter())
+    with _stop_is_said():
+        result = answer(request, TerminalReporter())
     return show(result.page(options.details), result, options.json)
 
 
@@ -69,7 +88,8 @@ def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     from ...lab.questions import one_step
     from ...lab.questions.requests.one_step import answer
 
-    result = answer(request, TerminalReporter())
+    with _stop_is_said():
+        result = answer(request, TerminalReporter())
     return show(one_step.page(result, options.details), result, options.json)
 
 
@@ -78,7 +98,8 @@ def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     from ...lab.questions import convergence
     from ...lab.questions.requests.converge import answer
 
-    result = answer(request, TerminalReporter())
+    with _stop_is_said():
+        result = answer(request, TerminalReporter())
     return show(convergence.page(result, options.details), result, options.json)
 
 
@@ -90,7 +111,8 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     from ...show.charts import write_pictures
 
     _files_of(options).check(TerminalReporter())
-    result = answer(request, TerminalReporter())
+    with _stop_is_said():
+        result = answer(request, TerminalReporter())
     if options.junit is not None:
         write_tests(options.junit, result.comparisons)
     page = versions.page(result, options.details)
@@ -111,7 +133,8 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
 
     interrupted = False
     try:
-        result = answer(request, TerminalReporter())
+        with _stop_is_said():
+            result = answer(request, TerminalReporter())
     except InterruptedExplanation as stop:
         result, interrupted = stop.result, True
     except EndedEarlyError:
@@ -137,7 +160,8 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     asked = None
     if files.html is not None and not options.no_why:
         asked = explain_request_of(options, request.run)
-    result = answer(request, reporter)
+    with _stop_is_said():
+        result = answer(request, reporter)
     page = comparison.page(result, options.details)
     if files.html is not None:
         try:

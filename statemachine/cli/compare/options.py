@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterable, Sequence
 
 from ...errors import BadInputError
-from ...typed_numbers import typed_float, typed_int
+from ...typed_numbers import typed_float
 from ..common import (
     PROGRAM,
     SIDES,
@@ -133,9 +133,8 @@ def _add_sides(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--every",
-        type=typed_int,
-        metavar="N",
-        help="steps for which what FUNCTION(model, data) returned holds (1)",
+        metavar="N|TIME",
+        help="for how long what FUNCTION(model, data) returned holds: steps (1), or 5ms",
     )
     group.add_argument("--keyframe", metavar="NAME", help="where it starts, on both sides")
 

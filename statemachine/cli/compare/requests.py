@@ -96,6 +96,7 @@ def explain_request_of(options: argparse.Namespace, run: Request) -> ExplainRequ
 def run_of(options: argparse.Namespace) -> Request:
     """Return what is run on two sides, or which traces are opened."""
     from ...lab.compare import Request, split_words
+    from ...lab.runs.call_period import every_of_word
 
     what, sides = split_words(options.what, options.menagerie)
     common: dict[str, OptionValue] = {}
@@ -110,7 +111,7 @@ def run_of(options: argparse.Namespace) -> Request:
     names = pairs_of(options.map, "--map")
     if sides:
         sides = _with_parts(options, sides[0], sides[1], names)
-    every = 1 if options.every is None else options.every
+    every = 1 if options.every is None else every_of_word(options.every)
     return Request(
         what=what,
         backends=_backends(options, what),
@@ -145,8 +146,6 @@ def _check_options_of_run(
         )
     if not (len(what) == 1 and is_function(what[0])):
         refuse_options(options, ["every"], "{} goes with FILE.py:FUNCTION")
-    if options.every is not None and options.every < 1:
-        raise BadInputError(f"--every wants a number of steps, at least 1; got {options.every}")
 
 
 def _with_parts(

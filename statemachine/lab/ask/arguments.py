@@ -18,7 +18,9 @@ from ..compare.perturbed import Uncertainty, parse_uncertainty
 from ..compare.sides import Request, Side, What
 from ..compare.typed_sides import parse_sides
 from ..recordings import Trace
+from ..runs.call_period import Every
 from ..runs.scenarios import SCENARIOS
+from ..shown_result import ShownResult
 
 AnySide = AnyPath | Model | Side
 AnyWhat = What | os.PathLike[str]
@@ -43,7 +45,7 @@ class RunArguments:
             None for none.
         actuators: The side whose actuators both have.
         floor: The side whose floor both have.
-        every: Steps for which what a function returned holds.
+        every: Steps for which what a function returned holds, or a time such as "5ms".
         keyframe: Where it starts, on both sides.
     """
 
@@ -58,7 +60,7 @@ class RunArguments:
     names: Mapping[str, str] | None = None
     actuators: Which | None = None
     floor: Which | None = None
-    every: int = 1
+    every: Every = 1
     keyframe: str | None = None
 
     @classmethod
@@ -185,6 +187,11 @@ def side_of(side: AnySide, menagerie: AnyPath | None = None) -> Side:
         return side
     if isinstance(side, Model):
         return Side.of_model(side)
+    if isinstance(side, ShownResult):
+        raise BadInputError(
+            f"a {type(side).__name__} is an answer, not a side; what was run on both sides is "
+            "result.request.run, as in lab.why(result.request.run)"
+        )
     if not isinstance(side, str | os.PathLike):
         raise BadInputError(
             f'a side is "FILE@ENGINE option=value", a path, a Model or a Side; got {shown(side)}'

@@ -11,6 +11,7 @@ from ..compare.sides import Request
 from ..questions.requests import causes, gap
 from ..questions.requests.causes import ExplainRequest, ExplainResult
 from ..questions.requests.gap import CompareRequest, CompareResult
+from ..runs.call_period import Every
 from ..runs.reporter import QUIET, Reporter
 from ..why.gap import Measure
 from .arguments import (
@@ -37,7 +38,7 @@ def compare(
     names: Mapping[str, str] | None = None,
     actuators: Which | None = None,
     floor: Which | None = None,
-    every: int = 1,
+    every: Every = 1,
     keyframe: str | None = None,
     tolerances: Mapping[str, float | str] | None = None,
     uncertainty: Uncertainty | str | Sequence[str] = (),
@@ -68,7 +69,7 @@ def compare(
         names: Joints, bodies, sites and actuators of the left by the names that the right has.
         actuators: "left" or "right": both sides have the actuators of that one.
         floor: "left" or "right": both sides have the floor of that one.
-        every: Steps for which what a function returned holds.
+        every: Steps for which what a function returned holds, or a time such as "5ms".
         keyframe: Where it starts, on both sides; None for the experiment's own, and for the default
             state of a function.
         tolerances: By kind of quantity, over the usual ones: SI, or words as in
@@ -107,7 +108,7 @@ def why(
     names: Mapping[str, str] | None = None,
     actuators: Which | None = None,
     floor: Which | None = None,
-    every: int = 1,
+    every: Every = 1,
     keyframe: str | None = None,
     quantity: str | None = None,
     measure: Measure = "worst",

@@ -9,6 +9,7 @@ from ...interface import Model
 from ...models import AnyPath
 from ..compare.sides import Request, Side
 from ..questions.requests.versions import VersionsRequest, VersionsResult, answer
+from ..runs.call_period import Every
 from ..runs.reporter import QUIET, Reporter
 from .arguments import AnyWhat, RunArguments, check_alone, side_of, tolerances_of
 
@@ -23,7 +24,7 @@ def versions(
     seconds: float | None = None,
     timestep: float | None = None,
     seed: int = 0,
-    every: int = 1,
+    every: Every = 1,
     keyframe: str | None = None,
     tolerances: Mapping[str, float | str] | None = None,
     reporter: Reporter = QUIET,
@@ -45,7 +46,7 @@ def versions(
         seconds: Simulated time [s]; None for the experiment's own, or 2 of a function.
         timestep: Length of a step [s]; None for the file's own.
         seed: Of what an experiment draws.
-        every: Steps for which what a function returned holds.
+        every: Steps for which what a function returned holds, or a time such as "5ms".
         keyframe: Where it starts; None for the experiment's own, and for the default state of a
             function.
         tolerances: By kind of quantity, over the usual ones: SI, or words such as "0.5deg".

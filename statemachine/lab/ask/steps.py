@@ -11,6 +11,7 @@ from ..questions.requests import converge as limits
 from ..questions.requests import one_step as steps
 from ..questions.requests.converge import ConvergeRequest, ConvergeResult
 from ..questions.requests.one_step import OneStepRequest, OneStepResult
+from ..runs.call_period import Every
 from ..runs.reporter import QUIET, Reporter
 from .arguments import AnySide, AnyWhat, RunArguments, Which, check_alone
 
@@ -28,7 +29,7 @@ def one_step(
     names: Mapping[str, str] | None = None,
     actuators: Which | None = None,
     floor: Which | None = None,
-    every: int = 1,
+    every: Every = 1,
     keyframe: str | None = None,
     reporter: Reporter = QUIET,
 ) -> OneStepResult:
@@ -78,7 +79,7 @@ def converge(
     names: Mapping[str, str] | None = None,
     actuators: Which | None = None,
     floor: Which | None = None,
-    every: int = 1,
+    every: Every = 1,
     keyframe: str | None = None,
     reporter: Reporter = QUIET,
 ) -> ConvergeResult:

@@ -12,7 +12,6 @@ from ...engines import raw_engine_of
 from ...errors import BadInputError, TraceError
 from ...interface import Model
 from ...measures import common_moments
-from ...measures.text import milliseconds
 from ...release_names import engine_of
 from ..recordings import (
     Rerun,
@@ -77,6 +76,7 @@ def prepare_sides(request: Request) -> PreparedSides:
     left, right = models = loaded.models
     matched = match_sides(sides, left, right, request.names)
     seconds = scenario.seconds if trace or request.seconds is None else request.seconds
+    request.call_periods((left.timestep, right.timestep))  # whole steps on both sides
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
@@ -96,7 +96,6 @@ def prepare_sides(request: Request) -> PreparedSides:
         seed = request.seed if scenario.seeded else None
     right_start = _start_of_right(scenario.keyframe, left_start, left, right, matched)
     notes += right_start.notes
-    notes += _notes_on_every(request.every, left, right)
 
     def left_controller(model: Model) -> Controller:
         return scenario.controller(model, request.seed)
@@ -191,16 +190,6 @@ def _start_of_right(
     if matched and written:
         written = matched.start(written, usual)
     return _RightStart(keyframe, usual, written, notes)
-
-
-def _notes_on_every(every: int, left: Model, right: Model) -> list[str]:
-    """Say for how long a command holds, where that is not the same on both sides."""
-    if every <= 1 or left.timestep == right.timestep:
-        return []
-    return [
-        f"{every} steps are {milliseconds(every * left.timestep)} on the left "
-        f"and {milliseconds(every * right.timestep)} on the right"
-    ]
 
 
 def _starting(rerun: Rerun, keyframe: str | None, start: SideStart | None) -> Rerun:

@@ -18,7 +18,6 @@ from ...engines import raw_engine_of
 from ...errors import BadInputError, TraceError, shown
 from ...installed import DEFAULT, PAIR
 from ...interface import Model
-from ...interface.checks import as_count
 from ...interface.free_base import FreeBase
 from ...interface.options import OptionValue
 from ...interface.read_options import non_default_options
@@ -27,6 +26,7 @@ from ...measures.text import listed
 from ...models import resolve
 from ..recordings import Trace, read
 from ..recordings.files import SUFFIXES
+from ..runs.call_period import CallPeriods, Every, call_periods, checked_every
 from ..runs.controllers import Function, file_and_name_of, function_scenario, is_function
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
@@ -210,7 +210,7 @@ class Request:
         sides: The two sides, instead of backends and model; empty for those.
         names: Joints, bodies, sites and actuators of the left that go by other names on the
             right.
-        every: Steps for which what a FUNCTION returns holds.
+        every: Steps for which what a FUNCTION returns holds, or a time such as "5ms".
         keyframe: Where it starts; None for the experiment's own, and a FUNCTION's default state.
     """
 
@@ -223,13 +223,13 @@ class Request:
     options: Mapping[str, OptionValue] = field(default_factory=dict)
     sides: tuple[Side, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
-    every: int = 1
+    every: Every = 1
     keyframe: str | None = None
 
     def __post_init__(self) -> None:
         if len(self.backends) != 2:
             raise BadInputError(f"two backends are compared; got {shown(self.backends)}")
-        as_count(self.every, "every")
+        checked_every(self.every)
 
     @property
     def is_traces(self) -> bool:
@@ -285,6 +285,20 @@ class Request:
             for side, (name, other) in zip(self.sides, names, strict=False)
             if side.taken
         )
+
+    def call_periods(self, timesteps: tuple[float, float]) -> CallPeriods | None:
+        """Return how often a function is called on each side; None where none is run.
+
+        Args:
+            timesteps: Of the left and of the right [s].
+
+        Raises:
+            BadInputError: A time is not a whole number of steps of a side.
+        """
+        what = self.what[0]
+        if len(self.what) != 1 or isinstance(what, Trace) or not is_function(what):
+            return None
+        return call_periods(self.every, timesteps)
 
     def both_sides(self, model: str) -> Sequence[Side]:
         """The two sides; where none were said, one model on the two backends.

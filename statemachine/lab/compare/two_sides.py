@@ -255,7 +255,7 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
 
 def _command(request: Request, backend: BackendChoice) -> str:
     """The command that records one side of an experiment; "" where it cannot say that."""
-    if request.sides or request.every > 1 or not request.is_typed:
+    if request.sides or request.every != 1 or not request.is_typed:
         return ""
     if {*request.options} - {"timestep"}:
         return ""

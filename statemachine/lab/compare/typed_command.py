@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...installed import DEFAULT, PAIR
 from .labels import typed_option
@@ -13,6 +13,7 @@ from .sides import Request, Side, without_folders
 
 _WIDTH = 74  # of a line of a command, which is set in
 _SOME_FOLDER = "DIR"
+_EVERY = "--every"
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,16 @@ class TypedCommand:
     words: tuple[str, ...]
     question: tuple[str, ...] = ()
     run: Request | None = None
+
+    def calling_every(self, period: str) -> TypedCommand:
+        """Return the same command with another period of the function, such as "5ms"."""
+        if self.run is not None:
+            return replace(self, run=replace(self.run, every=period))
+        words = list(self.words)
+        if _EVERY in words:
+            place = words.index(_EVERY)
+            del words[place : place + 2]
+        return replace(self, words=(*words, _EVERY, period))
 
     def lines(self, *further: str) -> str:
         """Return the command as one types it, continued on further lines where it is long.
@@ -103,7 +114,7 @@ def _words_of_run(run: Request, folders: bool) -> list[str]:
     if run.seed:
         words += ["--seed", str(run.seed)]
     if run.every != 1:
-        words += ["--every", str(run.every)]
+        words += [_EVERY, str(run.every)]
     if run.keyframe is not None:
         words += ["--keyframe", run.keyframe]
     for left, right in run.names.items():

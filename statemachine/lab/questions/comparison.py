@@ -12,9 +12,11 @@ from ...show.first_screen import first_that_fits
 from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison
 from ..compare.base_frame_page import base_frame_blocks
+from ..compare.call_periods_page import call_periods_blocks
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.matched import Matched
 from ..compare.series import SETTLED
+from ..compare.written_state_page import written_state_blocks
 from ..runs.floating import Bases
 from .compare_details import details_of
 from .compare_verdict import headline_of, sentence_labels
@@ -173,7 +175,8 @@ def _with_rows(
     table, rest = worst.narrow_table, worst.rest
     if finding.outcome == "nothing moved" or finding.is_same:  # a row could say nothing
         table, rest = replace(table, rows=[]), VerdictCounts(0, 0, 0)
-    following = next_command(result.request.run, finding, result.instead)
+    periods = result.call_periods
+    following = next_command(result.request.run, finding, result.instead, periods)
     content = ComparePage(
         result=result,
         worst=table,
@@ -185,7 +188,9 @@ def _with_rows(
     )
     headline = headline_of(finding, comparison, result.instead)
     frame = base_frame_blocks(content.bases.frame)
-    blocks = [*frame, *_known_changes(result), *render_blocks(content)]
+    called = call_periods_blocks(periods)
+    state = written_state_blocks(comparison.left.trace, comparison.right.trace)
+    blocks = [*state, *called, *frame, *_known_changes(result), *render_blocks(content)]
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
 
 

@@ -8,13 +8,15 @@ from typing import Literal
 
 from ...measures import QUANTITIES
 from ...measures.text import grouped, milliseconds, quantity, short_time
-from ...show.blocks import Page, Table
+from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_screen
 from ...show.templates import PageContent, render, with_answer
+from ..compare.call_periods_page import call_periods_blocks
 from ..compare.convergence import FINER, Convergence, GapLimit, GapState, TouchState
 from ..compare.sides import Request, Side
 from ..compare.stillness import nothing_moved
 from ..compare.typed_command import typed_command
+from ..runs.call_period import CallPeriods
 from .compared_names import name_of
 from .requests.converge import ConvergeResult
 
@@ -23,7 +25,7 @@ _WORST_FIRST = ("stays", "in part", "unclear", "discretisation")
 _FINER_BY = 4  # than the steps as given, where those are too coarse
 _OTHER_EXPERIMENT = "waves"  # moves whatever has an actuator
 
-NextStep = Literal["why", "smaller steps", "finer", "another experiment", "nothing"]
+NextStep = Literal["why", "same period", "smaller steps", "finer", "another experiment", "nothing"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class ConvergencePage(PageContent):
         more: How many gaps beyond rounding it does not show.
         next_step: What the next command is for.
         next_command: What to type next; "" for nothing.
+        call_periods: How often a function is called on each side; None where none is run.
         details: Whether everything is shown.
     """
 
@@ -47,6 +50,7 @@ class ConvergencePage(PageContent):
     more: int
     next_step: NextStep
     next_command: str
+    call_periods: CallPeriods | None
     details: bool
 
     @property
@@ -99,6 +103,16 @@ class ConvergencePage(PageContent):
     def steps(self) -> list[str]:
         """The engines' steps as given, each once."""
         return list(dict.fromkeys(milliseconds(step, 3) for step in self.limits.steps))
+
+    @property
+    def called(self) -> list[Block]:
+        """How often a function is called on both sides, where that is not the same."""
+        return call_periods_blocks(self.call_periods)
+
+    @property
+    def asks_function(self) -> bool:
+        """Whether a function of the user's commands."""
+        return self.call_periods is not None
 
     @property
     def periods_differ(self) -> bool:
@@ -172,15 +186,17 @@ def page(result: ConvergeResult, details: bool = False) -> Page:
 def _page(result: ConvergeResult, worst: Sequence[GapLimit], details: bool = False) -> Page:
     """Return the page with some of the gaps; with details two tables have all of them."""
     run = result.request.run
-    next_step = _next_step(result, run)
+    periods = run.call_periods(result.periods)
+    next_step = _next_step(result, run, periods)
     more = 0 if details else len(_worst_first(result.whole)) - len(worst)
     content = ConvergencePage(
         experiment=run.experiment,
         limits=result,
         worst=_limits_table(worst, "", finest=1),
         more=more,
+        call_periods=periods,
         next_step=next_step,
-        next_command=_next_command(next_step, result, run),
+        next_command=_next_command(next_step, result, run, periods),
         details=details,
     )
     return with_answer(render(content))
@@ -235,8 +251,10 @@ def _gap_at(level: int) -> Callable[[GapLimit], str]:
     return lambda limit: quantity(limit.gaps[level], limit.unit)
 
 
-def _next_step(limits: Convergence, run: Request) -> NextStep:
+def _next_step(limits: Convergence, run: Request, periods: CallPeriods | None) -> NextStep:
     """Return what to ask next."""
+    if periods is not None and periods.differ and limits.state not in ("still", "rounding"):
+        return "same period"
     match limits.state:
         case "still":
             return "nothing" if run.what[0] == _OTHER_EXPERIMENT else "another experiment"
@@ -249,9 +267,15 @@ def _next_step(limits: Convergence, run: Request) -> NextStep:
     return "why"
 
 
-def _next_command(next_step: NextStep, limits: Convergence, run: Request) -> str:
+def _next_command(
+    next_step: NextStep, limits: Convergence, run: Request, periods: CallPeriods | None
+) -> str:
     """Return what to type next; "" for nothing."""
+    if periods is not None:  # whose function is called as often with finer steps
+        run = replace(run, every=periods.common_word)
     match next_step:
+        case "same period":
+            return typed_command(run).lines("--converge")
         case "why" if QUANTITIES[limits.lead.kind].own:
             return typed_command(run).lines("--why", "--quantity", name_of(limits.lead.name))
         case "why":

@@ -10,6 +10,7 @@ from ...measures import QUANTITIES
 from ..compare.instead import Instead
 from ..compare.sides import Request, Side
 from ..compare.typed_command import TypedCommand, typed_command
+from ..runs.call_period import CallPeriods
 from ..runs.scenarios import SCENARIOS
 from .compared_names import name_of
 from .finding import Finding
@@ -18,14 +19,16 @@ _OTHER = "waves"  # moves whatever has an actuator
 _STEPS = ("timestep", "substeps")
 
 # What the command is for: it tells which difference causes the gap; the same until before a run
-# ended; it gives a side the parts or the base that the other has; it tells which stage of one step
-# differs, which chance cannot hide; it tells whether a gap vanishes with the timestep, where
-# nothing else differs; it runs something that moves more; there is none to type.
+# ended; it gives a side the parts or the base that the other has; it calls a function as often on
+# both sides; it tells which stage of one step differs, which chance cannot hide; it tells whether a
+# gap vanishes with the timestep, where nothing else differs; it runs something that moves more;
+# there is none to type.
 Purpose = Literal[
     "why",
     "why until then",
     "same parts",
     "same base",
+    "same period",
     "one step",
     "converge",
     "move more",
@@ -49,13 +52,19 @@ class NextCommand:
     short_text: str = ""
 
 
-def next_command(request: Request, finding: Finding, instead: Instead | None) -> NextCommand:
+def next_command(
+    request: Request,
+    finding: Finding,
+    instead: Instead | None,
+    periods: CallPeriods | None = None,
+) -> NextCommand:
     """Return what to type after a comparison.
 
     Args:
         request: What was run.
         finding: What came of it.
         instead: What moves the model where nothing moved; None where that was not looked for.
+        periods: How often a function is called on each side; None where none is run.
     """
     match finding.outcome:
         case "nothing moved":
@@ -64,13 +73,9 @@ def next_command(request: Request, finding: Finding, instead: Instead | None) ->
             return _until_then(request, finding)
         case "agrees":
             return _more(request, finding)
-    if finding.bases.differ:
-        return _same_base(request, finding)
-    if finding.missing:
-        parts: list[str] = []
-        for missing in finding.missing:
-            parts += [f"--{missing.part}", missing.giver]
-        return _asking(request, "same parts", *parts)
+    same = _same_on_both(request, finding, periods)
+    if same is not None:
+        return same
     can_step = not request.is_traces or bool(request.sides)
     moves = QUANTITIES[finding.lead.kind].moves
     if can_step and (finding.rounding.verdict in ("as much", "no bound") or not moves):
@@ -80,6 +85,22 @@ def next_command(request: Request, finding: Finding, instead: Instead | None) ->
     if _only_timesteps_differ(request):
         return _asking(request, "converge", "--converge")
     return _asking(request, "why", "--why", "--quantity", name_of(finding.lead.name))
+
+
+def _same_on_both(
+    request: Request, finding: Finding, periods: CallPeriods | None
+) -> NextCommand | None:
+    """Return the comparison with the same base, parts or period on both sides; None if they are."""
+    if finding.bases.differ:
+        return _same_base(request, finding)
+    if finding.missing:
+        parts: list[str] = []
+        for missing in finding.missing:
+            parts += [f"--{missing.part}", missing.giver]
+        return _asking(request, "same parts", *parts)
+    if periods is not None and periods.differ:
+        return _same_period(request, periods)
+    return None
 
 
 def _only_timesteps_differ(request: Request) -> bool:
@@ -114,6 +135,12 @@ def _same_base(request: Request, finding: Finding) -> NextCommand:
             text = typed_command(same).lines()
             return NextCommand("same base", text, text)
     return NextCommand("nothing")
+
+
+def _same_period(request: Request, periods: CallPeriods) -> NextCommand:
+    """Return the comparison with a function that is called as often on both sides."""
+    text = typed_command(replace(request, every=periods.common_word)).lines()
+    return NextCommand("same period", text, text)
 
 
 def _until_then(request: Request, finding: Finding) -> NextCommand:

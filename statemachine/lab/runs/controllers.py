@@ -18,6 +18,7 @@ from ...interface import Data, Model
 from ...interface.checks import as_vector
 from ...measures.text import count, few
 from ...models import kind_of_path
+from .call_period import Every, steps_of
 from .drive import Controller
 from .scenarios import Scenario
 
@@ -109,7 +110,7 @@ def is_function(spec: object) -> bool:
 
 def function_scenario(
     spec: str | Function,
-    every: int = 1,
+    every: Every = 1,
     keyframe: str | None = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> Scenario:
@@ -119,7 +120,8 @@ def function_scenario(
 
     Args:
         spec: The function; or a file and a function of it, without a name `controller`.
-        every: The function is called at the first of so many steps, and its ctrl holds.
+        every: The function is called at the first of so many steps, or once in a time such as
+            "5ms", and its ctrl holds.
         keyframe: Where it starts; None for the default state.
         parameters: Further keyword arguments of the function.
 
@@ -138,12 +140,12 @@ def function_scenario(
 
     imported()  # that it fails is said before anything is loaded
 
-    def controller_of(_model: Model, _seed: int) -> Controller:
+    def controller_of(model: Model, _seed: int) -> Controller:
         function = imported()
-        numbers = itertools.count()
+        numbers, steps = itertools.count(), steps_of(every, model.timestep)
 
         def controller(model: Model, data: Data) -> Any:
-            if next(numbers) % every:
+            if next(numbers) % steps:
                 return None
             with _errors_in_one_line(path, name, data.time):
                 ctrl = function(model, data, **given)
@@ -152,7 +154,7 @@ def function_scenario(
         return controller
 
     called = Path(spec).name if isinstance(spec, str) else name
-    steps = "every step" if every == 1 else f"every {count(every, 'step')}"
+    steps = _how_often(every)
     begins = "the default state" if keyframe is None else f"the keyframe {keyframe!r}"
     says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
     return Scenario(
@@ -166,6 +168,13 @@ def function_scenario(
         keyframe=keyframe,
         own=True,
     )
+
+
+def _how_often(every: Every) -> str:
+    """Return how often a function is called, in words."""
+    if isinstance(every, str):
+        return f"every {every}"
+    return "every step" if every == 1 else f"every {count(every, 'step')}"
 
 
 def parameters_of(spec: str) -> tuple[str, ...]:
@@ -271,12 +280,21 @@ def _import_function(path: Path, name: str) -> Function:
         module = load_module(f"controller_{path.stem}", path)
     function = getattr(module, name, None)
     if not callable(function):
-        functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
+        functions = _functions_of(module)
         hint = did_you_mean(name, functions)
         if functions and not hint:
             hint = f"; it has {few(functions)}"
         raise BadInputError(f"{path.name} has no function {name}({', '.join(_POSITIONAL)}){hint}")
     return function
+
+
+def _functions_of(module: Any) -> list[str]:
+    """Return the names of the functions that a module defines, without those that it imports."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if inspect.isfunction(value) and value.__module__ == module.__name__
+    ]
 
 
 def _missing(path: Path) -> BadInputError:

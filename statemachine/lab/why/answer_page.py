@@ -123,6 +123,12 @@ class AnswerSentence(PageContent):
         return known[0] if known else None
 
     @property
+    def candidate(self) -> Effect | None:
+        """The cause that takes away most alone, of those that were tried; None of none."""
+        tried = [each for each in self.result.ranking if each.alone is not None]
+        return tried[0] if tried else None
+
+    @property
     def has_gap(self) -> bool:
         """Whether there is any gap."""
         return self.result.gap > 0

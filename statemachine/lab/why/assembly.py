@@ -81,7 +81,7 @@ def explanation_of(search: Search) -> Explanation:
         impossible=impossible,
         unmatched=matched.only,
         missing=_missing(request),
-        notes=_notes(matched, left, right),
+        notes=_notes(matched, left, right, asks_function=request.periods is not None),
         unread=_unread(matched, request, gap),
         still=_still(search.causes, left, trials.traces[0]),
         motion=motion,
@@ -94,6 +94,7 @@ def explanation_of(search: Search) -> Explanation:
         provenance=(provenance(left), provenance(right)),
         right_file=right.path.name,
         renamed=matched.renamed,
+        call_periods=request.periods,
         changes=trials.known_changes if gap.size > gap.negligible else (),
     )
 
@@ -227,15 +228,22 @@ def _redundant(shares: Sequence[Share]) -> tuple[str, ...]:
     return tuple(names) if len(names) > 1 else ()
 
 
-def _notes(matched: Matched, left: Model, right: Model) -> tuple[str, ...]:
-    """Return what a reader should know, in sentences."""
+def _notes(matched: Matched, left: Model, right: Model, asks_function: bool) -> tuple[str, ...]:
+    """Return what a reader should know, in sentences.
+
+    Args:
+        matched: What of the left is what of the right.
+        left: The left side.
+        right: The right side.
+        asks_function: Whether a function commands, whose periods stand on the first screen.
+    """
     notes = list(matched.other_notes)
     for model in (left, right):
         for what in raw_engine_of(engine_of(model.backend)).ignored(model):
             if "integrator" not in what:  # which is a cause
                 notes.append(f"{model.backend}: {what}")
     left_period, right_period = milliseconds(left.timestep, 3), milliseconds(right.timestep, 3)
-    if left_period != right_period:
+    if not asks_function and left_period != right_period:
         notes.append(_PERIODS.format(left=left_period, right=right_period))
     return tuple(dict.fromkeys(notes))
 

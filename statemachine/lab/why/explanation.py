@@ -15,6 +15,7 @@ from ..compare.matched import RenamedPair
 from ..compare.matching import Only
 from ..compare.motion import MotionExtent
 from ..compare.typed_command import TypedCommand
+from ..runs.call_period import CallPeriods
 from ..runs.floating import Bases
 from ..runs.provenance import Provenance
 from .gap import FirstTouch, Measure
@@ -184,6 +185,7 @@ class Explanation:
         renamed: What was taken for one although the names differ, and nobody said so.
         changes: Known changes between two releases that concern the runs as they come; empty where
             there is no gap.
+        call_periods: How often a function is called on each side; None where none is run.
         bases: Whether the base of each side floats, and whether their frames are one; None where
             nobody looked.
         command: What asks something of these sides again; None where nothing was typed.
@@ -232,6 +234,7 @@ class Explanation:
     renamed: tuple[RenamedPair, ...] = ()
     changes: tuple[KnownChange, ...] = ()
     bases: Bases | None = None
+    call_periods: CallPeriods | None = None
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
 

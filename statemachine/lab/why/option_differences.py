@@ -20,12 +20,23 @@ _OPTIONS = {
     "damping": {"damping": "dof_damping"},
     "dry friction": {"frictionloss": "dof_frictionloss"},
 }
+# The timestep where a function is called by the step, so that its period differs, too.
+TIMESTEP_AND_PERIOD = "timestep, and the period of the function with it"
 # SI unit of each option that has one.
 _OPTION_UNITS = {"timestep": "s", "gravity": "m/s²"}
 
 
-def differences_by_option(left: Model, right: Model) -> Iterator[ModelDifference]:
-    """Yield what differs and is equalized by `Model.replace`."""
+def differences_by_option(
+    left: Model, right: Model, periods_differ: bool = False
+) -> Iterator[ModelDifference]:
+    """Yield what differs and is equalized by `Model.replace`.
+
+    Args:
+        left: The Model that the other is brought to.
+        right: The other.
+        periods_differ: Whether a function is called more often on one side: with the timestep its
+            period is made the same, too.
+    """
     both_compiled = left.compiled is not None and right.compiled is not None
     for name, options in _OPTIONS.items():
         if both_compiled and name != "timestep":
@@ -36,14 +47,16 @@ def differences_by_option(left: Model, right: Model) -> Iterator[ModelDifference
             if not np.array_equal(ours, theirs):
                 values.append(_quantity_of_option(option, ours, theirs))
         if values and options.keys() <= set(right.capabilities.options):
-            yield ModelDifference(name, "option", "", tuple(values))
+            subject = TIMESTEP_AND_PERIOD if name == "timestep" and periods_differ else name
+            yield ModelDifference(subject, "option", "", tuple(values))
 
 
 def options_that_equalize(names: Set[str], left: Model) -> dict[str, Any]:
     """Return the options of `Model.replace` that equalize some causes, by their names."""
     options: dict[str, Any] = {}
     for name in sorted(names):
-        for option, attribute in _OPTIONS[name].items():
+        known = "timestep" if name == TIMESTEP_AND_PERIOD else name
+        for option, attribute in _OPTIONS[known].items():
             options[option] = getattr(left, attribute)
     return options
 

@@ -16,6 +16,7 @@ from ...show.blocks import Block, Headline, Page, Table, Text
 from ...show.first_screen import LINES, MOST_ROWS, first_screen, lines_of
 from ...show.templates import PageContent, render_blocks
 from ..compare.base_frame_page import base_frame_blocks
+from ..compare.call_periods_page import call_periods_blocks
 from ..compare.chaos import CLEAR
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.labels import lacking
@@ -31,7 +32,7 @@ from .verdict import UNEXPLAINED
 Conclusion = Literal["wider", "divided", "stopped", "no gap", "refused", "chance", "nothing moved"]
 Advice = Literal[
     "settings", "write", "refused", "both", "engines", "between", "files", "chance", "details",
-    "written", "go on", "",
+    "written", "go on", "same period", "",
 ]  # fmt: skip
 
 
@@ -55,6 +56,11 @@ class WhyPage(PageContent):
         """That the base has another frame on either side."""
         bases = self.result.bases
         return [] if bases is None else base_frame_blocks(bases.frame)
+
+    @property
+    def called(self) -> Sequence[Block]:
+        """How often a function is called on both sides, where that is not the same."""
+        return call_periods_blocks(self.result.call_periods)
 
     @property
     def known(self) -> Sequence[Block]:
@@ -236,13 +242,15 @@ def _conclusion(result: Explanation) -> Conclusion:
 
 def _advice(result: Explanation) -> Advice:
     """Return which sentence leads to the next command."""
-    verdict = result.verdict
+    verdict, periods = result.verdict, result.call_periods
     if result.rewritten is not None:
         return "written"
     if verdict.answer == "nothing moved":
         return ""
     if result.ended_by and verdict.divides:
         return "go on"
+    if verdict.divides and periods is not None and periods.differ:
+        return "same period"
     if not verdict.divides:
         return "details" if verdict.answer in ("rounding", "alike", "within") else "chance"
     if verdict.holds:
@@ -278,11 +286,21 @@ def _next_command(result: Explanation, advice: Advice) -> str:
             flags = (*result.command.question, "--write", target)
         case "refused" | "details":
             flags = (*result.command.question, "--details")
+        case "same period":
+            return _with_same_period(result)
         case "go on":
             flags = result.command.question
         case "written" | "":
             return ""
     return result.command.lines(*flags)
+
+
+def _with_same_period(result: Explanation) -> str:
+    """Return the same question with a function that is called as often on both sides."""
+    command, periods = result.command, result.call_periods
+    if command is None or periods is None:
+        return ""
+    return command.calling_every(periods.common_word).lines(*command.question)
 
 
 def _engines_differ(result: Explanation) -> bool:

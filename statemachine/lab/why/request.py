@@ -12,6 +12,7 @@ from ...release_names import engine_of
 from ..compare.labels import files_apart
 from ..compare.perturbed import EXACT, Uncertainty
 from ..recordings import Trace
+from ..runs.call_period import CallPeriods
 from ..runs.scenarios import Scenario
 from .gap import Measure
 
@@ -43,6 +44,7 @@ class WhyRequest:
         jobs: How many processes make the runs; None for one a processor where that pays, and
             for one where a function commands. Without forks the runs are made in this process. The
             figures are the same.
+        periods: How often a function is called on each side; None where none is run.
 
     Raises:
         BadInputError: `jobs` is less than 1, or the time limit is no time above 0.
@@ -62,6 +64,7 @@ class WhyRequest:
     labels: tuple[str, str] | None = None
     uncertain: Uncertainty | None = EXACT
     jobs: int | None = None
+    periods: CallPeriods | None = None
 
     def __post_init__(self) -> None:
         checked_jobs(self.jobs)

@@ -88,7 +88,7 @@ def check_target(target: Path, left: Path, right: Path, inputs: Collection[Path]
         inputs: Other files that are read.
 
     Raises:
-        BadInputError: It is an input, ends otherwise than the right's file, its folder is not
+        BadInputError: It is there already, ends otherwise than the right's file, its folder is not
             there, or the files that the right's names would not be found from it.
         ModelError: The right's file is no XML.
     """
@@ -104,6 +104,11 @@ def check_target(target: Path, left: Path, right: Path, inputs: Collection[Path]
             raise BadInputError(
                 f"--write {target} would overwrite a file that is read; name another one"
             )
+    if target.exists() or target.is_symlink():
+        raise BadInputError(
+            f"--write replaces no file, and {target} is there already: name another one, or delete "
+            "that one first"
+        )
     if not _is_same_folder(target, right):
         source.check_can_move()
 

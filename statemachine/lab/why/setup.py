@@ -84,6 +84,7 @@ class Setup:
         elif self._keyframes[0] != self._keyframes[1]:
             right_start = matched.start(left_start, right_start)
         self._starts = left_start, right_start
+        self._periods_differ = request.periods is not None and request.periods.differ
         self._causes: dict[str, Cause] = {}
         self._by_option = NONE  # names of the causes that are equalized by `Model.replace`
 
@@ -104,7 +105,7 @@ class Setup:
             finer: Differences of files by their single entries, each by itself.
         """
         own = any(self._own_settings)
-        by_option = [] if own else list(differences_by_option(*self.models))
+        by_option = [] if own else list(differences_by_option(*self.models, self._periods_differ))
         self._by_option = frozenset(row.subject for row in by_option)
         rows = [*self._differences_of_files(finer), *self._difference_of_commands()]
         for side, settings in enumerate(self._own_settings):

@@ -186,6 +186,7 @@ def _question(
             labels=None if labels[0] == labels[1] else labels,
             uncertain=request.uncertainty,
             jobs=request.jobs,
+            periods=run.call_periods((models[0].timestep, models[1].timestep)),
         )
         return question, sides, loaded.bases
 

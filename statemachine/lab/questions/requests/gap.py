@@ -21,6 +21,7 @@ from ...compare.recorded import recorded_model
 from ...compare.sides import Request
 from ...compare.two_sides import SidesRun, run_sides
 from ...compare.witnessed import WitnessResult, witness
+from ...runs.call_period import CallPeriods
 from ...runs.controllers import is_function
 from ...runs.reporter import QUIET, Reporter
 from ...runs.scenarios import SCENARIOS
@@ -106,6 +107,12 @@ class CompareResult(ShownResult):
         """What it comes to: what differs most, since when, how far at the end, by chance or not."""
         return finding_of(self.comparison, self.floor, self.played, self.run.missing)
 
+    @cached_property
+    def call_periods(self) -> CallPeriods | None:
+        """How often a function is called on each side; None where none is run."""
+        left, right = self.run.traces
+        return self.request.run.call_periods((left.header.timestep, right.header.timestep))
+
     def to_dict(self) -> dict[str, Column]:
         """Return a row for each quantity: the fields of `Agreement`, in `unit` and in s."""
         agreements = self.comparison.agreements
@@ -139,6 +146,7 @@ class CompareResult(ShownResult):
             "unmatched": run.unmatched,
             "only": only,
             "bases": run.bases,
+            "call_periods": self.call_periods,
         }
 
 
