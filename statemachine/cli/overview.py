@@ -11,6 +11,6 @@ from ..program import as_called
 
 def overview(_options: argparse.Namespace) -> int:
     """Say what there is to begin with."""
-    text = resources.files(__package__).joinpath("overview.md").read_text("utf-8")
+    text = resources.files("statemachine.cli").joinpath("overview.md").read_text("utf-8")
     print(as_called(text.format(count=len(PATH))), end="")
     return 0

@@ -16,16 +16,16 @@ from .class_table import NOTHING
 from .submissions import Submission
 
 # The first row of a roster is its header where a cell is one of these words: those of a name, and
-# of what else a column may hold.
+# of what else a column may hold; accents do not count.
 _NAMES = {
     "name", "names", "student", "full name", "first name", "last name", "given name", "surname",
-    "family name", "firstname", "lastname", "vorname", "nachname", "familienname", "prénom", "nom",
+    "family name", "firstname", "lastname", "vorname", "nachname", "familienname", "prenom", "nom",
     "nom de famille", "nombre", "apellido", "apellidos", "cognome", "nome",
 }  # fmt: skip
 _OTHERS = {
     "number", "no", "no.", "id", "student id", "file", "login", "user", "username", "email",
-    "e-mail", "mail", "nummer", "matrikelnummer", "matrikel", "kennung", "datei", "numéro",
-    "número", "numero", "matricola",
+    "e-mail", "mail", "nummer", "matrikelnummer", "matrikel", "kennung", "datei", "numero",
+    "matricola",
 }  # fmt: skip
 _NAMED = 3  # files of nobody on the roster, in a note
 _WORDS = re.compile(r"[^\W\d_]+(?:[ .'’-]+[^\W\d_]+)*")
@@ -127,7 +127,7 @@ def _rows_of(roster: Path) -> list[list[str]]:
 
 def _is_header(row: Sequence[str]) -> bool:
     """Return whether a row has a word of a header."""
-    return not (_NAMES | _OTHERS).isdisjoint(map(str.casefold, row))
+    return not (_NAMES | _OTHERS).isdisjoint(map(_header_word, row))
 
 
 def _students(rows: Sequence[Sequence[str]]) -> Iterator[_Student]:
@@ -135,7 +135,7 @@ def _students(rows: Sequence[Sequence[str]]) -> Iterator[_Student]:
     names: list[int] = []  # columns, by the header
     for number, row in enumerate(rows):
         if number == 0 and _is_header(row):
-            names = [column for column, cell in enumerate(row) if cell.casefold() in _NAMES]
+            names = [column for column, cell in enumerate(row) if _header_word(cell) in _NAMES]
             continue
         cells = [cell for cell in row if cell]
         if not cells:
@@ -183,6 +183,12 @@ def _has_one_of(cells: Sequence[str], submission: Submission) -> bool:
     words = _words(submission.name)
     keys = [_words(cell) for cell in cells if len(cell) > 2]
     return any(key and key <= words for key in keys)
+
+
+def _header_word(cell: str) -> str:
+    """Return a cell of a header in small letters, without accents."""
+    letters = unicodedata.normalize("NFD", cell.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
 
 
 def _composed(text: str) -> str:
