@@ -14,7 +14,7 @@ from statemachine.errors import BadInputError
 from statemachine.lab.questions.requests.gap import CompareResult
 from statemachine.lab.runs.call_period import call_periods, every_of_word, steps_of
 from statemachine.lab.shown_result import ShownResult
-from statemachine.lab.why.setup import RunKey, Setup
+from statemachine.lab.why.trials import Trials
 
 from .support.processes import Cli
 
@@ -253,10 +253,10 @@ def test_an_answer_that_is_given_as_a_side_names_what_was_run(files: Path) -> No
 def test_a_stop_before_any_run_is_said(
     files: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stop(_setup: Setup, _run: RunKey) -> None:
+    def stop(_trials: Trials, _equalized: frozenset[str]) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Setup, "model", stop)
+    monkeypatch.setattr(Trials, "gaps", stop)
     monkeypatch.chdir(files)
     run = here("compare", "waves", "scene.xml", "scene.xml", "timestep=0.002", "--why")
     assert (run.returncode, run.stdout) == (130, "")
