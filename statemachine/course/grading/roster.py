@@ -28,7 +28,7 @@ _OTHERS = {
     "matricola",
 }  # fmt: skip
 _NAMED = 3  # files of nobody on the roster, in a note
-_WORDS = re.compile(r"[^\W\d_]+(?:[ .'’-]+[^\W\d_]+)*")
+_WORDS = re.compile(r"[^\W\d_]+(?:[ .'\u2019-]+[^\W\d_]+)*")
 
 
 @dataclass(frozen=True)
