@@ -13,11 +13,13 @@ from statemachine.lab.compare.typed_command import TypedCommand, typed_command
 from statemachine.lab.questions.requests.causes import ExplainRequest, answer
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import Explanation, Share
+from statemachine.lab.why.answer_page import CauseSentence, sentence_of
 from statemachine.lab.why.apart_page import ApartSentence
 from statemachine.lab.why.changes_page import WhyChanges
 from statemachine.lab.why.page import WhyPage, page
 from statemachine.lab.why.rewriting import RewrittenFile
 from statemachine.lab.why.table_page import summary_table
+from statemachine.measures.text import percent
 from statemachine.show.blocks import Code, Section, Table, Verdict
 from statemachine.show.first_screen import COLUMNS, LINES
 
@@ -242,3 +244,15 @@ def test_what_nobody_can_type_is_a_call_of_python(gains: Explanation) -> None:
     run = Request((swing,), sides=(Side("a.xml"), Side("b.xml")))
     assert typed_command(run, ("--why",)).lines("--why").startswith("lab.why(")
     assert not blocks(page(gains), Code)
+
+
+@pytest.mark.parametrize(("alone", "last", "interacts"), [(0.73, 1.18, True), (0.95, 1.0, False)])
+def test_a_cause_that_acts_with_others_says_what_it_takes_away_alone(
+    alone: float, last: float, interacts: bool
+) -> None:
+    cause = CauseSentence(
+        wording="values", heading="damping", element="elbow", left="1", right="2", place=None,
+        part=0.953, gap="30.1 mm", alone=alone, last=last,
+    )  # fmt: skip
+    assert cause.interacts == interacts
+    assert (f"{percent(alone)} alone" in sentence_of(cause)) == interacts

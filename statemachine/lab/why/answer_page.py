@@ -20,7 +20,7 @@ from .values_page import CauseWording, heading_of, sides_of, texts_of, wording_o
 if TYPE_CHECKING:
     from .locate import Localisation
 
-_INTERACTS = 0.5  # of the gap, between alone and last: it is said with the cause
+_INTERACTS = 0.25  # of the gap, between alone and last: it is said with the cause
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 
 PlaceWording = Literal["switched", "still", "refused", "one engine", "one integrator", "located"]
