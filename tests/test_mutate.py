@@ -182,7 +182,7 @@ def test_a_fault_is_killed_survives_or_runs_out_of_time(
     file = _module(tree, "count.py", source)
     text = "from statemachine.count import count\n\ndef test_count():\n    assert count(3) < 1\n"
     written_all(tree, {"tests/test_count.py": text})
-    monkeypatch.setattr(run, "SECONDS", 15)
+    monkeypatch.setattr(run, "SECONDS", 30)
     test = "tests/test_count.py::test_count"
     outcomes = {
         (site.mutant.kind, site.mutant.statement): run._tried(site, [test], tree)
