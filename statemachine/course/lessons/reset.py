@@ -253,6 +253,7 @@ _NO_KEYFRAME = {
     "right": 0,
     "frame": None,
     "frame_time": "",
+    "several": False,
     "body": None,
     "public": False,
 }
