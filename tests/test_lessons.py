@@ -978,3 +978,9 @@ def test_a_lesson_at_a_terminal_is_recorded(tmp_path: Path) -> None:
     assert_in(seen, "You predicted it", "mine.json: 1 of 1 predictions right")
     record = json.loads(file.read_text())
     assert (record["score"], record["of"], record["answers"][0]["predicted"]) == (1, 1, "12")
+
+
+def test_a_file_without_keyframes_has_its_page_of_reset(capsys: pytest.CaptureFixture[str]) -> None:
+    assert not sm.load("so101").keyframes
+    assert main(["lesson", "reset", "--model", "so101", "--no-questions"]) == 0
+    assert "reset" in capsys.readouterr().out

@@ -7,6 +7,7 @@ import pytest
 from statemachine.cli import main
 from statemachine.errors import BadInputError
 from statemachine.lab.compare.typed_sides import parse_sides
+from statemachine.lab.runs.call_period import every_of_word
 from statemachine.lab.sweep.design import parse_vary
 from statemachine.lab.sweep.kinds import VariableNames, resolve_kinds
 from statemachine.measures import parse_tolerances
@@ -35,7 +36,6 @@ def test_what_is_one() -> None:
     "words",
     [
         ("compare", "hold", "--seconds={}"),
-        ("compare", "hold", "--every={}"),
         ("trace", "record", "hold", "--seconds={}"),
         ("sweep", "hold", "--seeds={}", "--out", "x"),
         ("view", "--speed={}"),
@@ -52,10 +52,12 @@ def test_an_option_of_a_command_takes_none(
 
 
 @pytest.mark.parametrize("text", STRANGE)
-def test_a_side_a_tolerance_and_a_sweep_take_none(text: str) -> None:
+def test_a_side_a_tolerance_a_period_and_a_sweep_take_none(text: str) -> None:
     refused(
         (BadInputError, "", lambda: parse_sides(["so101", f"substeps={text}"])),
         (BadInputError, "", lambda: parse_tolerances([f"tip={text}mm"])),
+        (BadInputError, "", lambda: every_of_word(text)),
+        (BadInputError, "", lambda: every_of_word(f"{text}ms")),
         (
             BadInputError,
             "",
