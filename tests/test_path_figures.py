@@ -13,6 +13,7 @@ import statemachine as sm
 from statemachine.models import models_dir
 
 from .support.pages import lesson_result
+from .support.requirements import ROOT
 
 _HOLD = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
@@ -185,3 +186,9 @@ def test_the_summary_shows_what_each_lesson_did() -> None:
     assert found.lines["gravity"].startswith(f"{np.degrees(data.qpos[1]):.3f} degrees")
     assert found.same
     assert set(found.changed) <= {"time"}
+
+
+def test_what_is_slow_to_load_is_counted() -> None:
+    raw = mujoco.MjModel.from_xml_path(str(ROOT / "models" / "so101" / "scene.xml"))
+    result = lesson_result("objects", sm.load("so101/scene"))
+    assert (result.meshes, result.triangles) == (raw.nmesh, raw.mesh_facenum.sum())
