@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from ...backends import load as load_model
 from ...engines import raw_engine_of
+from ...errors import UnsupportedError
 from ...interface import Data, Model, make_data, reset, step
 from ...lab.runs.drive import Progress
 from ...lab.runs.interleaved_timing import Ratio, time_interleaved
@@ -59,8 +61,9 @@ def measured(model: Model, steps: int, progress: Progress) -> LoopCost:
     rounds = rounds_of(steps)
     models = {_BULK: model, _AGAIN: model, _LOOP: model}
     if raw_engine_of(model.backend).emulated:
-        as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
-        models[_OWN] = as_it_comes.replace(gravity=model.gravity, timestep=model.timestep)
+        with suppress(UnsupportedError):  # the engine as it comes has not all that a model may have
+            as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
+            models[_OWN] = as_it_comes.replace(gravity=model.gravity, timestep=model.timestep)
     ways: dict[str, Callable[[], None]] = {}
     for name, variant in models.items():
         ways[name] = _way(variant, _started(variant), rounds, bulk=name != _LOOP)
