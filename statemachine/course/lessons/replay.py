@@ -319,8 +319,7 @@ def slots(result: ReplayResult) -> dict[str, Any]:
 
 def _slots_of_breaks(breaks: Sequence[BrokenRun]) -> dict[str, Any]:
     """Fill the slots about second runs that were made to differ."""
-    slots: dict[str, Any] = {"broken": False, "fooled": False, "shrinks_all": False}
-    slots["all_differ"] = False
+    slots: dict[str, Any] = dict.fromkeys(("broken", "fooled", "all_differ", "shrinks_all"), False)
     if not breaks:
         return slots
     first, fooled = breaks[0], [run.close and run.end > 0 for run in breaks]

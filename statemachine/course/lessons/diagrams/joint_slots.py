@@ -220,28 +220,18 @@ def _slots(
     if piece.joints > 1:
         width = piece.columns(pitch)
         yield Box(left, top, width + 1, 3, piece.look, is_dashed=True)
-        yield Label(
-            _range(slots),
-            left + width // 2,
-            top + 1,
-            width - 1,
-            piece.look,
-            is_code=True,
-            is_centered=True,
-        )
+        yield _slot_label(_range(slots), left, top, width, piece.look)
         return
     for number in range(start, stop):
         column = left + (number - start) * pitch
         yield Box(column, top, pitch + 1, 3, piece.look)
-        yield Label(
-            str(number),
-            column + pitch // 2,
-            top + 1,
-            pitch - 1,
-            piece.look,
-            is_code=True,
-            is_centered=True,
-        )
+        yield _slot_label(str(number), column, top, pitch, piece.look)
+
+
+def _slot_label(text: str, left: int, top: int, width: int, look: Look) -> Label:
+    """Return what stands in the middle of a box of slots, `width` columns from edge to edge."""
+    middle = left + width // 2
+    return Label(text, middle, top + 1, width - 1, look, is_code=True, is_centered=True)
 
 
 def _between(piece: _Piece, left: int, top: int, rows: int, pitch: int) -> Iterator[Shape]:
