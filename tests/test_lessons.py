@@ -475,7 +475,7 @@ def test_what_catches_the_falling_arm() -> None:
     assert np.degrees(touching.position[4]) == pytest.approx(23.92, abs=0.01)
     assert np.degrees(touching.position[-1]) > 50
     (said,) = (text.text for text in blocks(page, Text) if "catches" in text.text)
-    assert_in(said, "It is the contact that catches", "at 4 s it is at 23.92°, at 100 s at 53.89°")
+    assert_in(said, "It is the contact that catches", "At 4 s it is at 23.92°, at 100 s at 53.89°")
 
 
 @pytest.mark.parametrize("further", [False, True])

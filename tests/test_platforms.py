@@ -164,7 +164,8 @@ def test_two_distributions_at_once_are_an_error_that_says_what_to_type(
     assert_in(
         line,
         "pybullet and pybullet-arm64 are both installed",
-        "pip uninstall -y pybullet pybullet-arm64, then pip install pybullet",
+        "pip uninstall -y pybullet pybullet-arm64, then ",
+        "-m pip install pybullet",
     )
     found = json.loads(cli("doctor", "--json", **path).stdout)["findings"]
     (finding,) = (f for f in found if f["name"] == "pybullet" and not f["works"])

@@ -415,7 +415,7 @@ class TestReleases:
                 lambda: sm.load("so101", backend=OLD),
             ),
         )
-        assert lesson_result("hold", sm.load("so101/scene")).older.recorded
+        assert lesson_result("hold", sm.load("so101/scene"), further=True).older.recorded
         releases.remove(OLD)
         assert not broken.exists()
 

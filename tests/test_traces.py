@@ -440,11 +440,13 @@ def test_the_recorded_run_of_an_older_release_is_what_it_does(
     monkeypatch: pytest.MonkeyPatch, mujoco_scene: sm.Model
 ) -> None:
     _is_as_recorded(f"hold.{OLDER}", monkeypatch)
-    here = lesson_result("hold", mujoco_scene).older
+    here = lesson_result("hold", mujoco_scene, further=True).older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
-    recorded = vars(lesson_result("hold", mujoco_scene).older)
+    recorded = dataclasses.asdict(
+        lesson_result("hold", mujoco_scene, further=True).older
+    )
     assert recorded["recorded"]
-    for name, value in vars(here).items():
+    for name, value in dataclasses.asdict(here).items():
         if isinstance(value, float):
             assert recorded[name] == pytest.approx(value, rel=1e-6, abs=1e-6), name
         elif name != "recorded":

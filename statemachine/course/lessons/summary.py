@@ -70,7 +70,7 @@ class SummaryResult:
 
     Attributes:
         lines: What each of its lines printed, by the name of the lesson.
-        changed: The names of the lines that printed something else in a second run.
+        changed_lines: The names of the lines that printed something else in a second run.
         fingertip: (3,) where `forward` puts the fingertip [m].
         nq: Length of qpos.
         nv: Length of qvel.
@@ -85,7 +85,7 @@ class SummaryResult:
     """
 
     lines: dict[str, str]
-    changed: tuple[str, ...]
+    changed_lines: tuple[str, ...]
     fingertip: Array
     nq: int
     nv: int
@@ -118,12 +118,12 @@ def run(play: CodeRun, options: Options, progress: Progress) -> SummaryResult:
         second()
     again = _by_lesson(second.printed)
     names = play.names
-    changed = tuple(name for name in lines if lines[name] != again[name])
+    changed_lines = tuple(name for name in lines if lines[name] != again[name])
     is_same = bool(np.array_equal(names["first"], names["second"]))
     value, rate = usual_value(model, joint), 1000 * model.timestep / names["wall"]
     return SummaryResult(
         lines=lines,
-        changed=changed,
+        changed_lines=changed_lines,
         fingertip=fingertip,
         nq=model.nq,
         nv=model.nv,
@@ -149,7 +149,7 @@ def _by_lesson(printed: str) -> dict[str, str]:
 
 def slots(result: SummaryResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
-    repeats = set(result.changed) <= {_LAST}
+    repeats = set(result.changed_lines) <= {_LAST}
     slots: dict[str, Any] = {"right": 1 if repeats else None, "repeats": repeats}
     slots["place"] = vector(result.fingertip)
     slots["count"] = count(len(result.lines), "line")
