@@ -310,10 +310,8 @@ _NO_PAGES = {
     "show/html/diagram.py": "styles and names of fonts",
     "show/html/notebook.py": "the name of a file",
     "show/html/page.py": "names of files, and a policy for the browser",
-    "show/lesson_template.py": "the title of a table that many lessons end with",
     "show/markdown.py": "what replaces a pattern",
     "show/templates.py": "an assertion",
-    "show/terminal.py": "what is said to somebody who predicts, while they sit there",
 }
 
 

@@ -7,10 +7,13 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import jinja2
 import pytest
 
-from statemachine.course.lessons import LESSONS
-from statemachine.show.lesson_template import Words
+from statemachine.course.lessons import LESSONS, module
+from statemachine.show.check_templates import faults_of, label_faults
+from statemachine.show.labels import TableLabels
+from statemachine.show.templates import PageContent
 
 from .support.requirements import ROOT
 
@@ -63,16 +66,59 @@ def test_a_sentence_in_code_is_seen() -> None:
     assert not sentences('x = "data.ctrl[:2] += (0.4, -0.2)  # pan and lift it"')
 
 
+def _content_of(name: str) -> type[PageContent]:
+    """Return the class that the template of a lesson is checked against."""
+    classes = vars(module(f"{name}_page")).values()
+    (content,) = (kind for kind in classes if getattr(kind, "template", "") == f"{name}.md.j2")
+    return content
+
+
 @pytest.mark.parametrize("name", LESSONS)
-def test_each_word_of_a_template_is_used(name: str) -> None:
+def test_a_lesson_names_fields_alone(name: str) -> None:
+    assert faults_of(_content_of(name)) == []
+
+
+@pytest.mark.parametrize("name", LESSONS)
+def test_a_misspelled_field_of_a_lesson_is_reported(name: str) -> None:
+    """In each branch, whatever a run would show."""
+    source = (_FOLDER / f"{name}.md.j2").read_text("utf-8")
+    fields = set(re.findall(r"(?<=result\.)\w+", source))
+    if not fields:
+        pytest.skip("the template names properties alone")
+    for field in fields:
+        misspelled = re.sub(rf"result\.{field}\b", f"result.{field}x", source)
+        assert faults_of(_content_of(name), misspelled), field
+
+
+@pytest.mark.parametrize("file", sorted(_FOLDER.glob("*_labels.md.j2")), ids=lambda file: file.name)
+def test_each_label_is_used(file: Path) -> None:
     """What nobody says any more is gone from the template."""
-    text = (_FOLDER / f"{name}.md").read_text("utf-8").partition("<!-- words -->")[2]
-    code = "".join(file.read_text("utf-8") for file in _FOLDER.glob("*.py"))
-    for line in text.strip().splitlines():
-        word = line.partition(": ")[0]
-        assert f'ay("{word}"' in code or f'AY("{word}"' in code or f'"{word}": (' in code, word
+    code = "".join(path.read_text("utf-8") for path in _FOLDER.glob("*.py"))
+    source = file.read_text("utf-8")
+    assert label_faults(source, file.name) == []
+    for name in re.findall(r"{% macro (\w+)\(", source):
+        is_way_back = any(f'"{way}": (' in code for way in (name, name.replace("_", " ")))
+        assert is_way_back or re.search(rf'(?i)say\(\s*f?"{name}"', code), name
 
 
-def test_a_word_that_is_not_there_is_an_error() -> None:
-    with pytest.raises(KeyError):
-        Words("course/lessons/state")("nonsense")
+def test_a_label_that_is_not_there_is_an_error() -> None:
+    with pytest.raises(AttributeError):
+        TableLabels("statemachine.course.lessons.state", "state_labels.md.j2")("nonsense")
+
+
+def test_a_label_whose_value_is_missing_is_an_error() -> None:
+    with pytest.raises(jinja2.UndefinedError):
+        TableLabels("statemachine.course.lessons.state", "state_labels.md.j2")("theirs")
+
+
+@pytest.mark.parametrize(
+    ("source", "is_right"),
+    [
+        ("{% macro a(b) %}of {{ b }}{% endmacro %}\n", True),
+        ("{% macro a(b) %}of {{ c }}{% endmacro %}\n", False),
+        ("{% macro a(b) %}of {{ b | nonsense }}{% endmacro %}\n", False),
+        ("{% macro a() %}of it{% endmacro %}\nand a word\n", False),
+    ],
+)
+def test_a_fault_in_labels_is_reported(source: str, is_right: bool) -> None:
+    assert (label_faults(source, "made_up_labels.md.j2") == []) is is_right

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import io
-import itertools
 import json
 import os
 import pty
@@ -43,8 +42,7 @@ from statemachine.errors import BadInputError, StateMachineError, UnknownNameErr
 from statemachine.lab.recordings import record_scenario
 from statemachine.lab.runs.interleaved_timing import Ratio
 from statemachine.lab.runs.scenarios import SCENARIOS
-from statemachine.show import lesson_template as template
-from statemachine.show import progress as bar
+from statemachine.show import progress_bar as bar
 from statemachine.show import terminal
 from statemachine.show.blocks import Code, Heading, Page, Printed, Question, Table, Text, Verdict
 from statemachine.show.pictures import Traces
@@ -123,65 +121,6 @@ def test_worlds_that_are_apart_fit_into_the_memory_that_is_free(
 ) -> None:
     monkeypatch.setattr(_many_worlds, "free_memory", lambda: 5 * 3 * 30e6)
     assert _many_worlds._limit(4096, 30e6) == (5, 5 * 3 * 30e6)
-
-
-# --- templates
-
-
-# Options with which a run on PyBullet gives all slots.
-_ALL = {
-    "nowhere": {"further": True},
-    "objects": {"further": True, "most": 4, "worlds": 2},
-    "forward": {"further": True, "seconds": 0.4},
-    "hold": {"further": True},
-    "gravity": {"seconds": 1.0, "longer": 2.0, "further": True},
-    "reset": {"further": True},
-    "replay": {"steps": 50, "further": True},
-    "time": {"steps": 200, "further": True},
-}
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("name", LESSONS)
-def test_each_branch_of_a_template_can_be_filled_in(name: str) -> None:
-    """Each condition set and unset, whatever the run gave: another text, and no slot is lacking."""
-    _, taken = _take(name, "pybullet", **_ALL.get(name, {}))
-    slots = dict.fromkeys(("mujoco", "pybullet"), True) | vars(taken.result)
-    slots |= module(name).slots(taken.result)
-    tables = getattr(module(name), "tables", lambda *_results: {})
-    alone = ("code", "printed", "diagram", *tables({"pybullet": taken.result}, taken.result))
-    slots |= {block: block for block in alone}
-    text = (ROOT / "statemachine" / "course" / "lessons" / f"{name}.md").read_text("utf-8")
-    conditions = sorted(set(re.findall(r"<!-- if (?:not )?(\w+) -->", text)))
-    pages = {
-        values: template.filled(text, slots | dict(zip(conditions, values, strict=True)))
-        for values in itertools.product((True, False), repeat=len(conditions))
-    }
-    for k, condition in enumerate(conditions):
-        turned = (((*v[:k], not v[k], *v[k + 1 :]), shown) for v, shown in pages.items())
-        assert any(pages[other] != shown for other, shown in turned), condition
-
-
-def test_engines_that_say_the_same_stand_together(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    written(
-        tmp_path / "made.md",
-        "# T\n\nAll.\n\n<!-- if odd -->\nOdd {n}.\n<!-- else -->\nEven {n}.\n<!-- end -->\n\n"
-        "✓ {odd}: It is odd.\n\n{table}\n\n? {n}: How\nmany?\na) none\nb) `one`\n> So.\n",
-    )
-    monkeypatch.setattr(template.resources, "files", lambda _package: tmp_path)
-    monkeypatch.setattr(template, "origin", lambda _results: "")
-    slots = {"x": {"odd": True, "n": 1}, "y": {"odd": False, "n": 0}, "z": {"odd": True, "n": 1}}
-    table = Table(("a",), [])
-    assert template.page("made", {}, slots, {"table": table}) == Page("T", "", [
-        Text("All."), Text("x, z: Odd 1."), Text("y: Even 0."),
-        Verdict("x, z: It is odd.", True), Verdict("y: It is odd.", False), table,
-        Question("How many?", ["none", "`one`"], 1, "So.", always=True),
-    ])  # fmt: skip
-    bare = template.page("made", {}, slots, {"table": table}, prose=False)
-    assert [type(block) for block in bare.blocks] == [Verdict, Verdict, Table]
 
 
 @pytest.mark.slow

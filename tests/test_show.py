@@ -15,8 +15,19 @@ from rich.console import Console
 
 from statemachine.course.notebook import markdown
 from statemachine.show import terminal, text_blocks
-from statemachine.show.blocks import Items, Markdown, Page, Question, Section, Table, Text, Verdict
+from statemachine.show.blocks import (
+    Block,
+    Items,
+    Markdown,
+    Page,
+    Question,
+    Section,
+    Table,
+    Text,
+    Verdict,
+)
 from statemachine.show.check_templates import faults_of
+from statemachine.show.each_engine import blocks_of_engines
 from statemachine.show.html.blocks import drawn
 from statemachine.show.markdown import code, escape, inline_html, plain_text, spans
 from statemachine.show.page_text import text_of
@@ -79,6 +90,84 @@ def page_of(source: str, content: _Content, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(jinja, "loader", jinja2.DictLoader({_Content.template: source}))
     monkeypatch.setattr(jinja, "cache", None)
     return render(content)
+
+
+@dataclass(frozen=True)
+class _OfEngine(PageContent):
+    template = "made_up.md.j2"
+    odd: bool
+    number: int
+    sizes: Table = field(default_factory=lambda: Table(("a",), [("1",)]))
+
+
+def _said_of(source: str, monkeypatch: pytest.MonkeyPatch, **contents: _OfEngine) -> list[Block]:
+    """What a template says of several engines."""
+    jinja = environment(_OfEngine.__module__)
+    monkeypatch.setattr(jinja, "loader", jinja2.DictLoader({_OfEngine.template: source}))
+    return blocks_of_engines(contents)
+
+
+_ODD, _EVEN = _OfEngine(odd=True, number=1), _OfEngine(odd=False, number=0)
+
+
+def test_engines_of_which_the_same_is_said_stand_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = (
+        "All.\n\n{% if odd %}\nOdd {{ number }}.\n{% else %}\nEven {{ number }}.\n{% endif %}\n"
+    )
+    assert _said_of(source, monkeypatch, x=_ODD, y=_EVEN, z=_ODD) == [
+        Text("All."), Text("x, z: Odd 1."), Text("y: Even 0."),
+    ]  # fmt: skip
+
+
+def test_paragraphs_of_engines_stand_in_the_order_of_the_template(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    source = (
+        "{% if odd %}\nFirst.\n\n{% endif %}\nIt is {{ number }}.\n\n"
+        "{% if odd %}\nLast.\n{% endif %}\n"
+    )
+    assert _said_of(source, monkeypatch, y=_EVEN, x=_ODD) == [
+        Text("y: It is 0."), Text("x: First."), Text("x: It is 1."), Text("x: Last."),
+    ]  # fmt: skip
+
+
+def test_a_verdict_says_whose_it_is_and_a_table_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = "{% call verdict(odd) %}It is odd.{% endcall %}\n\n{{ table(sizes) }}\n"
+    assert _said_of(source, monkeypatch, x=_ODD, y=_EVEN) == [
+        Verdict("x: It is odd.", True), Verdict("y: It is odd.", False), _ODD.sizes,
+    ]  # fmt: skip
+
+
+_QUESTION = """\
+{% call question(number) %}
+How
+many?
+- none
+- `one`
+
+> So.
+{% endcall %}
+"""
+
+
+def test_a_question_is_a_paragraph_a_list_and_a_quotation(monkeypatch: pytest.MonkeyPatch) -> None:
+    question = Question("How many?", ["none", "`one`"], 1, "So.")
+    assert _said_of(_QUESTION, monkeypatch, x=_ODD) == [question]
+
+
+def test_a_question_is_that_of_the_first_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    (question,) = _said_of(_QUESTION, monkeypatch, y=_EVEN, x=_ODD)
+    assert isinstance(question, Question)
+    assert question.right == 0
+
+
+def test_a_table_of_words_stands_in_the_template(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = (
+        '{% call written_table("Names") %}\n| a | b |\n| :-- | :-- |\n| 1 | `x` |\n{% endcall %}\n'
+    )
+    assert _said_of(source, monkeypatch, x=_ODD) == [
+        Table(["a", "b"], [["1", "x"]], "Names", frozenset({0, 1}))
+    ]
 
 
 def printed(page: Page) -> str:

@@ -2,7 +2,8 @@
 
     python tools/check_templates.py
 
-A template that no class names is reported, too. The exit code is 1 where anything is reported.
+Templates of labels have macros alone. Any other template that no class names is reported, too. The
+exit code is 1 where anything is reported.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import statemachine
-from statemachine.show.check_templates import faults_of
+from statemachine.show.check_templates import faults_of, label_faults
 from statemachine.show.templates import PageContent
 
-ROOMS = ("course", "lab")
+ROOMS = ("cli", "course", "lab", "show")
 
 
 def contents() -> list[type[PageContent]]:
@@ -43,7 +44,9 @@ def main() -> int:
     named = {content.template for content in classes}
     package = Path(statemachine.__file__).parent
     for file in sorted(package.rglob("*.md.j2")):
-        if file.name not in named:
+        if file.name.endswith("_labels.md.j2"):
+            reports += map(str, label_faults(file.read_text("utf-8"), file.name))
+        elif file.name not in named:
             reports.append(f"{file.name}: no content has this template")
     print("\n".join(reports), end="\n" if reports else "")
     return 1 if reports else 0

@@ -37,12 +37,12 @@ from ..show.blocks import (
 )
 from ..show.html.diagram import figure
 from ..show.pictures import Bars, Diagram, Picture, RobotPicture, Traces
-from ..show.terminal import judged
+from ..show.predictions import answer_of, judged
 from ..show.text_blocks import together
 from .lessons import LESSONS, Lesson, check_lesson, module
 from .lessons.pictures import with_picture
 from .lessons.session import fitted, page_of_lesson, take
-from .quiz import answer_of, lettered
+from .quiz import lettered
 
 _INSTALL = """\
 # Where the package is not installed, as on Colab: from a wheel that you uploaded beside this

@@ -20,7 +20,6 @@ from typing import NamedTuple
 from .. import __version__
 from ..atomic_files import replace_text
 from ..show.blocks import LETTERS, Question
-from ..show.terminal import UNDECIDED
 from .asking import Stopped
 from .grading import KIND, answers_in
 
@@ -35,13 +34,6 @@ _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 def lettered(question: Question) -> list[str]:
     """Return its choices as they are shown: "a) 12"."""
     return [f"{letter}) {text}" for letter, text in zip(LETTERS, question.choices, strict=False)]
-
-
-def answer_of(question: Question) -> str:
-    """Return the choice that the run gave."""
-    if question.undecided:
-        return UNDECIDED
-    return "none of them" if question.right is None else lettered(question)[question.right]
 
 
 class Reader:

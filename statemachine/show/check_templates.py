@@ -6,8 +6,11 @@ too. A condition tests one field or property; conditions nest at most one deep.
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import functools
+import importlib
+import inspect
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,6 +32,8 @@ _MACROS = (
     "code_block",
     "verdict",
     "small",
+    "question",
+    "written_table",
     "section",
 )
 _DEEPEST = 2  # conditions inside each other: one, and one in it
@@ -69,17 +74,58 @@ def faults_of(content: type[PageContent], source: str | None = None) -> list[Tem
     return checker.faults
 
 
+def label_faults(source: str, template: str) -> list[TemplateFault]:
+    """Return what is wrong in a template of labels: it has macros alone, which name what they take.
+
+    Args:
+        source: Text of the template.
+        template: Name of the file.
+    """
+    checker = _Checker(template)
+    for node in environment(__name__).parse(source).body:
+        if isinstance(node, nodes.Macro):
+            checker.visit_all(node.body, {argument.name: str for argument in node.args}, 0)
+        elif not (isinstance(node, nodes.Output) and _is_blank(node)):
+            checker.add_fault(node, "a template of labels has macros alone")
+    return checker.faults
+
+
+def _is_blank(node: nodes.Output) -> bool:
+    """Tell whether a part of a template is only the space between others."""
+    texts = [part for part in node.nodes if isinstance(part, nodes.TemplateData)]
+    return len(texts) == len(node.nodes) and not any(text.data.strip() for text in texts)
+
+
 @functools.cache
 def members_of(kind: type) -> dict[str, Any]:
     """Return the types of the fields and properties of a class, by name."""
-    members = typing.get_type_hints(kind) if dataclasses.is_dataclass(kind) else {}
+    names = _names_for_checking(kind.__module__) if dataclasses.is_dataclass(kind) else {}
+    members: dict[str, Any] = {}
+    if dataclasses.is_dataclass(kind):
+        members = typing.get_type_hints(kind, localns=names)
     for base in reversed(kind.__mro__):
         for name, member in vars(base).items():
             if isinstance(member, property) and member.fget is not None:
-                members[name] = typing.get_type_hints(member.fget).get("return", Any)
+                members[name] = typing.get_type_hints(member.fget, localns=names).get("return", Any)
             elif isinstance(member, functools.cached_property):
-                members[name] = typing.get_type_hints(member.func).get("return", Any)
+                members[name] = typing.get_type_hints(member.func, localns=names).get("return", Any)
     return members
+
+
+@functools.cache
+def _names_for_checking(module: str) -> dict[str, Any]:
+    """Return what a module imports for type checkers alone, by name."""
+    names: dict[str, Any] = {}
+    tree = ast.parse(inspect.getsource(importlib.import_module(module)))
+    for node in tree.body:
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            continue
+        for imported in node.body:
+            if isinstance(imported, ast.ImportFrom) and imported.level:
+                path = f"{'.' * imported.level}{imported.module}"
+                source = importlib.import_module(path, module.rpartition(".")[0])
+                names |= {alias.name: getattr(source, alias.name) for alias in imported.names}
+    return names
 
 
 class _Checker:
@@ -100,7 +146,7 @@ class _Checker:
             case nodes.Output():
                 for part in node.nodes:
                     if isinstance(part, nodes.Const) and not isinstance(part.value, str):
-                        self._fault(part, f"a page shows no {part.value!r}")
+                        self.add_fault(part, f"a page shows no {part.value!r}")
                     self._check_shown(part, self._type_of(part, scope, depth))
             case nodes.If():
                 self._check_condition(node.test, scope, depth)
@@ -124,7 +170,7 @@ class _Checker:
             case nodes.TemplateData():
                 pass
             case _:
-                self._fault(node, f"{type(node).__name__} has no place in a template")
+                self.add_fault(node, f"{type(node).__name__} has no place in a template")
 
     def _check_shown(self, node: nodes.Node, kind: Any) -> None:
         """Report a value that a page shows through a filter alone: a figure, a flag, a list."""
@@ -133,7 +179,7 @@ class _Checker:
         if plain is Any or not isinstance(plain, type):
             return
         if plain is bool or not issubclass(plain, (str, int)):
-            self._fault(node, f"a page shows no {plain.__name__} without a filter")
+            self.add_fault(node, f"a page shows no {plain.__name__} without a filter")
 
     def _bound(self, target: nodes.Node, kind: Any) -> dict[str, Any]:
         """Return the names that a loop or an assignment makes, with their types."""
@@ -142,7 +188,7 @@ class _Checker:
         bound: dict[str, Any] = {}
         if isinstance(target, nodes.Tuple):
             if kind is str:
-                self._fault(target, "a text is no pair: a loop over a table takes its keys")
+                self.add_fault(target, "a text is no pair: a loop over a table takes its keys")
             parts = _parts_of(kind, len(target.items))
             for item, part in zip(target.items, parts, strict=True):
                 bound |= self._bound(item, part)
@@ -150,7 +196,7 @@ class _Checker:
 
     def _check_condition(self, test: nodes.Node, scope: Mapping[str, Any], depth: int) -> None:
         if depth >= _DEEPEST:
-            self._fault(test, "a condition stands in a condition that stands in a condition")
+            self.add_fault(test, "a condition stands in a condition that stands in a condition")
         tested = test.node if isinstance(test, nodes.Not) else test
         if isinstance(tested, nodes.Test) and tested.name == "none":
             tested = tested.node
@@ -160,11 +206,11 @@ class _Checker:
                 operand.expr.value, str
             )
             if others or operand.op not in ("eq", "ne") or not is_constant:
-                self._fault(test, "a condition compares a field with a constant text alone")
+                self.add_fault(test, "a condition compares a field with a constant text alone")
             self._check_literal(tested.expr, operand.expr, scope, depth)
             tested = tested.expr
         if not isinstance(tested, (nodes.Name, nodes.Getattr)):
-            self._fault(test, "a condition tests one field or named property")
+            self.add_fault(test, "a condition tests one field or named property")
             return
         self._type_of(tested, scope, depth)
 
@@ -177,21 +223,23 @@ class _Checker:
         if not is_literal or not isinstance(constant, nodes.Const):
             return
         if constant.value not in typing.get_args(kind):
-            self._fault(constant, f"no value {constant.value!r} of {typing.get_args(kind)}")
+            self.add_fault(constant, f"no value {constant.value!r} of {typing.get_args(kind)}")
 
     def _type_of(self, node: nodes.Node | None, scope: Mapping[str, Any], depth: int) -> Any:
         """Return the type of an expression, and report what is wrong in it."""
         match node:
             case nodes.Name():
                 if node.name not in scope:
-                    self._fault(node, f"no field {node.name!r}{did_you_mean(node.name, scope)}")
+                    self.add_fault(node, f"no field {node.name!r}{did_you_mean(node.name, scope)}")
                     return Any
                 return scope[node.name]
             case nodes.Getattr():
                 return self._attribute(node, self._type_of(node.node, scope, depth))
             case nodes.Filter():
                 if node.name not in FILTERS:
-                    self._fault(node, f"no filter {node.name!r}{did_you_mean(node.name, FILTERS)}")
+                    self.add_fault(
+                        node, f"no filter {node.name!r}{did_you_mean(node.name, FILTERS)}"
+                    )
                 self._type_of(node.node, scope, depth)
                 self._arguments(node.args, scope, depth)
                 self._arguments([keyword.value for keyword in node.kwargs], scope, depth)
@@ -200,7 +248,7 @@ class _Checker:
                 if isinstance(node.node, nodes.Name) and node.node.name in _MACROS:
                     self._check_arguments(node, node.node.name)
                 else:
-                    self._fault(node, f"a template calls {', '.join(_MACROS)} alone")
+                    self.add_fault(node, f"a template calls {', '.join(_MACROS)} alone")
                 self._arguments(node.args, scope, depth)
                 self._arguments([keyword.value for keyword in node.kwargs], scope, depth)
                 return str
@@ -213,7 +261,7 @@ class _Checker:
                 return str
             case None:
                 return Any
-        self._fault(node, f"{type(node).__name__} has no place in a template: name a property")
+        self.add_fault(node, f"{type(node).__name__} has no place in a template: name a property")
         return Any
 
     def _check_arguments(self, node: nodes.Call, macro: str) -> None:
@@ -222,7 +270,7 @@ class _Checker:
         try:
             signature_of(macro).bind(*node.args, **dict.fromkeys(keywords))
         except TypeError as error:
-            self._fault(node, f"{macro}: {error}")
+            self.add_fault(node, f"{macro}: {error}")
 
     def _arguments(
         self, arguments: Sequence[nodes.Node], scope: Mapping[str, Any], depth: int
@@ -241,12 +289,13 @@ class _Checker:
             if node.attr not in members:
                 name = getattr(plain, "__name__", plain)
                 hint = did_you_mean(node.attr, members)
-                self._fault(node, f"{name} has no field {node.attr!r}{hint}")
+                self.add_fault(node, f"{name} has no field {node.attr!r}{hint}")
                 return Any
             found.append(members[node.attr])
         return found[0]
 
-    def _fault(self, node: nodes.Node, text: str) -> None:
+    def add_fault(self, node: nodes.Node, text: str) -> None:
+        """Add a fault, at the line of a node."""
         self.faults.append(TemplateFault(self.template, node.lineno, text))
 
 

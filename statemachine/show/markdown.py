@@ -103,6 +103,11 @@ def plain_text(text: str) -> str:
     return "".join(span.text for span in spans(text))
 
 
+def typed_text(text: Markdown) -> str:
+    """Return a paragraph as a plain text, in which code stands between backticks."""
+    return "".join(f"`{span.text}`" if span.kind == "code" else span.text for span in spans(text))
+
+
 def inline_html(text: Markdown) -> str:
     """Return a paragraph as HTML, without an element around it; raw HTML in it is text."""
     return parser().renderInline(text)
@@ -110,10 +115,10 @@ def inline_html(text: Markdown) -> str:
 
 @functools.cache
 def parser() -> MarkdownIt:
-    """Return the parser of CommonMark; raw HTML, and links to scripts, are text for it."""
+    """Return the parser of CommonMark, and of tables; raw HTML and links to scripts are text."""
     from markdown_it import MarkdownIt
 
-    return MarkdownIt("commonmark", {"html": False})
+    return MarkdownIt("commonmark", {"html": False}).enable("table")
 
 
 def _inline_tokens(text: Markdown) -> list[Token]:

@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .remaining import RemainingTime
 
-_PATIENCE = 0.5  # seconds without a bar
-_PACE = 0.1  # seconds between two pictures of it
-
 
 @contextmanager
 def progress(
@@ -30,9 +27,11 @@ def progress(
             ended; 0 where it does not.
         takes: How long it takes, from what was measured before [s]; None where that is not known.
     """
-    wait = _Wait(runs_at_once, takes)
+    wait = Wait(runs_at_once, takes)
     if sys.stderr.isatty():
-        with _bar(what, wait) as report:
+        from .progress_bar import shown_bar  # here, for nobody sees one elsewhere
+
+        with shown_bar(what, wait) as report:
             yield report
         return
     is_said = False
@@ -49,7 +48,7 @@ def progress(
     yield tell
 
 
-class _Wait:
+class Wait:
     """What is known of how long it still takes."""
 
     def __init__(self, runs_at_once: int, takes: float | None) -> None:
@@ -80,42 +79,3 @@ class _Wait:
         from .remaining import LONG, in_words
 
         return in_words(seconds) if seconds > LONG else ""
-
-
-@contextmanager
-def _bar(what: str, wait: _Wait) -> Iterator[Callable[[float], None]]:
-    """Show a bar on the terminal, with the time that remains where that is known and long."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[left]}"),
-        console=Console(stderr=True),
-        transient=True,
-        auto_refresh=False,  # which would take a thread, beside which no process is forked
-        redirect_stdout=False,  # while it starts, a lesson may take what its code prints
-    )
-    task = bar.add_task(what, total=1.0, left="")
-    began = time.monotonic()
-    started, drawn = False, 0.0
-
-    def report(fraction: float) -> None:
-        nonlocal started, drawn
-        wait.ended(fraction)
-        now = time.monotonic()
-        if not started and now - began > _PATIENCE:
-            bar.start()
-            started = True
-        bar.update(task, completed=fraction, left=wait.words())
-        if started and now - drawn > _PACE:
-            bar.refresh()
-            drawn = now
-
-    try:
-        yield report
-    finally:
-        if started:
-            bar.stop()

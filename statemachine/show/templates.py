@@ -14,6 +14,17 @@ whose fields are the names that the template may use:
     {% call verdict(holds) %}…{% endcall %}    a statement that was checked
     {% call titled(sums) %}…{% endcall %}      a table, and its title
     {% call small() %}…{% endcall %}           notes in small print
+    {% call question(right) %}                 a prediction, and the number of the right choice:
+    How far is it?                             a paragraph,
+    - one metre                                a list of choices,
+    - two metres
+    > It was measured.                         and a quotation, which says what the run showed
+    {% endcall %}
+    {% call written_table("Names") %}          a table of words, and its title
+    | here | there |
+    | :-- | :-- |
+    | step | mj_step |
+    {% endcall %}
 
 A template chooses words, never verdicts: a condition tests one field or one named property, alone,
 negated, against a constant text or for None. `check_templates` keeps that rule, and that every name
@@ -26,33 +37,21 @@ from __future__ import annotations
 import functools
 import importlib
 import inspect
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from importlib import resources
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from ..measures import text as numbers
-from .blocks import (
-    Block,
-    Code,
-    Heading,
-    Headline,
-    Items,
-    Markdown,
-    Page,
-    Section,
-    Table,
-    Text,
-    Verdict,
-)
-from .markdown import code, escape, parser, plain_text, prose
+from .blocks import Block, Headline, Markdown, Page, Text, Verdict
+from .markdown import code, escape, plain_text, prose
+from .placed_blocks import PageOrigin, PageTitle, PlacedBlocks
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markdown_it.tree import SyntaxTreeNode
 
-# Around the number of a block that a template places; no value can hold them, see `escape`.
-_OPEN, _CLOSE = "\ue100", "\ue101"
+_NUMBER = re.compile("\ue102([0-9]+)\ue103")  # of a paragraph, in the empty line before it
 
 
 class PageContent:
@@ -75,9 +74,9 @@ def render(content: PageContent) -> Page:
     title, origin = "", ""
     blocks: list[Block] = []
     for block in render_blocks(content):
-        if isinstance(block, _Title):
+        if isinstance(block, PageTitle):
             title = block.text
-        elif isinstance(block, _Origin):
+        elif isinstance(block, PageOrigin):
             origin = block.text
         else:
             blocks.append(block)
@@ -94,10 +93,47 @@ def with_answer(page: Page) -> Page:
 
 def render_blocks(content: PageContent) -> list[Block]:
     """Return the blocks of a content that is a part of a page; errors as of `render`."""
-    placed = _Placed()
+    placed = PlacedBlocks()
     template = environment(type(content).__module__).get_template(type(content).template)
     text = template.render(_names_of(content) | placed.macros())
     return placed.blocks_of(text)
+
+
+def render_texts(content: PageContent) -> list[str]:
+    """Return the paragraphs of a content as plain texts; errors as of `render`."""
+    return [plain_text(block.text) for block in render_blocks(content) if isinstance(block, Text)]
+
+
+def render_paragraphs(content: PageContent) -> dict[int, list[Block]]:
+    """Return the blocks of each paragraph of a content's template, by its number.
+
+    A number belongs to a place in the template, whatever else of the template is shown: paragraphs
+    of two contents are about the same thing where their numbers are equal. Errors as of `render`.
+    """
+    placed = PlacedBlocks()
+    jinja = environment(type(content).__module__)
+    assert jinja.loader is not None
+    source, _, _ = jinja.loader.get_source(jinja, type(content).template)
+    text = jinja.from_string(numbered(source)).render(_names_of(content) | placed.macros())
+    first, *parts = _NUMBER.split(text)
+    paragraphs = {0: placed.blocks_of(first)}
+    for number, part in zip(parts[::2], parts[1::2], strict=True):
+        paragraphs.setdefault(int(number), []).extend(placed.blocks_of(part))
+    return paragraphs
+
+
+def numbered(source: str) -> str:
+    """Return a template with a number in each empty line, which belongs to what stands below it.
+
+    An empty line within a call block is left as it is: what it separates is one block.
+    """
+    lines: list[str] = []
+    open_calls = 0
+    for number, line in enumerate(source.split("\n"), start=1):
+        open_calls += line.count("{% call") - line.count("{% endcall")
+        is_between = not line.strip() and open_calls == 0
+        lines.append(f"\ue102{number}\ue103" if is_between else line)
+    return "\n".join(lines)
 
 
 def _names_of(content: PageContent) -> dict[str, object]:
@@ -158,8 +194,13 @@ def _joined(words: Iterable[object], between: str = ", ") -> str:
     return between.join(map(str, words))
 
 
+def _size(value: float) -> float:
+    """Return a figure without its sign."""
+    return abs(value)
+
+
 # What a template may send a value through. Figures are in SI units.
-FILTERS: dict[str, Callable[..., str | int]] = {
+FILTERS: dict[str, Callable[..., str | float]] = {
     "degrees": numbers.degrees,
     "millimetres": numbers.millimetres,
     "percent": numbers.percent,
@@ -169,6 +210,11 @@ FILTERS: dict[str, Callable[..., str | int]] = {
     "rough": numbers.rough,
     "quantity": numbers.quantity,
     "fixed": numbers.fixed,
+    "number": format,
+    "abs": _size,
+    "milliseconds": numbers.milliseconds,
+    "position": numbers.position,
+    "vector": numbers.vector,
     "count": numbers.count,
     "length": len,
     "capital": numbers.capital,
@@ -182,145 +228,13 @@ FILTERS: dict[str, Callable[..., str | int]] = {
 }
 
 
-class _Title(Text):
-    """The heading of a page."""
-
-
-class _Origin(Text):
-    """What a page was computed with."""
-
-
 def macros() -> list[str]:
     """Return the names of what a template calls to place blocks."""
-    return list(_Placed().macros())
+    return list(PlacedBlocks().macros())
 
 
 def signature_of(macro: str) -> inspect.Signature:
     """Return what a macro takes from a template, without the text that a call block gives it."""
-    signature = inspect.signature(_Placed().macros()[macro])
+    signature = inspect.signature(PlacedBlocks().macros()[macro])
     names = [parameter for name, parameter in signature.parameters.items() if name != "caller"]
     return signature.replace(parameters=names)
-
-
-class _Placed:
-    """The blocks that a template places; each leaves a marker in the text."""
-
-    def __init__(self) -> None:
-        self._groups: list[Sequence[Block]] = []
-
-    def macros(self) -> dict[str, Callable[..., str]]:
-        """Return the functions that a template calls to place blocks."""
-        return {
-            "table": self.table,
-            "titled": self.titled,
-            "block": self.block,
-            "blocks": self.blocks,
-            "items": self.items,
-            "code_block": self.code_block,
-            "verdict": self.verdict,
-            "small": self.small,
-            "section": self.section,
-        }
-
-    def table(self, table: Table) -> Markdown:
-        """Place a table; without rows there is nothing to show."""
-        return self._mark([table] if table.rows else [])
-
-    def titled(self, table: Table, caller: Callable[[], str]) -> Markdown:
-        """Place a table under a title."""
-        return self.table(replace(table, title=plain_text(_on_one_line(caller()))))
-
-    def block(self, block: Block) -> Markdown:
-        """Place a block of any kind."""
-        return self._mark([block])
-
-    def blocks(self, blocks: Sequence[Block]) -> Markdown:
-        """Place blocks one below the other."""
-        return self._mark(blocks)
-
-    def items(self, texts: Sequence[str], ordered: bool = False) -> Markdown:
-        """Place a list; without items there is nothing to show."""
-        return self._mark([Items(texts, ordered)] if texts else [])
-
-    def code_block(self, source: str) -> Markdown:
-        """Place lines as they are typed; of none there is nothing to show."""
-        return self._mark([Code(source.splitlines())] if source else [])
-
-    def verdict(self, holds: bool, caller: Callable[[], str]) -> Markdown:
-        """Place a statement that was checked, and whether it held."""
-        return self._mark([Verdict(_on_one_line(caller()), holds)])
-
-    def small(self, caller: Callable[[], str]) -> Markdown:
-        """Place paragraphs in small print."""
-        inside = self.blocks_of(caller())
-        notes = [Text(b.text, b.see, True) if isinstance(b, Text) else b for b in inside]
-        return self._mark(notes)
-
-    def section(
-        self,
-        heading: str,
-        caller: Callable[[], str],
-        name: str = "",
-        folded: bool = False,
-        detail: bool = False,
-    ) -> Markdown:
-        """Place blocks under a heading."""
-        return self._mark([Section(name, heading, self.blocks_of(caller()), folded, detail)])
-
-    def _mark(self, blocks: Sequence[Block]) -> Markdown:
-        self._groups.append(blocks)
-        return Markdown(f"\n\n{_OPEN}{len(self._groups) - 1}{_CLOSE}\n\n")
-
-    def blocks_of(self, text: str) -> list[Block]:
-        """Return the blocks of a Markdown text, those that were placed at their places."""
-        from markdown_it.tree import SyntaxTreeNode
-
-        tree = SyntaxTreeNode(parser().parse(text))
-        blocks: list[Block] = []
-        for node in tree.children:
-            is_below_title = len(blocks) == 1 and isinstance(blocks[0], _Title)
-            if is_below_title and node.type == "paragraph":
-                blocks += self._below_title(node)
-            else:
-                blocks += self._blocks_of_node(node)
-        return blocks
-
-    def _blocks_of_node(self, node: SyntaxTreeNode) -> Sequence[Block]:
-        match node.type:
-            case "heading":
-                heading = _inline(node)
-                if node.tag == "h1":
-                    return [_Title(plain_text(heading))]
-                return [Heading(heading)]
-            case "paragraph":
-                return self._paragraph(node)
-            case "bullet_list" | "ordered_list":
-                texts = [_inline(item.children[0]) for item in node.children]
-                return [Items(texts, node.type == "ordered_list")]
-            case "fence" | "code_block":
-                return [Code(node.content.rstrip("\n").split("\n"))]
-        raise ValueError(f"a template's Markdown has a {node.type}, which no page shows")
-
-    def _paragraph(self, node: SyntaxTreeNode) -> Sequence[Block]:
-        text = _inline(node)
-        if text.startswith(_OPEN) and text.endswith(_CLOSE):
-            return self._groups[int(text[1:-1])]
-        return [Text(text)]
-
-    def _below_title(self, node: SyntaxTreeNode) -> Sequence[Block]:
-        """Return the line below the title, *all of it*; another paragraph is one."""
-        text = _inline(node)
-        if len(text) > 2 and text.startswith("*") and text.endswith("*"):
-            return [_Origin(Markdown(text[1:-1]))]
-        return self._paragraph(node)
-
-
-def _on_one_line(text: str) -> Markdown:
-    """Return the Markdown that a call block gives a macro, without its line breaks."""
-    return Markdown(" ".join(text.split()))
-
-
-def _inline(node: SyntaxTreeNode) -> Markdown:
-    """Return the Markdown of a paragraph or heading, on one line."""
-    source: Any = node.children[0].content
-    return Markdown(" ".join(source.split("\n")))

@@ -9,7 +9,6 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Protocol
 
 from .blocks import (
-    LETTERS,
     Block,
     Code,
     Heading,
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
 
 
 WIDTH_PIPED = 80
-UNDECIDED = "it cannot be told on this machine now"  # of a question that the runs do not decide
 _WIDTH_MOST = 100
 # Blanks at the end of a line, before a colour ends.
 _PADDED = re.compile(r" +((?:\x1b\[[0-9;]*m)*)$", re.MULTILINE)
@@ -142,15 +140,21 @@ class Printer:
             self._headings.clear()
         choice = self._reader.ask(question) if self._reader else None
         if choice is not None:
+            from .predictions import judged  # here, for most pages are printed to nobody
+
             self._predicted.append(judged(question, choice))
             if not question.undecided:
                 self._answered.append(choice == question.right)
             return
-        answer = Text(f"Answer: {lettered_answer(question)}. {question.because}")
+        if not (self._reader or question.always):
+            return
+        from .predictions import answered
+
         if question.always:
+            answer = answered(question)
             self.write([answer] if self._reader else [question, answer])
-        elif self._reader:  # who passed
-            self._predicted.append(answer)
+        else:  # the reader passed
+            self._predicted.append(answered(question))
 
     def show(self, block: Block, following: Block | None) -> None:
         """Print a block, with what became of the prediction before it."""
@@ -170,11 +174,11 @@ class Printer:
     def end(self, page: Page, views: Sequence[str], footer: str) -> None:
         """Print the last lines: the score, how to look at the robot, the footer."""
         last: list[Block] = []
-        if len(self._answered) > 2:  # of so few there is no score
-            right = sum(self._answered)
-            last.append(Text(f"You had {right} of {len(self._answered)} right."))
-        if self._reader and views and find_spec("viser"):  # else nothing here can show it
-            last += [Text("To look at it, in a second terminal:"), Code([views[0]])]
+        if self._reader:
+            from .predictions import last_lines
+
+            can_look = views and find_spec("viser")
+            last += last_lines(self._answered, views[0] if can_look else "")
         if footer:
             last.append(Text(footer))
         self.write(last)
@@ -190,25 +194,6 @@ def spelled(error: Any) -> tuple[str, int]:
     """
     lacking = error.object[error.start : error.end].translate(ASCII)
     return lacking.encode("ascii", "replace").decode(), error.end
-
-
-def lettered_answer(question: Question) -> str:
-    """Return the choice that the run gave, with its letter."""
-    if question.undecided:
-        return UNDECIDED
-    if question.right is None:
-        return "none of them"
-    return f"{LETTERS[question.right]}) {question.choices[question.right]}"
-
-
-def judged(question: Question, choice: int) -> Text:
-    """What became of a prediction; the marks of a verdict are for what the run claims."""
-    if question.undecided:
-        return Text(f"You predicted {LETTERS[choice]}; {UNDECIDED}. {question.because}")
-    if choice == question.right:
-        return Text(f"You predicted it: {LETTERS[choice]}. {question.because}")
-    right = "none of them" if question.right is None else LETTERS[question.right]
-    return Text(f"You predicted {LETTERS[choice]}; it is {right}. {question.because}")
 
 
 def _text(console: Console, blocks: Sequence[Page | Block]) -> str:

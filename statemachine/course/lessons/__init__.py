@@ -1,14 +1,14 @@
 """The lessons: what each is called, asks and takes. Importing this loads no engine.
 
-A lesson is a page `NAME.md`, a template (see `lesson_template`), and a module `NAME.py` with these
-functions, in the order in which one reads them: `code(model, options, load)` is what a student
-types for a Model, where `load` is the call that loads it; `run(play, options, progress)` calls
-`play` (a `session.CodeRun`) once, which runs that code, looks on, and returns what was measured;
-`slots(result)` gives what the page's slots take beside the fields of the result;
-`tables(results, first)` its tables and curves, if it has any, from the results by backend, of which
-`first` is the first; and `diagram(model)` its diagram, if it has one. One whose options depend on
-the robot also has `fit(model, options)`, which gives them back with nothing left open. Terminal,
-documentation and notebook show the same page.
+A lesson `NAME` is two modules and a template. `NAME.py` has `code(model, options, load)`, which is
+what a student types for a Model, where `load` is the call that loads it; and
+`run(play, options, progress)`, which calls `play` (a `session.CodeRun`) once, looks on, and returns
+what was measured, a dataclass. One that draws a diagram also has `diagram(model)`; one whose
+options depend on the robot has `fit(model, options)`, which gives them back with nothing left open.
+`NAME_page.py` has `contents(results, frame)`: of the results by backend, and of what every lesson
+shows (`frame`), it makes a `PageContent` for each backend. The template `NAME.md.j2` says it (see
+`show/templates.py`); labels of tables are macros in `NAME_labels.md.j2`. Terminal, documentation
+and notebook show the same page.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Lesson:
     """An entry of the table of lessons.
 
     Attributes:
-        name: Of its module, of its template and on the command line.
+        name: Of its modules, of its template and on the command line.
         question: What it answers.
         model: The model that it is about.
         options: On the command line.
@@ -224,5 +224,5 @@ BESIDE = tuple(lesson for lesson in LESSONS.values() if not lesson.on_path)
 
 
 def module(name: str) -> Any:
-    """Import the module of a lesson."""
+    """Import the module of a lesson, or that of its page."""
     return importlib.import_module(f".{name}", __name__)

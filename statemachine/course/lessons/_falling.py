@@ -215,7 +215,7 @@ def milestones(seconds: float) -> list[float]:
     return [mark for mark in marks if mark < seconds * (1 - 1e-9)] + [seconds]
 
 
-def course_table(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
+def course_table(runs: Mapping[str, Droop], slide: bool, title: str = "") -> Table:
     """Show where the joint is at some moments of each run."""
     times = max((run.time for run in runs.values()), key=len)
     rows: list[tuple[str, ...]] = []
@@ -225,4 +225,4 @@ def course_table(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
         ]
         rows.append((f"{time:.2f} s", *cells))
     headers = [name.replace(": ", "\n") for name in runs]
-    return Table(("time", *headers), rows, title=title)
+    return Table(("time", *headers), rows, title)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,9 +12,8 @@ from ...errors import DivergedError, UnsupportedError
 from ...interface import Model, make_data, reset
 from ...lab.runs.drive import Progress, drive, number_of_steps, progress_of_stage
 from ...lab.runs.robot import FREE_FALL, UNACTUATED, start_keyframe
-from ...measures.text import position
 from ...show.blocks import Block
-from ...show.lesson_template import Words
+from ...show.labels import TableLabels
 from ...show.pictures import Traces
 from ._falling import BALANCE, Droop, course_table, droop
 from ._robot import coordinate
@@ -70,35 +69,56 @@ def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) ->
         return droop(data, joint, seconds, ctrl, np.array(path), diverged=diverged)
 
 
-def slots_of_the_catch(caught: Droop, longer: Mapping[str, Droop], slide: bool) -> dict[str, Any]:
-    """Return what the page's slots take of the contact that catches the joint.
+@dataclass(frozen=True)
+class Catch:
+    """The contact that catches the joint, and how the joint goes on [rad; of a slide, m].
+
+    Attributes:
+        caught_at: Where the joint is at the end of the shorter run.
+        long_time: Simulated time of the longer runs [s].
+        long_end: Where it is at the end of the longer run.
+        free_end: Where it is then without contacts.
+        limit_force: What the joint's limit exerts on it there [N·m or N].
+    """
+
+    caught_at: float
+    long_time: float
+    long_end: float
+    free_end: float
+    limit_force: float
+
+    @property
+    def at_limit(self) -> bool:
+        """Tell whether the joint's limit stops it where there are no contacts."""
+        return self.limit_force > BALANCE
+
+    @property
+    def creeps(self) -> bool:
+        """Tell whether it does not stay where it was caught."""
+        return abs(self.long_end - self.caught_at) > abs(self.caught_at) * _CREEP
+
+
+def catch_of(caught: Droop, longer: Mapping[str, Droop]) -> Catch | None:
+    """Return the contact that catches the joint; None where it would go no further without.
 
     Args:
         caught: The shorter run without servos.
         longer: The longer ones, by what can touch in them.
-        slide: Whether the joint is a slide.
     """
-    slots: dict[str, Any] = {"caught": False}
     runs = list(longer.values())
     both = len(runs) == 2 and all(run.diverged is None for run in runs)
     if not (both and caught.touching):
-        return slots
+        return None
     then = float(caught.position[-1])
     end, free = (float(run.position[-1]) for run in runs)
-    further = free * np.sign(then) - abs(then)
-    slots["caught"] = further >= max(_FURTHER, abs(then) * _CREEP)
-    slots["free_end"] = position(free, slide)
-    slots["at_limit"] = abs(runs[1].forces.limit or 0.0) > BALANCE
-    slots["limit_force"] = f"{abs(runs[1].forces.limit or 0.0):.4f}"
-    slots["creeps"] = abs(end - then) > abs(then) * _CREEP
-    slots["caught_at"] = position(then, slide)
-    slots["long_end"] = position(end, slide)
-    slots["long_time"] = f"{runs[0].time[-1]:g} s"
-    return slots
+    if free * np.sign(then) - abs(then) < max(_FURTHER, abs(then) * _CREEP):
+        return None
+    limit_force = 0.0 if runs[1].forces.limit is None else abs(runs[1].forces.limit)
+    return Catch(then, float(runs[0].time[-1]), end, free, limit_force)
 
 
 def long_course(
-    runs: Mapping[str, Droop], joint: str, slide: bool, timestep: float, say: Words
+    runs: Mapping[str, Droop], joint: str, slide: bool, timestep: float, say: TableLabels
 ) -> list[Block]:
     """Show the longer runs in a table, and every 20th step of them as curves.
 
@@ -117,6 +137,6 @@ def long_course(
         time = np.arange(len(run.path)) * timestep
         curves[name] = (time[::20].tolist(), (scale * run.path)[::20].tolist())
     return [
-        course_table(runs, say("longer", joint=joint), slide),
+        course_table(runs, slide, say("longer", joint=joint)),
         Traces(say("limp", joint=joint), "time [s]", unit, curves),
     ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 from ...backends import load as load_model
 from ...engines import raw_engine_of
@@ -13,9 +12,9 @@ from ...errors import UnsupportedError
 from ...interface import Data, Model, make_data, reset, step
 from ...lab.runs.drive import Progress
 from ...lab.runs.interleaved_timing import Ratio, time_interleaved
-from ...measures.text import count, duration
 from ...show.blocks import Block
-from ...show.lesson_template import UNDECIDED, Words, by_engine, differences
+from ...show.engine_tables import by_engine, differences
+from ...show.labels import TableLabels
 
 ROUNDS = 20
 _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it comes"
@@ -125,28 +124,19 @@ def _way(model: Model, data: Data, rounds: Sequence[int], bulk: bool) -> Callabl
     return take_round
 
 
-def loop_slots(cost: LoopCost) -> dict[str, Any]:
-    """Return what the page's slots take of the cost of a loop."""
-    slots: dict[str, Any] = {"loop_right": _right(cost), "told_apart": cost.told_apart}
-    slots["loop_steps"] = count(cost.nstep, "step")
-    slots["step_cost"] = duration(cost.bulk / cost.nstep)
-    slots["loop_rounds"] = count(cost.loop.rounds, "round")
-    slots["loop_cost"] = f"{cost.loop.median:.2f}"
-    slots["noise"] = f"{cost.null.median:.2f}"
-    slots["own_way"] = cost.as_it_comes is not None
-    return slots
+def is_undecided(cost: LoopCost) -> bool:
+    """Tell whether the rounds do not tell how much longer a loop takes."""
+    return not cost.told_apart or cost.loop.low <= _TWICE <= cost.loop.high
 
 
-def _right(cost: LoopCost) -> int | str:
-    """Return the number of the right choice, how much longer a loop takes, or `UNDECIDED`."""
-    if not cost.told_apart or cost.loop.low <= _TWICE <= cost.loop.high:
-        return UNDECIDED
+def right_choice(cost: LoopCost) -> int:
+    """Return the number of the right choice: no longer, up to twice as long, or longer."""
     if cost.loop.median <= 1:
         return 0
     return 1 if cost.loop.median <= _TWICE else 2
 
 
-def loop_tables(results: Mapping[str, LoopCost], say: Words) -> list[Block]:
+def loop_tables(results: Mapping[str, LoopCost], say: TableLabels) -> list[Block]:
     """Show times and factors; they are this machine's, now.
 
     Args:
@@ -167,7 +157,7 @@ def loop_tables(results: Mapping[str, LoopCost], say: Words) -> list[Block]:
     ]
 
 
-def _times(results: Mapping[str, LoopCost], say: Words) -> Block:
+def _times(results: Mapping[str, LoopCost], say: TableLabels) -> Block:
     """Return the wall time of each way by engine."""
     rows: dict[str, Callable[[LoopCost], str]] = {}
     rows[say("in_bulk")] = lambda cost: _by_the_clock(cost, cost.bulk)
@@ -178,7 +168,7 @@ def _times(results: Mapping[str, LoopCost], say: Words) -> Block:
     return by_engine(results, rows, say("times"))
 
 
-def _as_it_comes(cost: LoopCost, say: Words) -> str:
+def _as_it_comes(cost: LoopCost, say: TableLabels) -> str:
     """Write the wall time of the engine as it comes."""
     if cost.as_it_comes is None:
         return say("own_same")
@@ -190,7 +180,7 @@ def _by_the_clock(cost: LoopCost, wall: float) -> str:
     return f"{wall:.3f} s, {cost.simulated / wall:.0f} × real time"
 
 
-def _against(left: LoopCost, right: LoopCost, say: Words) -> str:
+def _against(left: LoopCost, right: LoopCost, say: TableLabels) -> str:
     """Write how much longer a step takes on another engine.
 
     The engines were measured one after the other, and not in turns.

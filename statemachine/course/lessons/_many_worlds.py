@@ -7,17 +7,17 @@ import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from ...interface import Data, Model, make_data
 from ...interface import reset as reset_data
 from ...interface import step as step_data
 from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.interleaved_timing import Ratio, time_interleaved
-from ...measures.text import count, duration
+from ...measures.text import duration
 from ...processes import free_memory, resident_memory
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Words, by_engine
+from ...show.engine_tables import by_engine
+from ...show.labels import TableLabels
 from ...show.pictures import Traces
 from ...worlds import make_worlds, reset, step
 
@@ -185,19 +185,47 @@ def _walls(call: Callable[[], object], times: int) -> list[float]:
     return time_interleaved({"": call}, times)[""]
 
 
-def slots_of_worlds(worlds: ManyWorlds) -> dict[str, Any]:
-    """Return what the page's slots take of many worlds."""
-    gaining = _gaining(worlds.costs)
-    best = max(gaining if gaining else worlds.costs, key=lambda cost: cost.faster.median)
-    slots: dict[str, Any] = {"apart": not worlds.shared, "gain": bool(gaining)}
-    slots["scarce"] = worlds.free_bytes is not None
-    slots["world_size"], slots["free_size"] = map(_memory, (worlds.data_bytes, worlds.free_bytes))
-    slots["most_worlds"] = count(worlds.costs[-1].n, "world")
-    slots["gain_from"] = count(gaining[0].n if gaining else 0, "world")
-    slots["best"] = count(best.n, "world")
-    slots["best_step"] = duration(best.step)
-    slots["best_gain"] = f"{best.faster.median:.2f}"
-    return slots
+@dataclass(frozen=True)
+class Crowd:
+    """What a page says of many worlds.
+
+    Attributes:
+        worlds: What each of them costs.
+    """
+
+    worlds: ManyWorlds
+
+    @property
+    def is_scarce(self) -> bool:
+        """Tell whether memory is the reason for no more worlds."""
+        return self.worlds.free_bytes is not None
+
+    @property
+    def world_size(self) -> str:
+        """Return the memory that a world takes."""
+        return _memory(self.worlds.data_bytes)
+
+    @property
+    def free_size(self) -> str:
+        """Return the memory that is free."""
+        return _memory(self.worlds.free_bytes)
+
+    @property
+    def most_worlds(self) -> int:
+        """Return the largest number of worlds."""
+        return self.worlds.costs[-1].n
+
+    @property
+    def gain_from(self) -> int:
+        """Return the number of worlds from which on all are faster than one Data; 0 for none."""
+        gaining = _gaining(self.worlds.costs)
+        return gaining[0].n if gaining else 0
+
+    @property
+    def best(self) -> WorldsCost:
+        """Return the number of worlds that is fastest; of those from `gain_from` on, if any."""
+        gaining = _gaining(self.worlds.costs)
+        return max(gaining if gaining else self.worlds.costs, key=lambda cost: cost.faster.median)
 
 
 def _gaining(costs: Sequence[WorldsCost]) -> Sequence[WorldsCost]:
@@ -208,7 +236,7 @@ def _gaining(costs: Sequence[WorldsCost]) -> Sequence[WorldsCost]:
     return costs[start:]
 
 
-def world_tables(results: Mapping[str, ManyWorlds], say: Words) -> list[Block]:
+def world_tables(results: Mapping[str, ManyWorlds], say: TableLabels) -> list[Block]:
     """Show what each world takes in memory, what it costs, and how that goes with their number.
 
     Args:
@@ -224,7 +252,7 @@ def world_tables(results: Mapping[str, ManyWorlds], say: Words) -> list[Block]:
     return [*blocks, _curves(results, say)]
 
 
-def _cost_table(engine: str, result: ManyWorlds, say: Words) -> Table:
+def _cost_table(engine: str, result: ManyWorlds, say: TableLabels) -> Table:
     """Return the wall time with the number of worlds on an engine."""
     rows = []
     for cost in result.costs:
@@ -245,7 +273,7 @@ def _cost_table(engine: str, result: ManyWorlds, say: Words) -> Table:
     )
 
 
-def _curves(results: Mapping[str, ManyWorlds], say: Words) -> Traces:
+def _curves(results: Mapping[str, ManyWorlds], say: TableLabels) -> Traces:
     """Return the wall time of a step over the number of worlds, a curve for each engine."""
     curves: dict[str, tuple[list[float], list[float]]] = {}
     for engine, result in results.items():

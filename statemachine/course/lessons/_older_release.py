@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from ...lab.recordings import read_shipped_trace, record_scenario
 from ...lab.runs.provenance import model_digest
 from ...lab.runs.scenarios import SCENARIOS
 from ...measures import largest
-from ...measures.text import position, short_time
 from ...release_names import version_of
 from ...releases import is_here
 
@@ -64,21 +62,3 @@ def on_older_release(model: Model, ctrl: Array, qpos: Array) -> OlderRelease | N
         at=float(known.time[moment]),
         recorded=not here,
     )
-
-
-def slots_of_older(older: OlderRelease | None) -> dict[str, Any]:
-    """Return what the page's slots take of the older release; of none, that there is none."""
-    if older is None:
-        texts = ("older_version", "older_joint", "older_at", "older_gap")
-        switches = {"older": False, "older_right": None, "older_recorded": False}
-        return dict.fromkeys(texts, "") | switches
-    limits = np.radians(1e-3), np.radians(1)  # of the choices
-    return {
-        "older": True,
-        "older_right": sum(older.gap > limit for limit in limits),
-        "older_version": older.version,
-        "older_joint": older.joint,
-        "older_at": short_time(older.at),
-        "older_gap": position(older.gap, False),
-        "older_recorded": older.recorded,
-    }

@@ -14,9 +14,10 @@ from ...lab.probes import conventions
 from ...lab.runs.drive import Progress
 from ...lab.runs.readings import Tip, read_derived, read_stored
 from ...lab.runs.usual_commands import hold_ctrl
+from ...measures import largest
 from ...measures.text import grouped
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Words
+from ...show.labels import TableLabels
 from ...show.pictures import Traces
 
 _STORED = (*INPUTS, "time")
@@ -192,7 +193,60 @@ def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
     )
 
 
-def change_tables(results: Mapping[str, Sequence[ArrayChange]], say: Words) -> list[Table]:
+@dataclass(frozen=True)
+class ChangeCounts:
+    """How many derived arrays `step` computes as `forward` does.
+
+    Attributes:
+        derived: Number of derived arrays.
+        same: Number of those in which both leave the same bits.
+        places_are_same: Whether those of places and orientations are among them.
+    """
+
+    derived: int
+    same: int
+    places_are_same: bool
+
+
+def counts_of(changes: Sequence[ArrayChange]) -> ChangeCounts:
+    """Return how many derived arrays `step` computes as `forward` does."""
+    derived = [change for change in changes if not change.stored]
+    same = {change.name for change in derived if change.same}
+    places_are_same = {"xpos", "xquat", "site_xpos", "site_xmat"} <= same
+    return ChangeCounts(len(derived), len(same), places_are_same)
+
+
+@dataclass(frozen=True)
+class WorstLag:
+    """The step that leaves the fingertip farthest behind.
+
+    Attributes:
+        steps: Number of all steps.
+        array: Where the fingertip is read.
+        of_before: Whether that array belongs to the state before the step, after each step.
+        behind: How far the fingertip is behind after the worst step [m].
+        at: When that step begins [s].
+        is_behind: Whether it is behind at all, and belongs to a moment.
+    """
+
+    steps: int
+    array: str
+    of_before: bool
+    behind: float
+    at: float
+    is_behind: bool
+
+
+def worst_lag_of(lag: Lag) -> WorstLag:
+    """Return the step that leaves the fingertip farthest behind."""
+    steps = len(lag.time)
+    behind, worst = largest(lag.distance)
+    of_before = lag.of_before[lag.array] == steps > lag.of_after[lag.array]
+    is_behind = behind > 0 and not lag.neither
+    return WorstLag(steps, lag.array, of_before, behind, float(lag.time[worst]), is_behind)
+
+
+def change_tables(results: Mapping[str, Sequence[ArrayChange]], say: TableLabels) -> list[Table]:
     """Show the arrays that a write, forward and step changed, in groups that behave alike."""
     engines_by_rows = grouped((_change_rows(changes), name) for name, changes in results.items())
     return [
@@ -217,7 +271,7 @@ def _change_rows(changes: Sequence[ArrayChange]) -> tuple[tuple[str, ...], ...]:
     return tuple(rows)
 
 
-def lag_tables(lags: Mapping[str, Lag], say: Words) -> list[Block]:
+def lag_tables(lags: Mapping[str, Lag], say: TableLabels) -> list[Block]:
     """Show to which moment belongs what a step leaves behind, by backend."""
     headers = ["array"]
     for name in lags:
@@ -238,7 +292,7 @@ def lag_tables(lags: Mapping[str, Lag], say: Words) -> list[Block]:
 
 
 def own_tables(
-    results: Mapping[str, Sequence[OwnAnswer]], question: str, say: Words
+    results: Mapping[str, Sequence[OwnAnswer]], question: str, say: TableLabels
 ) -> list[Table]:
     """Show what each engine does without us, where some of this is emulated."""
     tables: list[Table] = []

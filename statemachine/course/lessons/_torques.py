@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -12,8 +11,9 @@ from ...errors import UnsupportedError
 from ...interface import Array, Data, Ints, Model
 from ...measures import largest
 from ...measures.text import NO_NUMBER, fixed
-from ...show.blocks import Block, Table
-from ...show.lesson_template import Words, where
+from ...show.blocks import Table
+from ...show.engine_tables import where
+from ...show.labels import TableLabels
 
 _ALL = 1e-9  # of its limit; a servo that is so near exerts all that it can
 
@@ -89,27 +89,54 @@ def torques_of(
     return Torques(joints, slides, np.array(told), limits.max(axis=1))
 
 
-def torque_slots(torques: Torques | None) -> dict[str, Any]:
-    """Return what the page's slots take of what the servos exert."""
+@dataclass(frozen=True)
+class Strain:
+    """What servos with the same limit exert, beside that limit.
+
+    Attributes:
+        limit: What each can exert at most [N·m].
+        most: The most that one exerts in the run [N·m].
+        steps_at_limit: In how many steps a servo exerts all that it can.
+        last_joint: Joint of the servo that exerts most in the last step.
+        last: What it exerts then [N·m].
+    """
+
+    limit: float
+    most: float
+    steps_at_limit: int
+    last_joint: str
+    last: float
+
+    @property
+    def most_part(self) -> float:
+        """Return the most as a part of the limit."""
+        return self.most / self.limit
+
+    @property
+    def last_part(self) -> float:
+        """Return what is exerted in the last step as a part of the limit."""
+        return self.last / self.limit
+
+
+def strain_of(torques: Torques | None) -> Strain | None:
+    """Return what servos exert beside their limit; None where they have no common one."""
     limit = None if torques is None else torques.common_limit
     if torques is None or limit is None:
-        return {"limited": False}
-    most = float(torques.most.max())
+        return None
     last, joint = largest(np.abs(torques.last))
-    steps = torques.steps_at_limit
-    slots: dict[str, Any] = {"limited": True, "at_limit": steps > 0}
-    slots["most_allowed"] = f"{limit:.3g} N·m"
-    slots["most"] = f"{most:.3g} N·m"
-    slots["most_part"] = f"{most / limit:.0%}"
-    slots["limit_steps"] = f"{steps} of {len(torques.exerted)} steps"
-    slots["last_joint"] = torques.joints[joint]
-    slots["last"] = f"{last:.3g} N·m"
-    slots["last_part"] = f"{last / limit:.0%}"
-    return slots
+    return Strain(
+        limit=limit,
+        most=float(torques.most.max()),
+        steps_at_limit=torques.steps_at_limit,
+        last_joint=torques.joints[joint],
+        last=last,
+    )
 
 
-def torque_table(results: Mapping[str, Torques | None], say: Words) -> list[Block]:
+def torque_table(results: Mapping[str, Torques | None], say: TableLabels) -> Table:
     """Show the most that each servo exerted in the run, and what it exerts at the end.
+
+    Where the first backend does not tell it, the table has no rows.
 
     Args:
         results: By backend.
@@ -117,7 +144,7 @@ def torque_table(results: Mapping[str, Torques | None], say: Words) -> list[Bloc
     """
     first = next(iter(results.values()))
     if first is None:
-        return []
+        return Table((), ())
     most, last = say("most"), say("last")
     headers = ["joint"]
     for name in results:
@@ -129,7 +156,7 @@ def torque_table(results: Mapping[str, Torques | None], say: Words) -> list[Bloc
         for torques in results.values():
             row += [NO_NUMBER, NO_NUMBER] if torques is None else _cells(torques, k)
         rows.append(tuple(row))
-    return [Table(headers, rows, say("torque"))]
+    return Table(headers, rows)
 
 
 def _cells(torques: Torques, joint: int) -> list[str]:

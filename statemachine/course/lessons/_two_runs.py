@@ -26,7 +26,8 @@ from ...interface import (
 from ...measures import largest
 from ...measures.text import millimetres
 from ...show.blocks import Block, Table
-from ...show.lesson_template import Words, by_engine, where
+from ...show.engine_tables import by_engine, where
+from ...show.labels import TableLabels
 from ...show.pictures import Traces
 
 BREAKS = ("extra-step", "late-ctrl")
@@ -84,7 +85,7 @@ def course_of(gap: Array) -> Literal["grows", "shrinks", "stays"]:
     return "grows" if step == len(gap) - 1 else "stays"
 
 
-def broken_table(results: Mapping[str, Sequence[BrokenRun]], say: Words) -> list[Block]:
+def broken_table(results: Mapping[str, Sequence[BrokenRun]], say: TableLabels) -> list[Block]:
     """Show what became of second runs that were made to differ: by the end, and step by step.
 
     Args:
@@ -118,7 +119,7 @@ def _broken_row(label: str, run: BrokenRun) -> tuple[str, ...]:
     )
 
 
-def _growth_tables(runs: Mapping[str, BrokenRun], say: Words) -> list[Table]:
+def _growth_tables(runs: Mapping[str, BrokenRun], say: TableLabels) -> list[Table]:
     """Show the differences of two runs after some of the steps, drawn by their powers of ten."""
     tables: list[Table] = []
     for pair in _pairs(runs):
@@ -173,7 +174,7 @@ def growth(
     differences: Mapping[str, Array],
     bodies: Mapping[str, Array | None],
     body: str,
-    say: Words,
+    say: TableLabels,
 ) -> list[Block]:
     """Show the difference after some of the steps, and after all of them as curves.
 
@@ -254,18 +255,16 @@ def restore_methods(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBac
     )
 
 
-def through_us(results: Mapping[str, Sequence[WayBack]], say: Words) -> list[Table]:
-    """Show what the ways of this interface lead to, by backend, where they were tried."""
-    if not any(results.values()):
-        return []
+def through_us(results: Mapping[str, Sequence[WayBack]], say: TableLabels) -> Table:
+    """Show what the ways of this interface lead to, by backend; no rows where none was tried."""
     rows: list[tuple[str, ...]] = []
     for ways in zip(*results.values(), strict=True):
         cells = [_exactly(way.difference, say) for way in ways]
-        rows.append((say(ways[0].name), *cells))
-    return [Table(("", *results), rows, say("ways"))]
+        rows.append((say(ways[0].name.replace(" ", "_")), *cells))
+    return Table(("", *results), rows)
 
 
-def of_its_own(results: Mapping[str, Sequence[WayBack]], say: Words) -> list[Table]:
+def of_its_own(results: Mapping[str, Sequence[WayBack]], say: TableLabels) -> list[Table]:
     """Show what the engines' own ways lead to, where they were tried."""
     return [
         Table.of(
@@ -294,7 +293,7 @@ class Touching:
     pairs: Mapping[str, int]
 
 
-def touching_table(results: Mapping[str, Touching], say: Words) -> Table:
+def touching_table(results: Mapping[str, Touching], say: TableLabels) -> Table:
     """Show how many contacts the steps of a run found, and which pairs touched.
 
     Args:
@@ -308,7 +307,7 @@ def touching_table(results: Mapping[str, Touching], say: Words) -> Table:
     for result in results.values():
         for pair in result.pairs:
             rows[pair] = partial(_steps_of_pair, pair)
-    return by_engine(results, rows, say("touched"))
+    return by_engine(results, rows)
 
 
 def _steps_of_pair(pair: str, result: Touching) -> str:
@@ -316,6 +315,6 @@ def _steps_of_pair(pair: str, result: Touching) -> str:
     return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
-def _exactly(difference: float, say: Words) -> str:
+def _exactly(difference: float, say: TableLabels) -> str:
     """Say whether a future is the same, or by how much it is not."""
     return say("same") if difference == 0 else say("off", difference=f"{difference:.1e}")

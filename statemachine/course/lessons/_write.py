@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -21,9 +20,7 @@ from ...interface import (
     set_state,
     step,
 )
-from ...measures.text import count, position
 from ...show.blocks import Table
-from ...show.lesson_template import Words
 from ._robot import Coordinate
 
 
@@ -128,21 +125,10 @@ def _refused(data: Data) -> tuple[Refusal, ...]:
     return tuple(refused)
 
 
-def write_slots(effects: WriteEffects) -> dict[str, Any]:
-    """Return what the page's slots take of what follows from a write."""
-    return {
-        "same_arrays": effects.same_arrays,
-        "contacts_with": count(effects.contacts, "contact"),
-        "contacts_without": count(effects.contacts_without, "contact"),
-        "speed_change": f"{position(abs(effects.speed_change), effects.slide, 1)}/s",
-    }
-
-
-def refusals(effects: WriteEffects, say: Words) -> Table:
+def refusals(effects: WriteEffects) -> Table:
     """Show what is refused, and with which words."""
     return Table.of(
         effects.refused,
         {"you type": lambda refusal: refusal.typed, "and read": lambda refusal: refusal.message},
-        title=say("refused"),
         words=("and read",),
     )

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,32 +14,22 @@ from ...interface.checks import as_scalar
 from ...lab.runs.drive import Progress, number_of_steps
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import Tip, tips_of, usual_tip
-from ...measures import largest
-from ...measures.text import count, millimetres, short_time, vector
-from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, Words, differences, emulated
 from ...show.pictures import Diagram
 from ._robot import coordinate, with_joint
 from ._stages import (
     ArrayChange,
     Lag,
     OwnAnswer,
-    change_tables,
     changes_by_call,
     lag_of_steps,
-    lag_tables,
     own_answers,
-    own_tables,
 )
-from ._write import WriteEffects, effects_of, in_engine, refusals, write_slots
+from ._write import WriteEffects, effects_of, in_engine
 from .diagrams.pipeline import pipeline
 from .session import CodeRun, Options
 
-_SAY = Words("course/lessons/forward")
 _SECONDS = 2.0  # under a command, long enough to touch something
-_INSIDE = 1e-3  # metres; less is how engines press things together
-_Pairs = tuple[tuple[int, int], ...]
-_CHOICES: dict[_Pairs, int] = {((0, 1),): 0, ((1, 2),): 1, ((2, 3),): 2, ((1, 3),): 3}
+Pairs = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -131,7 +119,7 @@ class ForwardResult:
     site: str
     value: float
     readings: tuple[Reading, ...]
-    equal: _Pairs
+    equal: Pairs
     moved: float
     contacts: int
     deepest: float
@@ -246,7 +234,7 @@ def _further(model: Model, options: Options, progress: Progress) -> Further:
     )
 
 
-def _equal_pairs(readings: Sequence[Reading]) -> _Pairs:
+def _equal_pairs(readings: Sequence[Reading]) -> Pairs:
     """Return the pairs of readings that are equal bit by bit."""
     pairs: list[tuple[int, int]] = []
     for (i, one), (j, other) in itertools.combinations(enumerate(readings), 2):
@@ -264,115 +252,3 @@ def _steps(model: Model, options: Options) -> int:
 def diagram(model: Model) -> Diagram:
     """Draw what the lesson is about."""
     return pipeline(model)
-
-
-def slots(result: ForwardResult) -> dict[str, Any]:
-    """Fill the slots of the page."""
-    slots: dict[str, Any] = {}
-    slots["right"] = _CHOICES.get(result.equal)
-    slots["zero_at_first"] = not result.readings[0].fingertip.any()
-    slots["unchanged"] = (1, 2) in result.equal
-    written = result.written
-    slots |= vars(written)
-    slots["is_view"] = written.view == result.value != written.copy
-    slots["in_memory"] = written.in_engine is not None
-    slots["engine_agrees"] = written.in_engine == result.value
-    slots["moved"] = millimetres(result.moved, 1)
-    slots["moves"] = result.moved > 0
-    slots["no_time_passed"] = len({reading.time for reading in result.readings}) == 1
-    stepped = result.stepped
-    slots["stepped"] = stepped is not None and stepped.behind > 0
-    if stepped is not None:
-        slots["of_before_step"] = stepped.of_before
-        slots["behind_after_step"] = millimetres(stepped.behind)
-    slots["inside"] = result.deepest > _INSIDE
-    slots["contacts"] = count(result.contacts, "contact")
-    slots["deepest"] = millimetres(result.deepest, 1)
-    slots["emulated"] = emulated(
-        result, "zeros when fresh", "stale after a write", "stale after a step"
-    )
-    if result.further is not None:
-        slots |= write_slots(result.further.effects)
-        slots |= _slots_of_changes(result.further.changes)
-        slots |= _slots_of_lag(result.further.lag)
-    return slots
-
-
-def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
-    """Fill the slots about the arrays that each call changes."""
-    derived = [change for change in changes if not change.stored]
-    same = {change.name for change in derived if change.same}
-    return {
-        "derived": len(derived),
-        "same": len(same),
-        "places_are_same": {"xpos", "xquat", "site_xpos", "site_xmat"} <= same,
-    }
-
-
-def _slots_of_lag(lag: Lag) -> dict[str, Any]:
-    """Fill the slots about what a step leaves behind."""
-    steps = len(lag.time)
-    worst, step = largest(lag.distance)
-    slots: dict[str, Any] = {}
-    slots["lags"] = worst > 0 and not lag.neither
-    slots["steps"] = count(steps, "step")
-    slots["of_before"] = lag.of_before[lag.array] == steps > lag.of_after[lag.array]
-    slots["array"] = lag.array
-    slots["behind"] = millimetres(worst)
-    slots["behind_at"] = short_time(lag.time[step])
-    return slots
-
-
-def tables(results: Results[ForwardResult], first: ForwardResult) -> Blocks:
-    """Show the four readings; then what goes further, if that was asked for."""
-    rows: dict[str, Callable[[ForwardResult, ForwardResult], str]] = {}
-    for k in range(len(first.readings)):
-        rows[_SAY("reading", site=first.site, number=k + 1)] = partial(_apart, k)
-    blocks: dict[str, Table | Sequence[Block]] = {}
-    blocks["readings"] = _readings(results, first)
-    blocks["differences"] = differences(results, rows)
-    further = {name: result.further for name, result in results.items() if result.further}
-    return blocks | _further_tables(further)
-
-
-def _further_tables(results: Results[Further]) -> dict[str, Table | Sequence[Block]]:
-    """Show what goes further, by backend; nothing where that was not asked for."""
-    if not results:
-        return dict.fromkeys(("refused", "changes", "own_write", "lag_tables", "own_step"), ())
-    first = next(iter(results.values()))
-    answers = {name: further.itself for name, further in results.items()}
-    changes = {name: further.changes for name, further in results.items()}
-    lags = {name: further.lag for name, further in results.items()}
-    return {
-        "refused": refusals(first.effects, _SAY),
-        "changes": change_tables(changes, _SAY),
-        "own_write": own_tables(answers, "write", _SAY),
-        "lag_tables": lag_tables(lags, _SAY),
-        "own_step": own_tables(answers, "step", _SAY),
-    }
-
-
-def _readings(results: Results[ForwardResult], first: ForwardResult) -> Table:
-    """Show the four readings; those that are equal to another are set off."""
-    decimals = 3 if len(results) > 1 else 4  # so that two columns fit
-    rows: list[tuple[str, ...]] = []
-    for k, reading in enumerate(first.readings):
-        cells = [vector(each.readings[k].fingertip, decimals) for each in results.values()]
-        rows.append((str(k + 1), reading.after, *cells, f"{reading.time:g} s"))
-    equal: set[int] = set()
-    for result in results.values():
-        equal.update(*result.equal)
-    columns = [f"{name} [m]" for name in results]
-    return Table(
-        ("", "after", *columns, "data.time"),
-        rows,
-        title=_SAY("readings", site=first.site),
-        words=frozenset({0, 1}),
-        emphasis=frozenset(equal),
-    )
-
-
-def _apart(reading: int, left: ForwardResult, right: ForwardResult) -> str:
-    """Return how far a reading on one engine is from that on another."""
-    gap = math.dist(left.readings[reading].fingertip, right.readings[reading].fingertip)
-    return f"{gap:.1e} m"

@@ -11,13 +11,9 @@ from ...interface import Array, Model, forward
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import Tip, read_derived, read_stored, tips_of, usual_tip
-from ...measures.text import vector
-from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, Words, differences, emulated
 from ._robot import usual_joint
 from .session import CodeRun, Options
 
-_SAY = Words("course/lessons/nowhere")
 _MADE, _COMPUTED = "data = sm.make_data(model)", "sm.forward(model, data)"
 
 
@@ -142,41 +138,3 @@ def _witnessed(model: Model, tip: Tip, qpos: Array, computed: Array) -> Witnesse
         return None
     library = f"Pinocchio {kinematics.version}"
     return WitnessedTip(library, place, gap=math.dist(place, computed))
-
-
-def slots(result: NowhereResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
-    is_zero = not result.first.any()
-    slots: dict[str, Any] = {}
-    slots["zero"] = is_zero
-    slots["right"] = 0 if is_zero else 1
-    slots["place"] = vector(result.second)
-    slots["far"] = f"{100 * math.hypot(*result.second[:2]):.0f} cm"
-    slots["high"] = f"{100 * result.second[2]:.0f} cm"
-    slots["witnessed"] = result.witness is not None
-    slots["emulated"] = emulated(result, "zeros when fresh")
-    if result.witness is not None:
-        slots["library"] = result.witness.library
-        slots["gap"] = f"{result.witness.gap:.1e} m"
-    return slots
-
-
-def tables(results: Results[NowhereResult], first: NowhereResult) -> Blocks:
-    """Show the fingertip as another library computes it, and as the engines do."""
-    blocks: dict[str, Table | list[Block] | list[Table]] = {}
-    blocks["witness_table"] = [_witness_table(results, first)] if first.witness else []
-    blocks["differences"] = differences(results, {_SAY("after"): _apart})
-    return blocks
-
-
-def _witness_table(results: Results[NowhereResult], first: NowhereResult) -> Table:
-    """Show the fingertip by each engine, and by the witness."""
-    rows = [(name, vector(result.second, 10)) for name, result in results.items()]
-    if first.witness:
-        rows.append((first.witness.library, vector(first.witness.fingertip, 10)))
-    return Table(("", "x, y, z [m]"), rows, _SAY("witness", site=first.site))
-
-
-def _apart(left: NowhereResult, right: NowhereResult) -> str:
-    """Return how far the fingertip is on one engine from that on another."""
-    return f"{math.dist(left.second, right.second):.1e} m"

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,16 +16,11 @@ from ...interface.checks import as_count
 from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.interleaved_timing import time_interleaved
 from ...lab.runs.provenance import Provenance, provenance
-from ...measures.text import count, duration, milliseconds
-from ...show.blocks import Table
-from ...show.lesson_template import Blocks, Results, Words, by_engine, differences
 from ...show.pictures import Diagram
-from ._many_worlds import ManyWorlds, measured, slots_of_worlds, world_tables
+from ._many_worlds import ManyWorlds, measured
 from .diagrams.model_and_data import model_and_data
 from .session import CodeRun, Options
 
-_SAY = Words("course/lessons/objects")
-_CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
 _STEPS = 200  # of each Data
 _WORLDS_MOST = 100
@@ -186,52 +180,3 @@ def _arrays(model: Model) -> dict[str, bytes]:
 def diagram(model: Model) -> Diagram:
     """Draw what the lesson is about."""
     return model_and_data(model)
-
-
-def slots(result: ObjectsResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
-    slots: dict[str, Any] = {"right": 0 if result.alone else 1}
-    slots["stepped"] = f"{100 * result.provenance.timestep:g} s"
-    slots["timestep"] = milliseconds(result.provenance.timestep)
-    slots["steps"] = count(result.nstep, "step")
-    slots["load_steps"] = f"{result.ratio:,.0f}"
-    slots["make"] = duration(result.making)
-    slots["triangle_count"] = f"{result.triangles:,}"
-    slots["cheap"] = result.making < result.loading / _CHEAP
-    if result.further is not None:
-        slots |= slots_of_worlds(result.further)
-    return slots
-
-
-def tables(results: Results[ObjectsResult], _first: ObjectsResult) -> Blocks:
-    """Return what each part costs, and what each of many worlds costs."""
-    worlds = {name: result.further for name, result in results.items() if result.further}
-    return {
-        "costs": _costs(results),
-        "differences": _differences(results),
-        "worlds_tables": world_tables(worlds, _SAY) if worlds else [],
-    }
-
-
-def _costs(results: Results[ObjectsResult]) -> Table:
-    """Return the wall time of each part by engine."""
-    rows: dict[str, Callable[[ObjectsResult], str]] = {}
-    rows[_SAY("load_cost")] = lambda result: duration(result.loading)
-    rows[_SAY("data_cost")] = lambda result: duration(result.making)
-    rows[_SAY("step_cost")] = lambda result: duration(result.stepping)
-    rows[_SAY("load_in_steps")] = lambda result: f"{result.ratio:,.0f} steps"
-    return by_engine(results, rows, _SAY("costs"))
-
-
-def _differences(results: Results[ObjectsResult]) -> Sequence[Table]:
-    """Return how much longer each part takes on another engine than on the first."""
-    rows: dict[str, Callable[[ObjectsResult, ObjectsResult], str]] = {}
-    rows[_SAY("load_takes")] = lambda a, b: _times(a.loading, b.loading)
-    rows[_SAY("data_takes")] = lambda a, b: _times(a.making, b.making)
-    rows[_SAY("step_takes")] = lambda a, b: _times(a.stepping, b.stepping)
-    return differences(results, rows)
-
-
-def _times(first: float, other: float) -> str:
-    """Write how many times as long as the first another takes."""
-    return f"{other / first:.1f} ×"

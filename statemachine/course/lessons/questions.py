@@ -12,11 +12,9 @@ from ...interface import Model
 from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.robot import is_so101
-from ...measures.text import degrees, duration
 from ..grading.inside.worlds import Scenes
 from . import LESSONS, forward, gravity, objects, replay, state, time
-from ._falling import SERVO
-from .session import CodeRun, LessonModule, Options, fitted, load_line, slots_of
+from .session import CodeRun, LessonModule, Options, fitted, load_line
 
 if TYPE_CHECKING:
     from .forward import ForwardResult
@@ -38,7 +36,6 @@ ASKED: dict[str, dict[str, Any]] = {
     "time": {},
 }
 # The number of the right choice of each question, where its run bears it out.
-_RIGHT = {"forward": 2, "state": 0, "replay": 1, "gravity": 0, "objects": 2, "time": 0}
 
 
 @dataclass(frozen=True)
@@ -119,87 +116,3 @@ def _result_of(lesson: LessonModule[R], name: str, model: Model, progress: Progr
     code = lesson.code(model, options, load_line(entry.model, model.backend))
     with CodeRun(code, model) as play:
         return lesson.run(play, options, progress)
-
-
-def slots(result: QuestionsResult) -> dict[str, Any]:
-    """Return the slots of each lesson under its name, and what the page says beside them.
-
-    Each lesson's have two more: `holds`, whether its run bears out the right choice, and `right`,
-    the number of that choice, or None.
-    """
-    answers = result.answers
-    slots: dict[str, Any] = {}
-    for name, holds in _verdicts(result).items():
-        slots[name] = slots_of(name, getattr(answers, name))
-        slots[name]["holds"] = holds
-        slots[name]["right"] = _RIGHT[name] if holds else None
-    slots["state"]["joint_count"] = len(answers.state.joints)
-    slots["crate"] = vars(result.behind_crate) | {"joint": result.behind_crate.name}
-    on, off = _ends(answers.gravity)
-    slots["finer"] = _differs_with_half_the_timestep(answers.replay)
-    slots["sagged"] = degrees(on, 3)
-    slots["fallen"] = degrees(off)
-    slots["load"] = duration(answers.objects.loading)
-    slots["load_steps"] = f"{answers.objects.ratio:,.0f}"
-    slots["unpaced"] = duration(answers.time.free)
-    slots["paced"] = f"{answers.time.paced:.3f} s"
-    return slots
-
-
-def _verdicts(result: QuestionsResult) -> dict[str, bool]:
-    """Return whether each run bears out the right choice, by the name of the lesson."""
-    answers = result.answers
-    return {
-        "forward": _waits_for_forward(answers.forward),
-        "state": _fails_behind_crate(answers.state, result.behind_crate),
-        "replay": _repeats_without_being_true(answers.replay),
-        "gravity": _servo_carries_the_load(answers.gravity),
-        "objects": _worlds_share_a_model(answers.objects),
-        "time": _waiting_changes_nothing(answers.time),
-    }
-
-
-def _waits_for_forward(result: ForwardResult) -> bool:
-    """Tell whether a reading stays as it was after the write, until `forward` moves it."""
-    return (1, 2) in result.equal and result.moved > 0
-
-
-def _fails_behind_crate(result: StateResult, behind_crate: JointSlots) -> bool:
-    """Tell whether each joint here has one address, and a joint behind a crate has two."""
-    same_here = all(joint.qpos_start == joint.qvel_start for joint in result.joints)
-    return same_here and behind_crate.qpos_start != behind_crate.qvel_start
-
-
-def _repeats_without_being_true(result: ReplayResult) -> bool:
-    """Tell whether runs repeat, and yet end elsewhere with half the timestep, if that was tried."""
-    tried = result.finer is not None
-    return result.identical and (not tried or _differs_with_half_the_timestep(result))
-
-
-def _differs_with_half_the_timestep(result: ReplayResult) -> bool:
-    """Tell whether runs with half the timestep repeat, too, and end elsewhere."""
-    finer = result.finer
-    return finer is not None and finer.identical and finer.difference > 0
-
-
-def _servo_carries_the_load(result: GravityResult) -> bool:
-    """Tell whether the servo holds the joint against gravity, which moves it without the servo."""
-    servos_on, servos_off = result.servos_on, result.servos_off
-    balanced = servos_on.balanced and servos_off.balanced
-    on, off = _ends(result)
-    return balanced and servos_on.held_by == SERVO and abs(off) > abs(on)
-
-
-def _ends(result: GravityResult) -> tuple[float, float]:
-    """Return where the joint is at the end, with the servos on and off [rad]."""
-    return float(result.servos_on.position[-1]), float(result.servos_off.position[-1])
-
-
-def _worlds_share_a_model(result: ObjectsResult) -> bool:
-    """Tell whether Data of one Model leave it and each other alone, and a load is worth steps."""
-    return result.alone and result.constant and result.ratio > 1
-
-
-def _waiting_changes_nothing(result: TimeResult) -> bool:
-    """Tell whether time and state stand still while nothing is called, and pacing is no physics."""
-    return result.identical and time.is_still(result)

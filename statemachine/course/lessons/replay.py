@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,28 +17,14 @@ from ...interface.checks import as_count
 from ...lab.runs.drive import Progress, progress_of_stage
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.robot import checked_ctrl, contact_counts, is_so101
-from ...measures import largest
-from ...measures.text import count, degrees, millimetres
-from ...show.blocks import Block, Table
-from ...show.lesson_template import Blocks, Results, Words, by_engine, differences
 from ._two_runs import (
     BREAKS,
     BrokenRun,
-    Touching,
     broken,
-    broken_table,
-    course_of,
     free_body,
-    growth,
-    of_its_own,
     restore_methods,
-    through_us,
-    touching_table,
 )
 from .session import CodeRun, Options
-
-_SAY = Words("course/lessons/replay")
-_COURSES = ("grows", "shrinks", "stays")  # of a difference, in the order of the choices
 
 
 @dataclass(frozen=True)
@@ -288,111 +274,3 @@ def _finer(model: Model, options: Options, end: Array) -> FinerRuns | None:
         identical=bool(np.array_equal(ends["first"], ends["second"])),
         difference=float(np.abs(ends["first"] - end).max()),
     )
-
-
-def slots(result: ReplayResult) -> dict[str, Any]:
-    """Fill the slots of the page."""
-    peak, row = largest(result.difference)
-    end = float(result.difference[-1])
-    slots: dict[str, Any] = {}
-    slots["right"] = _right_choice(result)
-    slots["identical"] = result.identical
-    slots["steps"] = count(len(result.contacts), "step")
-    slots["start"] = "the default state"
-    if result.keyframe:
-        slots["start"] = f'the keyframe "{result.keyframe}"'
-    slots["peak"] = f"{peak:.1e}"
-    slots["peak_step"] = row
-    slots["end"] = f"{end:.1e}"
-    slots["shrinks"] = course_of(result.difference) == "shrinks"
-    slots["held_in_state"] = ", ".join(result.state)
-    slots["fewest"] = count(int(result.contacts.min()), "contact")
-    slots["touch"] = bool(result.contacts.all())
-    slots |= _slots_of_breaks(result.breaks)
-    slots["truth"] = False
-    if result.finer is not None:
-        slots["truth"] = result.finer.identical and result.finer.difference > 0
-        slots["finer_timestep"] = f"{result.finer.timestep * 1e3:g} ms"
-        slots["finer_off"] = f"{result.finer.difference:.1e}"
-    return slots
-
-
-def _slots_of_breaks(breaks: Sequence[BrokenRun]) -> dict[str, Any]:
-    """Fill the slots about second runs that were made to differ."""
-    slots: dict[str, Any] = dict.fromkeys(("broken", "fooled", "all_differ", "shrinks_all"), False)
-    if not breaks:
-        return slots
-    first, fooled = breaks[0], [run.close and run.end > 0 for run in breaks]
-    slots |= {"broken": True, "fooled": any(fooled), "fools": sum(fooled), "breaks": len(breaks)}
-    slots["gap_right"] = _COURSES.index(first.course)
-    slots["gap_peak"] = f"{first.peak:.1e}"
-    slots["gap_peak_step"] = first.peak_step
-    slots["gap_end"] = f"{first.end:.1e}"
-    # A late command changes nothing of a robot without actuators.
-    slots["all_differ"] = all(run.peak > 0 for run in breaks)
-    slots["notices"] = all(run.end > 0 for run in breaks)
-    slots["shrinks_all"] = all(run.course == "shrinks" for run in breaks)
-    return slots
-
-
-def _right_choice(result: ReplayResult) -> int | None:
-    """Return the number of the right choice, None if no choice is right.
-
-    The choices of a second run that was made to differ are `_COURSES`.
-    """
-    if result.broken_by is None:
-        return 0 if result.identical else None
-    return _COURSES.index(course_of(result.difference))
-
-
-def tables(results: Results[ReplayResult], first: ReplayResult) -> Blocks:
-    """Show whether the runs are equal, what touched on the way, and the ways back."""
-    blocks: dict[str, Table | Sequence[Block]] = {}
-    blocks["outcome"] = _outcome(results)
-    touching = {name: Touching(result.contacts, result.pairs) for name, result in results.items()}
-    blocks["touched"] = touching_table(touching, _SAY)
-    blocks["growth"] = []
-    if first.broken_by:
-        gaps = {name: result.difference for name, result in results.items()}
-        bodies = {name: result.apart for name, result in results.items()}
-        blocks["growth"] = growth(gaps, bodies, first.body, _SAY)
-    blocks["ways"] = through_us({name: result.ways for name, result in results.items()}, _SAY)
-    blocks["own"] = of_its_own({name: result.own_ways for name, result in results.items()}, _SAY)
-    breaks = {name: result.breaks for name, result in results.items()}
-    blocks["broken_runs"] = broken_table(breaks, _SAY)
-    rows: dict[str, Callable[[ReplayResult, ReplayResult], str]] = {
-        _SAY("hinges_apart"): _hinges_apart,
-        _SAY("bodies_apart", body=first.body): _bodies_apart,
-        _SAY("contacts_apart"): _contacts_apart,
-    }
-    blocks["differences"] = differences(results, rows)
-    return blocks
-
-
-def _outcome(results: Results[ReplayResult]) -> Table:
-    """Show whether the two runs are equal, and how far they are apart."""
-    rows: dict[str, Callable[[ReplayResult], str]] = {}
-    rows["np.array_equal"] = lambda result: str(result.identical)
-    rows["np.allclose"] = lambda result: str(result.close)
-    rows[_SAY("at_end")] = lambda result: f"{result.difference[-1]:.1e}"
-    rows[_SAY("on_the_way")] = lambda result: f"{result.difference.max():.1e}"
-    rows[_SAY("turn")] = lambda result: degrees(result.travel, 1)
-    return by_engine(results, rows, _SAY("outcome"))
-
-
-def _hinges_apart(left: ReplayResult, right: ReplayResult) -> str:
-    """Return the largest distance of a hinge between two ends."""
-    gaps = np.abs(left.qpos - right.qpos)[list(left.hinges)]
-    return degrees(float(gaps.max()), 3) if len(gaps) else "there are none"
-
-
-def _bodies_apart(left: ReplayResult, right: ReplayResult) -> str:
-    """Return the distance of the free body between two ends."""
-    if left.free is None:
-        return "there is none"
-    return millimetres(float(np.linalg.norm((left.qpos - right.qpos)[list(left.free)])))
-
-
-def _contacts_apart(left: ReplayResult, right: ReplayResult) -> str:
-    """Compare the average number of contacts in a step."""
-    return f"{right.contacts.mean():.1f} instead of {left.contacts.mean():.1f}"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -14,14 +12,10 @@ from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import read_derived, read_stored
 from ...lab.runs.robot import actuated_bodies, carried_by, contact_counts
-from ...measures.text import count, millimetres
-from ...show.blocks import Block, Table
-from ...show.lesson_template import Words, differences, emulated
 from .session import CodeRun, Options
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
-_SAY = Words("course/lessons/reset")
 
 # Lines of the code after which the Data is looked at.
 _MADE = "data = sm.make_data(model)"
@@ -231,112 +225,3 @@ def _touches(model: Model, data: Data, body: int | None) -> tuple[int, int]:
     pairs = [set(pair) for pair in model.geom_bodyid[data.contacts.geom].tolist()]
     others = [pair - {body} for pair in pairs if body in pair]
     return sum(bool(pair & robot) for pair in others), sum(not pair <= moving for pair in others)
-
-
-def slots(result: ResetResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
-    restores_all = set(result.restored) == {*INPUTS, "time"}
-    held = [scene.name for scene in result.scenes[:1] if scene.held]
-    return {
-        "simulated": f"{result.simulated:g} s",
-        "steps": count(result.steps, "step"),
-        "same": restores_all and result.same_future,
-        "emulated": emulated(result, "zeros when fresh"),
-        "held": ", ".join(held),
-        **_keyframe_slots(result),
-    }
-
-
-# What the page's slots take where the file names no keyframe.
-_NO_KEYFRAME = {
-    "asks": False,
-    "right": 0,
-    "frame": None,
-    "frame_time": "",
-    "several": False,
-    "body": None,
-    "public": False,
-}
-
-
-def _keyframe_slots(result: ResetResult) -> dict[str, Any]:
-    """Return what the page says of the first keyframe."""
-    if not result.scenes:
-        return _NO_KEYFRAME
-    scene = result.scenes[0]
-    is_public = result.provenance.model_file.startswith("robotstudio_so101")
-    several = len(result.scenes) > 1
-    return {
-        "asks": scene.time != 0,
-        "right": 2 if "time" in scene.exact else 0,
-        "frame": scene.name,
-        "frame_time": f"{scene.time:g} s",
-        "several": several,
-        "body": scene.body,
-        "public": is_public and scene.on_robot == 0,
-    }
-
-
-def tables(
-    results: Mapping[str, ResetResult], first: ResetResult
-) -> dict[str, Block | Sequence[Block]]:
-    """Return what each keyframe shows, and what becomes of it."""
-    keyframes = []
-    rises: dict[str, Callable[[ResetResult, ResetResult], str]] = {}
-    for number, scene in enumerate(first.scenes):
-        keyframes.append(_keyframe(number, results))
-        if scene.body:
-            rises[_SAY("rise", body=scene.body, keyframe=scene.name)] = partial(_rises, number)
-    return {
-        "keyframe": keyframes[:1],
-        "others": keyframes[1:],
-        "differences": differences(results, rises),
-    }
-
-
-def _rises(number: int, left: ResetResult, right: ResetResult) -> str:
-    """Write how far the body of a keyframe rises on the right, and on the left."""
-    on_left, on_right = (millimetres(r.scenes[number].rise, 3) for r in (left, right))
-    return f"{on_right} instead of {on_left}"
-
-
-def _keyframe(number: int, results: Mapping[str, ResetResult]) -> Table:
-    """Return what a keyframe shows on each engine, and what becomes of it."""
-    scenes = [result.scenes[number] for result in results.values()]
-    first = scenes[0]
-    rows = _contact_rows(scenes)
-    if first.body:
-        rows += _later_rows(first.body, scenes)
-    if not rows:
-        rows = [("nothing", *("" for _ in scenes))]
-    title = _SAY("keyframe", number=number, name=first.name, time=f"{first.time:g} s")
-    return Table((_SAY("touches"), *results), rows, title)
-
-
-def _contact_rows(scenes: Sequence[KeyframeScene]) -> list[tuple[str, ...]]:
-    """Return the number of contacts of each pair of bodies, a scene a column."""
-    pairs = dict.fromkeys(pair for scene in scenes for pair in scene.contacts)
-    rows = []
-    for pair in pairs:
-        counts = (count(scene.contacts.get(pair, 0), "contact") for scene in scenes)
-        rows.append((pair, *counts))
-    return rows
-
-
-def _later_rows(body: str, scenes: Sequence[KeyframeScene]) -> list[tuple[str, ...]]:
-    """Return what becomes of a body after a keyframe, a scene a column."""
-    by_robot = [str(scene.robot_steps) for scene in scenes]
-    by_world = [str(scene.world_steps) for scene in scenes]
-    moves = [_moved(scene.rise) for scene in scenes]
-    steps = scenes[0].nstep
-    return [
-        (_SAY("robot_steps", steps=steps, body=body), *by_robot),
-        (_SAY("world_steps", steps=steps, body=body), *by_world),
-        (_SAY("moves", steps=steps, body=body), *moves),
-    ]
-
-
-def _moved(rise: float) -> str:
-    """Write how far a body rises or sinks [m]."""
-    height = millimetres(abs(rise))
-    return _SAY("sinks", height=height) if rise < 0 else _SAY("rises", height=height)

@@ -9,7 +9,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stdout
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
@@ -20,16 +20,19 @@ from ...interface import Array, Data, Model, make_data, step
 from ...lab.probes.code_statements import statements
 from ...lab.runs.drive import Progress, no_progress, number_of_steps
 from ...lab.runs.robot import is_so101, warn_of_start
-from ...show import lesson_template as template
-from ...show.blocks import Block, Code, Page, Printed
+from ...show.blocks import Block, Code, Items, Page, Printed, Question, Text
+from ...show.each_engine import blocks_of_engines
+from ...show.engine_tables import origin
+from ...show.labels import TableLabels
 from . import Lesson, module
+from .frame import LessonFrame, ShownEngines
 
 if TYPE_CHECKING:
     from ...lab.probes.calls import Recording
-    from ...show.lesson_template import HasProvenance
+    from ...show.engine_tables import HasProvenance
     from ...show.pictures import Diagram
 
-_SAY = template.Words("course/lessons/session")
+_SAY = TableLabels(__name__, "session_labels.md.j2")
 Options = Mapping[str, Any]  # of a lesson, by key
 L = TypeVar("L")  # what is looked at after a step
 R_co = TypeVar("R_co", covariant=True)  # the result of a lesson
@@ -262,34 +265,30 @@ def fitted(lesson: Lesson, model: Model, options: Options) -> dict[str, Any]:
 
 def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
     """Return the page of a lesson that was taken on one backend or several."""
-    lesson_module = module(lesson.name)
     results = {name: run.result for name, run in taken.items()}
-    slots = {name: slots_of(lesson.name, result) for name, result in results.items()}
-    first = next(iter(taken.values()))
-    blocks: dict[str, Block | Sequence[Block]] = {
-        "code": Code(_code_shown(taken).splitlines()),
-        "printed": Printed({name: run.printed for name, run in taken.items()}),
-    }
-    blocks["diagram"] = []
-    if first.diagram is not None:
+    is_on_arm = next(iter(taken.values())).arm
+    blocks = blocks_of_engines(module(f"{lesson.name}_page").contents(results, _frame(taken)))
+    heading = lesson.question
+    if not is_on_arm:
+        about_the_arm = (Text, Items, Question)
+        blocks = [block for block in blocks if not isinstance(block, about_the_arm)]
+        heading = _SAY("other_robot")
+    return Page(f"{lesson.name}: {heading}", origin(results), blocks)
+
+
+def _frame(taken: Mapping[str, LessonRun]) -> LessonFrame:
+    """Return what the page shows of the code that ran."""
+    diagram: Sequence[Block] = ()
+    if any(run.diagram is not None for run in taken.values()):
         from .diagrams import told_apart  # here, for most lessons have none
 
-        blocks["diagram"] = told_apart({name: run.diagram for name, run in taken.items()})
-    if hasattr(lesson_module, "tables"):
-        blocks |= lesson_module.tables(results, first.result)
-    page = template.page(f"course/lessons/{lesson.name}", results, slots, blocks, prose=first.arm)
-    heading = lesson.question if first.arm else _SAY("other_robot")
-    return replace(page, title=f"{lesson.name}: {heading}")
-
-
-def slots_of(name: str, result: HasProvenance) -> dict[str, Any]:
-    """Return what the slots of a lesson's page take: the fields of its result, and more.
-
-    Args:
-        name: Of the lesson.
-        result: What its module measured.
-    """
-    return vars(result) | module(name).slots(result)
+        diagram = told_apart({name: run.diagram for name, run in taken.items()})
+    return LessonFrame(
+        code=Code(_code_shown(taken).splitlines()),
+        printed=Printed({name: run.printed for name, run in taken.items()}),
+        diagram=diagram,
+        engines=ShownEngines.among(taken),
+    )
 
 
 def _code_shown(taken: Mapping[str, LessonRun]) -> str:

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from ...engines import raw_engine_of
 from ...interface import JointType, Model, make_data, reset
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
-from ...measures.text import grouped, listed
-from ...show.blocks import Block, Table
-from ...show.lesson_template import Words, differences
 from ...show.pictures import Diagram
 from .diagrams.joint_slots import joint_slots
 from .session import CodeRun, Options
-
-_SAY = Words("course/lessons/state")
-NO_NAME = "(no name)"
-_SIZES = ("nq", "nv", "nu", "nbody")
 
 
 def code(model: Model, options: Options, load: str) -> str:
@@ -147,93 +138,3 @@ def slots_of_joint(model: Model, joint: int) -> JointSlots:
 def diagram(model: Model) -> Diagram:
     """Draw what the lesson is about."""
     return joint_slots(model)
-
-
-def slots(result: StateResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
-    shifted = [_name(joint) for joint in result.joints if is_shifted(joint)]
-    return {
-        "shifted": ", ".join(shifted),
-        "right": 0 if result.nv == result.nq else 2,
-    }
-
-
-def _name(joint: JointSlots) -> str:
-    """Return the name of a joint as tables show it."""
-    return joint.name if joint.name else NO_NAME
-
-
-def is_shifted(joint: JointSlots) -> bool:
-    """Tell whether a joint has other slots in qvel than in qpos."""
-    return (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
-
-
-def tables(
-    results: Mapping[str, StateResult], _first: StateResult
-) -> dict[str, Block | Sequence[Block]]:
-    """Return sizes, and who owns which slots; engines that say the same share a table."""
-    return {
-        "sizes": _sizes(results),
-        "owners": _owners(results),
-        "terms": [_terms_table(name, result) for name, result in results.items() if result.terms],
-        "differences": differences(results, {_SAY("layout"): _compared}),
-    }
-
-
-def _sizes(results: Mapping[str, StateResult]) -> Table:
-    """Return the sizes of the Model by engine."""
-    rows = [
-        (name, str(result.nq), str(result.nv), str(result.nu), str(result.nbody))
-        for name, result in results.items()
-    ]
-    return Table(("", *_SIZES), rows, _SAY("sizes"))
-
-
-def _owners(results: Mapping[str, StateResult]) -> list[Table]:
-    """Return the slots of each joint; engines that say the same share a table."""
-    names_by_joints = grouped((result.joints, name) for name, result in results.items())
-    return [_slots_table(joints, names) for joints, names in names_by_joints.items()]
-
-
-def _slots_table(joints: Sequence[JointSlots], engines: Sequence[str]) -> Table:
-    """Return the slots of each joint on some engines."""
-    title = _SAY("slots", engines=listed(engines))
-    return Table.of(
-        joints,
-        {
-            "joint": _name,
-            "type": lambda joint: joint.type,
-            "qpos": lambda joint: _interval(joint.qpos_start, joint.qpos_stop),
-            "qvel": lambda joint: _interval(joint.qvel_start, joint.qvel_stop),
-        },
-        title=title,
-        words=("type",),
-    )
-
-
-def _terms_table(engine: str, result: StateResult) -> Table:
-    """Return what an engine itself calls what we have a name for."""
-    theirs = _SAY("theirs", engine=engine)
-    return Table.of(
-        result.terms,
-        {
-            "": lambda term: term.thing,
-            "here": lambda term: term.ours,
-            theirs: lambda term: term.engine,
-        },
-        title=_SAY("terms", engine=engine),
-        words=("here", theirs),
-    )
-
-
-def _compared(left: StateResult, right: StateResult) -> str:
-    """Say whether two engines have the same layout."""
-    same_sizes = all(getattr(left, size) == getattr(right, size) for size in _SIZES)
-    if same_sizes and left.joints == right.joints:
-        return "none"
-    return _SAY("differ")
-
-
-def _interval(start: int, stop: int) -> str:
-    """Write some slots as an index, or as a slice where there are several."""
-    return f"[{start}]" if stop == start + 1 else f"[{start}:{stop}]"

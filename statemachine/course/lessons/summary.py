@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,8 @@ from ...interface import Array, Model
 from ...lab.runs.drive import Progress
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.readings import tips_of, usual_tip
-from ...measures.text import count, position, vector
 from ._robot import coordinate, usual_joint, usual_value
 from .session import CodeRun, Options
-
-_LAST = "time"  # the line that measures the clock on the wall
 
 
 def code(model: Model, options: Options, load: str) -> str:
@@ -145,14 +141,3 @@ def _by_lesson(printed: str) -> dict[str, str]:
         name, _, text = line.partition(": ")
         lines[name] = text
     return lines
-
-
-def slots(result: SummaryResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
-    repeats = set(result.changed_lines) <= {_LAST}
-    slots: dict[str, Any] = {"right": 1 if repeats else None, "repeats": repeats}
-    slots["place"] = vector(result.fingertip)
-    slots["count"] = count(len(result.lines), "line")
-    slots["sag"] = position(abs(result.sagged), result.slide, 3)
-    slots["times"] = f"{result.rate:.0f}"
-    return slots

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,19 +11,14 @@ from ...errors import BadInputError
 from ...interface import Array, Data, Model, make_data, step
 from ...interface.checks import as_count
 from ...lab.runs.drive import Progress, number_of_steps, progress_of_stage
-from ...lab.runs.interleaved_timing import MIN_ROUNDS, Ratio
+from ...lab.runs.interleaved_timing import Ratio
 from ...lab.runs.provenance import Provenance, provenance
-from ...measures.text import count, duration
-from ...show.blocks import Block, Table
-from ...show.lesson_template import UNDECIDED, Blocks, Results, Words, by_engine
-from ._loop_cost import LoopCost, loop_slots, loop_tables, measured, rounds_of
+from ._loop_cost import LoopCost, measured, rounds_of
 from .session import CodeRun, Options
 
-_SAY = Words("course/lessons/time")
-_NAP = 0.2  # s
+NAP = 0.2  # s
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds that are paced, without and with --realtime
 _MOST = 20_000  # steps of a call; between two calls Ctrl-C is heard
-_BOUNDS = (1.0, 10.0)  # × real time, between the choices of the question
 
 
 def code(model: Model, options: Options, load: str) -> str:
@@ -65,7 +58,7 @@ data = sm.make_data(model)
 {stepping}
 wall = time.perf_counter() - began
 print(data.time)
-time.sleep({_NAP})
+time.sleep({NAP})
 print(data.time)
 print(f"{{data.time / wall:.0f}} times real time")
 """
@@ -287,96 +280,6 @@ def _sum_of_steps(model: Model, steps: int) -> float:
     return float(np.cumsum(np.full(steps, model.timestep))[-1])
 
 
-def slots(result: TimeResult) -> dict[str, Any]:
-    """Return what the page's slots take beside the fields of the result."""
-    still = is_still(result)
-    slots: dict[str, Any] = {"right": 0 if still else 1, "still": still}
-    slots["speed_right"] = _speed_choice(result.rate)
-    slots["nap"] = f"{result.nap:.2f} s"
-    slots["steps"] = count(result.nstep, "step")
-    slots["timestep"] = f"{result.provenance.timestep:g}"
-    slots["rounds"] = count(result.rate.rounds, "round")
-    slots["rate"] = f"{result.rate.median:.0f}"
-    slots["paced_steps"] = count(result.paced_steps, "step")
-    slots["paced_time"] = f"{result.simulated:g} s"
-    slots |= _clock_slots(result)
-    if result.further is not None:
-        slots |= loop_slots(result.further)
-    return slots
-
-
 def is_still(result: TimeResult) -> bool:
     """Tell whether neither time nor state moved while nothing was called."""
     return result.passed == 0 and not result.moved
-
-
-def _speed_choice(rate: Ratio) -> int | str:
-    """Return the number of the right choice, how many times real time; or `UNDECIDED`."""
-    straddles = any(rate.low <= bound <= rate.high for bound in _BOUNDS)
-    if rate.rounds < MIN_ROUNDS or straddles:
-        return UNDECIDED
-    return sum(rate.median > bound for bound in _BOUNDS)
-
-
-def _clock_slots(result: TimeResult) -> dict[str, Any]:
-    """Return what the page says of `data.time` at the end of a run."""
-    return {
-        "end": repr(result.end),
-        "later": repr(result.end + _NAP),
-        "inexact": result.end != round(result.end, 9),
-    }
-
-
-def tables(results: Results[TimeResult], first: TimeResult) -> Blocks:
-    """Return how fast the run is, and both loops by the clock."""
-    loops = {name: result.further for name, result in results.items() if result.further}
-    blocks: dict[str, Table | list[Block]] = {}
-    blocks["speed"] = _speed(results, first)
-    blocks["paces"] = _paces(results, first)
-    blocks["loops"] = loop_tables(loops, _SAY) if loops else []
-    return blocks
-
-
-def _speed(results: Results[TimeResult], first: TimeResult) -> Table:
-    """Return how many times real time the run is, by engine."""
-    wall = _SAY("wall_unpaced") if first.realtime else _SAY("wall")
-    rows: dict[str, Callable[[TimeResult], str]] = {
-        wall: lambda result: duration(result.wall),
-        _SAY("rate"): lambda result: result.rate.spread(" ×", 1),
-    }
-    simulated = f"{first.nstep * first.provenance.timestep:g} s"
-    steps = count(first.nstep, "step")
-    return by_engine(results, rows, _SAY("speed", steps=steps, simulated=simulated))
-
-
-def _paces(results: Results[TimeResult], first: TimeResult) -> Table:
-    """Return the run with waiting and without, by engine."""
-    rows: dict[str, Callable[[TimeResult], str]] = {
-        _SAY("unpaced"): _unpaced,
-        _SAY("paced"): _paced_by_clock,
-        _SAY("waiting"): _part_waited,
-        _SAY("latest"): _latest,
-    }
-    steps = count(first.paced_steps, "step")
-    simulated = f"{first.simulated:g} s"
-    return by_engine(results, rows, _SAY("paces", steps=steps, simulated=simulated))
-
-
-def _unpaced(result: TimeResult) -> str:
-    """Write the wall time of the run that does not wait."""
-    return f"{duration(result.free)}, {result.factor:.3g} × real time"
-
-
-def _paced_by_clock(result: TimeResult) -> str:
-    """Write the wall time of the run that waits."""
-    return f"{result.paced:.3f} s, {result.paced_factor:.3g} × real time"
-
-
-def _part_waited(result: TimeResult) -> str:
-    """Write how much of the run that waits was waiting."""
-    return f"{result.waited / result.paced:.0%}"
-
-
-def _latest(result: TimeResult) -> str:
-    """Write how late the latest step was."""
-    return duration(result.latest)

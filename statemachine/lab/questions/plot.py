@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from ...atomic_files import replace_bytes
 from ...interface import Array, JointType
 from ...measures import ENCODER_COUNT, distances
-from ...measures.text import display_unit, few, listed, milliseconds, rounded, short_time
-from ...show import report_template as template
+from ...measures.text import display_unit, milliseconds, rounded
 from ...show.charts import SETTINGS, SIDES, check_suffix, draw_picture, saved
 from ...show.pictures import Traces
-from ...show.report_template import if_true, slots_of
+from ...show.templates import PageContent, render_texts
 from ..compare import Comparison, default_tip
 from ..compare.chaos import ChaosFloor
 from ..recordings import Trace
@@ -81,24 +80,27 @@ class TracePlot:
 
 
 @dataclass(frozen=True)
-class _NoteSlots:
-    """The slots of the template "plot"; a line with a slot that is None is left out.
+class PlotNotes(PageContent):
+    """What the reader of a figure must know.
 
     Attributes:
-        right: "" where there are two sides.
-        changed: What was changed in the runs of the chaos floor.
-        at: When the sides part.
-        names: What parts then.
+        has_two_sides: Whether it is of two traces.
+        floor: The chaos floor, where it is drawn.
+        sizes: By how much the start was changed in the runs of that floor.
+        parts_at: When the sides part [s]; None where they do not.
+        parting: What parts then.
         fewer: How many quantities have no chart.
         not_shown: How many joints have no chart.
     """
 
-    right: str | None = None
-    changed: str | None = None
-    at: str | None = None
-    names: str | None = None
-    fewer: int | None = None
-    not_shown: int | None = None
+    template = "plot.md.j2"
+    has_two_sides: bool = False
+    floor: ChaosFloor | None = None
+    sizes: Sequence[str] = ()
+    parts_at: float | None = None
+    parting: Sequence[str] = ()
+    fewer: int = 0
+    not_shown: int = 0
 
 
 def of_comparison(comparison: Comparison, floor: ChaosFloor | None = None) -> TracePlot:
@@ -135,18 +137,20 @@ def _notes_on_sides(
         floor: The chaos floor, where it is drawn.
         without_chart: How many quantities are not drawn.
     """
-    first, at, names = parting(comparison), None, None
+    first = parting(comparison)
+    names: list[str] = []
     if first is not None:
-        at = short_time(first)
-        names = few([a.name for a in comparison.agreements if a.since == first], 1)
-    slots = _NoteSlots(
-        right=if_true(True),
-        changed=None if floor is None else _changed_by(floor),
-        at=at,
-        names=names,
-        fewer=without_chart if without_chart else None,
+        names = [a.name for a in comparison.agreements if a.since == first]
+    return render_texts(
+        PlotNotes(
+            has_two_sides=True,
+            floor=floor,
+            sizes=_sizes_of(floor),
+            parts_at=first,
+            parting=names,
+            fewer=without_chart,
+        )
     )
-    return template.texts("lab/questions/plot", **slots_of(slots))
 
 
 def of_trace(trace: Trace) -> TracePlot:
@@ -166,9 +170,7 @@ def of_trace(trace: Trace) -> TracePlot:
         charts.append(_chart("energy [J]", trace, trace["energy"].sum(axis=1)))
     rows = [charts[k : k + 2] for k in range(0, len(charts), 2)]
     labels = [header.label, COMMAND] if servos else [header.label]
-    not_shown = len(joints[CHARTS_SHOWN:])
-    slots = _NoteSlots(not_shown=not_shown if not_shown else None)
-    notes = template.texts("lab/questions/plot", **slots_of(slots))
+    notes = render_texts(PlotNotes(not_shown=len(joints[CHARTS_SHOWN:])))
     return TracePlot(
         title=header.experiment,
         lines=_origin(trace),
@@ -322,9 +324,10 @@ def _draw_touches(axes: Any, plot: TracePlot) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _changed_by(floor: ChaosFloor) -> str:
-    """Return what was changed in the runs that it is made of."""
+def _sizes_of(floor: ChaosFloor | None) -> list[str]:
+    """Return by how much the start was changed in the runs that a floor is made of."""
+    if floor is None:
+        return []
     size = floor.uncertain
-    sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
-    start = f", and the start by {listed(sizes)}" if sizes else ""
-    return f"start and commands changed by rounding ({floor.rounding:g}){start}"
+    lengths = ((size.length, "m"), (size.angle, "rad"))
+    return [rounded(value, unit) for value, unit in lengths if value > 0]

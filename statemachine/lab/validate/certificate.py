@@ -9,9 +9,8 @@ from typing import Literal
 
 from ...installed import PAIR, WITNESS
 from ...measures.text import degrees, grouped, millimetres, vector
-from ...show import lesson_template as template
 from ...show.blocks import Page, Table
-from ...show.lesson_template import by_engine, differences
+from ...show.engine_tables import by_engine, differences, origin
 from ...show.templates import PageContent, render
 from .fingertip_result import SAME_FRAME, FingertipResult, FrameOffset, TipGap
 
@@ -111,7 +110,7 @@ class FingertipPage(PageContent):
 def page(results: Mapping[str, FingertipResult]) -> Page:
     """Return the page of a certificate: frames first, then the differences."""
     content = FingertipPage(
-        template.origin(results),
+        origin(results),
         PAIR[1] in results,
         _by_engines(results, _reading_of),
         _by_engines(results, _finding_of),

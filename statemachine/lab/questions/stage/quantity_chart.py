@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from ....interface import Array
 from ....measures import distances, with_left_pair_names
-from ....measures.text import display_unit, figure, quantity, short_time
-from ....show import report_template as template
+from ....measures.text import display_unit, figure, quantity
 from ....show.blocks import Interactive
 from ....show.pictures import Traces
-from ....show.report_template import slots_of
+from ....show.templates import PageContent, render_texts
 from ...compare import Agreement, Comparison, Series
 from ...compare.chaos import ChaosFloor
 from ...compare.series import NORMAL, normal_forces, total_forces
@@ -22,10 +21,20 @@ from ..compared_names import long_labels, name_of, traces_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"
-SAID = (
-    "{title}, difference over time: at most {far} at {at}, settled at {settled}; tolerance "
-    "{tolerance}, left: {since}."
-)
+
+
+@dataclass(frozen=True)
+class ChartInWords(PageContent):
+    """What a chart shows, for those who do not see it.
+
+    Attributes:
+        title: Of the chart.
+        agreement: The figures of the comparison.
+    """
+
+    template = "quantity_chart.md.j2"
+    title: str
+    agreement: Agreement
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +63,7 @@ class QuantityChart(Interactive):
     @property
     def said(self) -> str:
         """What it shows, for those who do not see it."""
-        gap = self.agreement
-        far, settled, tolerance = (
-            quantity(value, gap.unit) for value in (gap.max, gap.settled, gap.tolerance)
-        )
-        return SAID.format(
-            title=self.title,
-            far=far,
-            at=short_time(gap.at),
-            settled=settled,
-            tolerance=tolerance,
-            since="never" if gap.since is None else f"at {short_time(gap.since)}",
-        )
+        return " ".join(render_texts(ChartInWords(self.title, self.agreement)))
 
     def values(self) -> Traces | None:
         """Return both sides: a position as the way from where the first began; None without."""
@@ -132,26 +130,38 @@ def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[
 
 
 @dataclass(frozen=True)
-class _FootSlots:
-    """The slots of the template "quantity_chart"; a line with a slot that is None is left out.
+class ForcesInWords:
+    """The largest forces between two bodies [N].
 
     Attributes:
-        by: What computed the energies.
         left: What the left side is called.
         right: What the right side is called.
-        left_normal: Its largest normal force on the left.
+        left_normal: The largest normal force on the left.
         right_normal: On the right.
         left_whole: The largest of the whole force on the left.
         right_whole: On the right.
     """
 
-    by: str | None = None
-    left: str | None = None
-    right: str | None = None
-    left_normal: str | None = None
-    right_normal: str | None = None
-    left_whole: str | None = None
-    right_whole: str | None = None
+    left: str
+    right: str
+    left_normal: str
+    right_normal: str
+    left_whole: str
+    right_whole: str
+
+
+@dataclass(frozen=True)
+class ChartFoot(PageContent):
+    """What stands under a chart.
+
+    Attributes:
+        computed_by: What computed the energies; empty under another chart.
+        forces: The largest forces; None under another chart.
+    """
+
+    template = "quantity_foot.md.j2"
+    computed_by: Sequence[str] = ()
+    forces: ForcesInWords | None = None
 
 
 def foot_of(curve: Series, comparison: Comparison) -> str:
@@ -159,24 +169,26 @@ def foot_of(curve: Series, comparison: Comparison) -> str:
     if curve.kind == "energy":
         headers = [trace.header for trace in traces_of(comparison)]
         by = dict.fromkeys(header.energy_by or header.backend for header in headers)
-        slots = _FootSlots(by=" and ".join(by))
+        foot = ChartFoot(computed_by=list(by))
     elif curve.kind == "force":
         pair = curve.name.removesuffix(NORMAL)
         left, right = traces_of(comparison)
         left_label, right_label = long_labels(comparison)
         left_normal, right_normal = _strongest(pair, normal_forces(left), normal_forces(right))
         left_whole, right_whole = _strongest(pair, total_forces(left), total_forces(right))
-        slots = _FootSlots(
-            left=left_label,
-            right=right_label,
-            left_normal=left_normal,
-            right_normal=right_normal,
-            left_whole=left_whole,
-            right_whole=right_whole,
+        foot = ChartFoot(
+            forces=ForcesInWords(
+                left=left_label,
+                right=right_label,
+                left_normal=left_normal,
+                right_normal=right_normal,
+                left_whole=left_whole,
+                right_whole=right_whole,
+            )
         )
     else:
         return ""
-    return " ".join(template.texts("lab/questions/stage/quantity_chart", **slots_of(slots)))
+    return " ".join(render_texts(foot))
 
 
 def _strongest(pair: str, left: Mapping[str, Array], right: Mapping[str, Array]) -> tuple[str, str]:

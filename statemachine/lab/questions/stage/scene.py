@@ -6,16 +6,16 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ....interface import Array, Ints
 from ....measures import common_moments
-from ....show import report_template as template
 from ....show.drawing import Drawing
 from ....show.drawing.scene import Camera, Motion, camera_for
 from ....show.html.geometry import mesh_as_data, mesh_of, packed, quantised
+from ....show.templates import PageContent, render_texts
 from ...compare.series import world_forces
 from ...recordings import Trace
 from ..compared_names import long_labels, traces_of
@@ -49,6 +49,55 @@ class Scene:
     data: dict[str, Any] | None
     notes: list[str]
     strongest: float = 0.0
+
+
+@dataclass(frozen=True)
+class SimplifiedMesh:
+    """Shapes that are drawn with fewer triangles than they have.
+
+    Attributes:
+        drawn: Number of triangles that are drawn.
+        triangles: Number of those that they have.
+    """
+
+    drawn: int
+    triangles: int
+
+
+@dataclass(frozen=True)
+class SceneNotes(PageContent):
+    """What a reader should know of the picture.
+
+    Attributes:
+        lacking: Why there is nothing to draw; "" where there is.
+        simplified: Shapes that are drawn with fewer triangles.
+        other: Side whose poses are taken between two of its rows; "" for none.
+        hidden: How many compared moments are not shown.
+        few: How many contacts of a moment are drawn at most; 0 where that is all of them.
+    """
+
+    template = "scene.md.j2"
+    lacking: Literal["", "poses", "finite poses"] = ""
+    simplified: Sequence[SimplifiedMesh] = ()
+    other: str = ""
+    hidden: int = 0
+    few: int = 0
+
+
+@dataclass(frozen=True)
+class SideNotes(PageContent):
+    """What a reader should know of a side.
+
+    Attributes:
+        label: What it is called.
+        left_out: What is not drawn.
+        why_not: Why its shapes cannot be had; "" where they can.
+    """
+
+    template = "scene_side.md.j2"
+    label: str
+    left_out: Sequence[str]
+    why_not: str
 
 
 def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
@@ -89,15 +138,13 @@ def scene_of(
     """
     traces, site = traces_of(runs.comparison), runs.comparison.tip
     if any("xpos" not in trace or "xquat" not in trace for trace in traces):
-        return Scene(None, ["The traces tell no poses of the bodies: there is nothing to draw."])
+        return Scene(None, render_texts(SceneNotes(lacking="poses")))
     labels = long_labels(runs.comparison)
     notes, drawings = _drawings(traces, looks, labels)
     shapes = list(dict.fromkeys(drawings))
     meshes = [mesh_of(drawing, _TRIANGLES // len(shapes)) for drawing in shapes]
-    notes += [
-        f"The shapes are drawn with {len(mesh.faces)} of their {mesh.simplified} triangles."
-        for mesh in meshes
-        if mesh.simplified
+    simplified = [
+        SimplifiedMesh(len(mesh.faces), mesh.simplified) for mesh in meshes if mesh.simplified
     ]
     extent = max(drawing.extent for drawing in drawings)
     places = [rows_at(trace, times) for trace in traces]
@@ -107,7 +154,7 @@ def scene_of(
     ]
     box = _box(poses, drawings[0], extent)
     if box is None:
-        return Scene(None, ["No pose of a body is a finite number: there is nothing to draw."])
+        return Scene(None, render_texts(SceneNotes(lacking="finite poses")))
     motions = [
         Motion(drawing, box.clipped(pos), orientations_between(trace["xquat"], *place))
         for drawing, pos, trace, place in zip(drawings, poses, traces, places, strict=True)
@@ -124,11 +171,13 @@ def scene_of(
         side["contacts"] = contacts[k].as_data()
         side |= _way(traces[k], site, times)
         sides.append(side)
-    notes += template.texts(
-        "lab/questions/stage/scene",
-        other=labels[1] if places[1][1].any() else None,
-        hidden=left_out if left_out else None,
-        few=few if any(of_side.more for of_side in contacts) else None,
+    notes += render_texts(
+        SceneNotes(
+            simplified=simplified,
+            other=labels[1] if places[1][1].any() else "",
+            hidden=left_out,
+            few=few if any(of_side.more for of_side in contacts) else 0,
+        )
     )
     camera = camera_for(motions, _ASPECT, _NEAR * extent)
     data = {
@@ -222,15 +271,9 @@ def _drawings(
     for trace, look, label in zip(traces, looks, labels, strict=True):
         if drawings and look is looks[0]:
             return notes, [*drawings, *drawings]
-        why_not = look if isinstance(look, str) else None
         drawings.append(bones_of(trace) if isinstance(look, str) else look)
-        left_out = drawings[-1].left_out
-        notes += template.texts(
-            "lab/questions/stage/scene_side",
-            left_out=", ".join(left_out) if left_out else None,
-            label=label,
-            why_not=why_not,
-        )
+        why_not = look if isinstance(look, str) else ""
+        notes += render_texts(SideNotes(label, drawings[-1].left_out, why_not))
     return notes, drawings
 
 
