@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from .remaining import RemainingTime
+from .waiting import Wait
 
 
 @contextmanager
@@ -46,36 +43,3 @@ def progress(
 
     tell(0.0)
     yield tell
-
-
-class Wait:
-    """What is known of how long it still takes."""
-
-    def __init__(self, runs_at_once: int, takes: float | None) -> None:
-        self._measured: RemainingTime | None = None
-        if runs_at_once:
-            from .remaining import RemainingTime  # here, for most work is too short to measure
-
-            self._measured = RemainingTime(runs_at_once)
-        self._takes, self._began = takes, time.monotonic()
-
-    def ended(self, fraction: float) -> None:
-        """Note what is done by now."""
-        if self._measured is not None:
-            self._measured.ended(fraction)
-
-    @property
-    def seconds(self) -> float | None:
-        """How long it still takes [s]; None where that is not known."""
-        if self._takes is not None:
-            return max(0.0, self._takes - (time.monotonic() - self._began))
-        return None if self._measured is None else self._measured.seconds
-
-    def words(self) -> str:
-        """Return how long it still takes in words; "" where that is not known, or is not long."""
-        seconds = self.seconds
-        if seconds is None:
-            return ""
-        from .remaining import LONG, in_words
-
-        return in_words(seconds) if seconds > LONG else ""

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .progress import Wait
+    from .waiting import Wait
 
 _PATIENCE = 0.5  # seconds without a bar
 _PACE = 0.1  # seconds between two pictures of it
