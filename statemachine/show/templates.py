@@ -37,6 +37,7 @@ from __future__ import annotations
 import functools
 import importlib
 import inspect
+import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -194,11 +195,6 @@ def _joined(words: Iterable[object], between: str = ", ") -> str:
     return between.join(map(str, words))
 
 
-def _size(value: float) -> float:
-    """Return a figure without its sign."""
-    return abs(value)
-
-
 # What a template may send a value through. Figures are in SI units.
 FILTERS: dict[str, Callable[..., str | float]] = {
     "degrees": numbers.degrees,
@@ -211,7 +207,7 @@ FILTERS: dict[str, Callable[..., str | float]] = {
     "quantity": numbers.quantity,
     "fixed": numbers.fixed,
     "number": format,
-    "abs": _size,
+    "abs": math.fabs,
     "milliseconds": numbers.milliseconds,
     "position": numbers.position,
     "vector": numbers.vector,
