@@ -43,7 +43,8 @@ def _make_pages(_app) -> None:
     backends = os.environ.get("STATEMACHINE_DOCS_BACKENDS", "").split(",")
     make_path(HERE / "path", [name for name in backends if name] or None)
     make_reference(HERE / "reference")
-    make_comparisons(HERE / "comparisons")
+    experiments = os.environ.get("STATEMACHINE_DOCS_COMPARISONS", "hold,gravity,box").split(",")
+    make_comparisons(HERE / "comparisons", experiments)
     pages = {"rooms": rooms.table()}
     for path, name in PAGES.items():
         text = (HERE / path).read_text(encoding="utf-8")

@@ -222,10 +222,10 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         uv = shutil.which("uv")
         pip = [uv, "pip", "install", "--python", own] if uv else [own, "-m", "pip", "install"]
         venv = [uv, "venv", "--python", python] if uv else [python, "-m", "venv"]
-        _run(name, *venv, str(place))
+        run_installer(name, *venv, str(place))
         for numpy in ("numpy", "numpy<2"):  # old wheels were built against NumPy 1, and do not say
             say(f"installing {name} and {numpy}")
-            _run(name, *pip, "--quiet", name, numpy)
+            run_installer(name, *pip, "--quiet", name, numpy)
             code = (
                 f"import importlib.metadata as m, numpy, {DEFAULT}; print(m.version('{DEFAULT}'))"
             )
@@ -283,7 +283,7 @@ def around_a_change(
     return [rows[k] for k in sorted({0, left, right, len(rows) - 1})]
 
 
-def _run(name: str, *command: str) -> None:
+def run_installer(name: str, *command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
     if done.returncode:
         lines = (done.stderr or done.stdout).strip().splitlines() or [f"code {done.returncode}"]

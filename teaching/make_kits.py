@@ -27,7 +27,7 @@ def wheel(folder: Path) -> Path:
 
 def student_kit(built: Path) -> dict[str, bytes]:
     """Return what a student needs, by name in the zip."""
-    exercises = {name: _template(name) for name in ("step_loop.py", "test_arm.py", "conftest.py")}
+    exercises = {name: template_of(name) for name in ("step_loop.py", "test_arm.py", "conftest.py")}
     start = (HERE / "START.md").read_text(encoding="utf-8").replace("WHEEL", built.name)
     return {
         built.name: built.read_bytes(),
@@ -38,7 +38,7 @@ def student_kit(built: Path) -> dict[str, bytes]:
     }
 
 
-def _template(name: str) -> bytes:
+def template_of(name: str) -> bytes:
     """Return a student's file as it is handed out.
 
     Raises:
@@ -46,7 +46,7 @@ def _template(name: str) -> bytes:
     """
     content = (ROOT / "exercises" / name).read_bytes()
     unwritten = content.count(b"raise NotImplementedError(")
-    if (name == "step_loop.py" and unwritten != 4) or _changed(ROOT / "exercises" / name):
+    if (name == "step_loop.py" and unwritten != 4) or is_changed(ROOT / "exercises" / name):
         raise SystemExit(
             f"exercises/{name} is not as it is handed out: restore it first. To keep what was "
             f"tried: cp exercises/{name} my_{name}; then: git restore --staged --worktree "
@@ -55,7 +55,7 @@ def _template(name: str) -> bytes:
     return content
 
 
-def _changed(file: Path) -> bool:
+def is_changed(file: Path) -> bool:
     """Return whether a file differs from the one that is committed; False outside a repository."""
     command = ["git", "-C", str(ROOT), "diff", "--quiet", "HEAD", "--", str(file)]
     try:

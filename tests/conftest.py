@@ -81,11 +81,16 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STATEMACHINE_JUDGED", "")  # what tests judge is no verdict for anybody
 
 
-@pytest.fixture(autouse=True)
-def _few_draws(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One perturbed run of each side is enough where the chaos floor is not what is tested."""
-    if request.module.__name__.rpartition(".")[2] != "test_floor":
-        monkeypatch.setattr(perturbed, "RUNS", 1)
+@pytest.fixture(autouse=True, scope="module")
+def _few_draws(request: pytest.FixtureRequest) -> Iterator[None]:
+    """One perturbed run of each side is enough where the chaos floor is not what is tested.
+
+    Of a module, so that what its tests share is computed so, too.
+    """
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        if request.module.__name__.rpartition(".")[2] != "test_floor":
+            monkeypatch.setattr(perturbed, "RUNS", 1)
+        yield
 
 
 @pytest.fixture(autouse=True, scope="module")

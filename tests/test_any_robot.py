@@ -30,7 +30,7 @@ from statemachine.lab.runs.scenarios import SCENARIOS, suitable_scenarios
 from statemachine.lab.runs.usual_commands import hold_ctrl
 from statemachine.show.blocks import Code, Page, Question, Table, Text
 
-from .support.claims import assert_has, assert_not_in, refused
+from .support.claims import assert_has, assert_not_in, overlapping, refused
 from .support.files import written, written_all
 from .support.motions import opened
 from .support.pages import blocks, shown
@@ -83,43 +83,63 @@ def model(tmp_path: Path) -> Any:
 
 
 def lesson(name: str, model: sm.Model, **options: Any) -> tuple[Any, Page, str]:
-    """What a lesson finds on a model, its page, and its code."""
+    """Return what a lesson finds on a model, its page, and its code."""
     taken = take(LESSONS[name], model, "mujoco", options, model.path.name)
     return taken.result, page_of_lesson(LESSONS[name], {"mujoco": taken}), taken.code
 
 
 def words(page: Page) -> str:
-    """All text of a page, but for its code."""
+    """Return all text of a page, but for its code."""
     whole = replace(page, blocks=[block for block in page.blocks if not isinstance(block, Code)])
     return " ".join(shown(whole).split())
 
 
-def test_a_pose_is_asked_of_servos_and_a_force_of_motors(model: Any) -> None:
-    robot = model(MIXED.format(rest=""))
-    assert is_servo(robot).tolist() == [True, False, False]
-    ctrl = hold_ctrl(robot)
+@pytest.fixture
+def mixed(model: Any) -> sm.Model:
+    """A servo on a slide, a motor that holds a load, and a velocity servo."""
+    return model(MIXED.format(rest=""))
+
+
+def test_only_a_position_servo_is_a_servo(mixed: sm.Model) -> None:
+    assert is_servo(mixed).tolist() == [True, False, False]
+
+
+def test_a_pose_is_asked_of_a_servo(mixed: sm.Model) -> None:
     # The servo stands at 0; a quarter of its 2.4 is beyond what 0.1 m of the joint are.
-    assert ctrl[0] == pytest.approx(0.2)
-    with sm.make_data(robot) as data:
-        sm.forward(robot, data)
-        assert ctrl[1] == pytest.approx(float(data.qfrc_bias[1]) / 3, rel=1e-3)
-        data.ctrl[:] = ctrl
-        sm.forward(robot, data)
-        assert data.qacc[1] == pytest.approx(0, abs=1e-2)  # the motor holds the arm up
-    assert ctrl[2] == 0
+    assert hold_ctrl(mixed)[0] == pytest.approx(0.2)
 
 
-def test_home_is_where_another_robot_starts(model: Any) -> None:
-    robot = model(MIXED.format(rest=HOME))
-    trace = record_scenario(SCENARIOS["hold"], robot, seconds=0.02)
+def test_a_motor_is_asked_for_the_force_that_holds_its_load(mixed: sm.Model) -> None:
+    ctrl = hold_ctrl(mixed)
+    data = mujoco.MjData(mixed.raw)
+    mujoco.mj_forward(mixed.raw, data)
+    assert ctrl[1] == pytest.approx(float(data.qfrc_bias[1]) / 3, rel=1e-3)
+    data.ctrl[:] = ctrl
+    mujoco.mj_forward(mixed.raw, data)
+    assert data.qacc[1] == pytest.approx(0, abs=1e-2)
+
+
+def test_a_velocity_servo_is_asked_for_nothing(mixed: sm.Model) -> None:
+    assert hold_ctrl(mixed)[2] == 0
+
+
+def test_a_run_of_another_robot_starts_in_its_keyframe_home(model: Any) -> None:
+    trace = record_scenario(SCENARIOS["hold"], model(MIXED.format(rest=HOME)), seconds=0.02)
     assert trace.header.keyframe == "home"
-    assert trace.header.says.endswith("It starts in the keyframe 'home'.")
+    assert "'home'" in trace.header.description
     assert trace.qpos[0].tolist() == [0.2, 0, 0]
+
+
+def test_commands_of_a_run_begin_with_those_of_home(model: Any) -> None:
+    trace = record_scenario(SCENARIOS["hold"], model(MIXED.format(rest=HOME)), seconds=0.02)
     assert trace.ctrl[0, 0] == pytest.approx(0.2)  # from 0.4 towards the farther end
     assert trace.ctrl[0, 2] == 1  # a velocity servo is left at the keyframe's
-    found, _, code = lesson("hold", robot, seconds=0.1)
-    assert "sm.reset(model, data, keyframe='home')" in code
+
+
+def test_a_lesson_on_another_robot_starts_in_its_keyframe_home(model: Any) -> None:
+    found, _, code = lesson("hold", model(MIXED.format(rest=HOME)), seconds=0.1)
     assert (found.qpos[0, 0], found.keyframe) == (0.2, "home")
+    assert "sm.reset(model, data, keyframe='home')" in code
 
 
 def test_a_force_is_never_read_as_a_place(model: Any) -> None:
@@ -131,50 +151,64 @@ def test_a_force_is_never_read_as_a_place(model: Any) -> None:
     assert row[1] == "200.00 mm"
 
 
-def test_what_has_no_servo_is_pointed_to_what_runs_it(model: Any) -> None:
-    floating, mixed = model(FLOATING), model(MIXED.format(rest=""), "mixed.xml")
-    says = r"statemachine compare {0} \S+robot.xml \(on one engine: trace record"
-    refused(
-        *(
-            (errors.BadInputError, says.format(name), partial(lesson, name, floating))
-            for name in ("hold", "gravity")
-        ),
-        (
-            errors.BadInputError,
-            "no position servo drives lift",
-            lambda: lesson("gravity", mixed, joint="lift"),
-        ),
-    )
+@pytest.mark.parametrize("name", ["hold", "gravity"])
+def test_what_has_no_servo_is_pointed_to_the_command_that_runs_it(model: Any, name: str) -> None:
+    says = rf"statemachine compare {name} \S+robot.xml \(.*trace record"
+    refused((errors.BadInputError, says, partial(lesson, name, model(FLOATING))))
 
 
-def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
-    passive, still = model(PASSIVE, "passive.xml"), model(STILL, "still.xml")
-    assert (suitable_scenarios(passive), suitable_scenarios(still)) == (("gravity", "fall"), ())
-    without = r"no actuators.*makes sense.*: gravity, fall"
-    wrong: list[tuple[Any, Any, sm.Model, str]] = [
-        *((record_scenario, SCENARIOS[name], passive, without) for name in ("hold", "droop")),
-        (record_scenario, SCENARIOS["waves"], passive, without),
-        (record_scenario, SCENARIOS["box"], passive, "no SO-101 that holds a box"),
-        (record_scenario, SCENARIOS["gravity"], still, "no joints: nothing in it can move"),
-        (lesson, "questions", passive, "about the SO-101"),
-    ]
-    refused(
-        *(
-            (errors.BadInputError, says, partial(ask, name, robot))
-            for ask, name, robot, says in wrong
-        )
-    )
+def test_a_joint_without_a_servo_is_refused_by_its_name(mixed: sm.Model) -> None:
+    refused((errors.BadInputError, "drives lift", lambda: lesson("gravity", mixed, joint="lift")))
 
 
-def test_sentences_are_true_of_the_robot(
-    model: Any, mujoco_arm: sm.Model, mujoco_scene: sm.Model
+@pytest.mark.parametrize(
+    ("text", "suitable"), [(PASSIVE, ("gravity", "fall")), (STILL, ())], ids=["passive", "still"]
+)
+def test_only_what_a_robot_can_show_is_suitable(
+    model: Any, text: str, suitable: tuple[str, ...]
 ) -> None:
-    says = {name: SCENARIOS[name].on(model(FLOATING)).says for name in ("hold", "gravity", "fall")}
-    assert "or is left at the start's ctrl" in says["hold"]
-    assert says["gravity"].startswith("No actuator of the file acts")
-    assert "nothing can touch anything" in says["fall"]
-    assert SCENARIOS["hold"].on(mujoco_arm).says.startswith("Each position servo")
-    assert "floor" not in SCENARIOS["gravity"].on(mujoco_arm).says
+    assert suitable_scenarios(model(text)) == suitable
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("hold", PASSIVE, "no actuators.*: gravity, fall"),
+        ("droop", PASSIVE, "no actuators.*: gravity, fall"),
+        ("waves", PASSIVE, "no actuators.*: gravity, fall"),
+        ("box", PASSIVE, "no SO-101"),
+        ("gravity", STILL, "no joints"),
+    ],
+)
+def test_what_is_not_suitable_is_refused_with_what_is(
+    model: Any, name: str, text: str, says: str
+) -> None:
+    run = partial(record_scenario, SCENARIOS[name], model(text))
+    refused((errors.BadInputError, says, run))
+
+
+def test_the_questions_are_of_the_arm_alone(model: Any) -> None:
+    refused((errors.BadInputError, "SO-101", partial(lesson, "questions", model(PASSIVE))))
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [("hold", "start's ctrl"), ("gravity", "No actuator"), ("fall", "nothing can touch")],
+)
+def test_an_experiment_is_described_as_it_is_on_another_robot(
+    model: Any, name: str, part: str
+) -> None:
+    assert part in SCENARIOS[name].on(model(FLOATING)).description
+
+
+def test_an_experiment_on_the_arm_alone_speaks_of_its_servos_and_no_floor(
+    mujoco_arm: sm.Model,
+) -> None:
+    assert "servo" in SCENARIOS["hold"].on(mujoco_arm).description
+    assert "floor" not in SCENARIOS["gravity"].on(mujoco_arm).description
+
+
+def test_experiments_are_described_for_the_arm_above_its_floor(mujoco_scene: sm.Model) -> None:
     assert all(each.on(mujoco_scene) is each for each in SCENARIOS.values())
 
 
@@ -270,22 +304,39 @@ def test_a_value_is_in_the_range_of_its_joint(model: Any) -> None:
     assert values == [0.5, 0.8]  # a quarter of the 2 m
 
 
-def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
+SEVERAL_NAMES = ("o.x", "o.y", "o.z", "p.position", "p.velocity", "m", "s", "i")
+
+
+def test_each_number_of_ctrl_has_a_name(model: Any) -> None:
     robot = model(SEVERAL)
-    names = ("o.x", "o.y", "o.z", "p.position", "p.velocity", "m", "s", "i")
-    assert robot.actuator_names == names
-    assert robot.nu == len(names) == len(robot.keyframes[0].ctrl)
+    assert robot.actuator_names == SEVERAL_NAMES
+    assert robot.nu == len(SEVERAL_NAMES) == len(robot.keyframes[0].ctrl)
+
+
+def test_each_number_of_ctrl_has_what_its_actuator_has(model: Any) -> None:
+    robot = model(SEVERAL)
     assert robot.actuator_jntid.tolist() == [-1, -1, -1, 1, 1, 1, 1, 1]
     assert np.flatnonzero(np.isfinite(robot.actuator_kp)).tolist() == [6]
     assert np.flatnonzero(np.isfinite(robot.actuator_gain)).tolist() == [5]
     assert (robot.actuator_gear[5], robot.actuator_forcerange[6].tolist()) == (3, [-7, 7])
-    with opened(robot, "home") as (_, data):
+
+
+def test_a_number_of_ctrl_is_found_by_its_name(model: Any) -> None:
+    with opened(model(SEVERAL), "home") as (robot, data):
         data.ctrl[robot.actuator_id("m")] = 2.0
         sm.forward(robot, data)
         assert data.raw.actuator_force[-3] == 2.0  # its gain is 1
         sm.step(robot, data, 10)
-    assert record_scenario(SCENARIOS["waves"], robot, seconds=0.05).header.actuators == names
-    assert main(["compare", "--models", str(robot.path), str(robot.path)]) == 0
+
+
+def test_a_robot_whose_actuators_take_several_numbers_is_recorded(model: Any) -> None:
+    trace = record_scenario(SCENARIOS["waves"], model(SEVERAL), seconds=0.05)
+    assert trace.header.actuators == SEVERAL_NAMES
+
+
+def test_a_robot_whose_actuators_take_several_numbers_is_compared(model: Any) -> None:
+    file = str(model(SEVERAL).path)
+    assert main(["compare", "--models", file, file]) == 0
 
 
 @pytest.mark.usefixtures("bullet")
@@ -332,20 +383,33 @@ def menagerie_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Regis
     return package
 
 
-def test_a_robot_by_name(menagerie_package: _Registry) -> None:
-    folder = menagerie_package.folder
-    assert models.resolve("menagerie:unitree_g1") == folder / "scene.xml"
-    assert models.resolve("menagerie:unitree_g1/g1") == folder / "g1.xml"
-    assert models.resolve("menagerie:unitree_g1/g1", menagerie="elsewhere") == folder / "g1.xml"
+@pytest.mark.parametrize(
+    ("name", "folder", "file"),
+    [
+        ("menagerie:unitree_g1", "", "scene.xml"),
+        ("menagerie:unitree_g1/g1", "", "g1.xml"),
+        ("menagerie:unitree_g1/g1", "elsewhere", "g1.xml"),
+    ],
+)
+def test_a_robot_by_name_is_a_file_of_the_package(
+    name: str, folder: str, file: str, menagerie_package: _Registry
+) -> None:
+    found = models.resolve(name, menagerie=folder) if folder else models.resolve(name)
+    assert found == menagerie_package.folder / file
+
+
+@pytest.mark.usefixtures("menagerie_package")
+def test_a_robot_is_loaded_by_its_name() -> None:
     assert sm.load("menagerie:unitree_g1").joint_names == ("swing",)
-    refused(
-        (
-            errors.UnknownNameError,
-            "Did you mean 'unitree_g1'",
-            lambda: models.resolve("menagerie:unitre_g1"),
-        ),
-        (errors.UnknownNameError, "scene, g1", lambda: models.resolve("menagerie:unitree_g1/nope")),
-    )
+
+
+@pytest.mark.usefixtures("menagerie_package")
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("menagerie:unitre_g1", "'unitree_g1'"), ("menagerie:unitree_g1/nope", "scene, g1")],
+)
+def test_a_name_that_is_not_known_is_refused_with_those_that_are(name: str, says: str) -> None:
+    refused((errors.UnknownNameError, says, lambda: models.resolve(name)))
 
 
 @pytest.fixture
@@ -365,13 +429,9 @@ def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize(
     ("name", "code", "said"),
     [
-        (
-            "menagerie:unitree_g1",
-            2,
-            "unitree_g1 is not on this machine and could not be downloaded",
-        ),
-        ("menagerie:", 2, "'menagerie:' names no robot: type menagerie:NAME"),
-        ("menagerie:unitre_g1", 2, "Did you mean 'unitree_g1'?"),
+        ("menagerie:unitree_g1", 2, "unitree_g1 is not on this machine"),
+        ("menagerie:", 2, "menagerie:NAME"),
+        ("menagerie:unitre_g1", 2, "'unitree_g1'"),
         ("robot_descriptions:panda_mj_description", 3, "[robots]"),
     ],
 )
@@ -387,7 +447,7 @@ def test_a_robot_that_cannot_be_had_is_one_line(
 ) -> None:
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
     one_line(here(*command.split(), name), said, code)
-    assert no_network == [5.0] * ("downloaded" in said)  # and no further try
+    assert no_network == [5.0] * ("not on this machine" in said)  # and no further try
 
 
 @pytest.mark.parametrize(
@@ -403,19 +463,31 @@ def test_a_package_that_is_missing_is_named(
     refused((errors.MissingEngineError, rf"\[{extra}\]", lambda: models.resolve(name)))
 
 
-def test_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a package robot_descriptions that has one MJCF, and one robot of no kind."""
     package = types.ModuleType("robot_descriptions")
     vars(package).update(DESCRIPTIONS={"a_mj_description": None, "b_description": None})
     one = types.ModuleType("robot_descriptions.a_mj_description")
     vars(one).update(MJCF_PATH=str(tmp_path / "a.xml"), URDF_PATH="a.urdf")
     for module in (package, one, types.ModuleType("robot_descriptions.b_description")):
         monkeypatch.setitem(sys.modules, module.__name__, module)
-    assert models.resolve("a_mj_description") == tmp_path / "a.xml"
-    assert models.resolve("robot_descriptions:a_mj_description") == tmp_path / "a.xml"
-    refused(
-        (errors.ModelFileError, "neither MJCF nor URDF", lambda: models.resolve("b_description")),
-        (errors.UnknownNameError, "a_mj_description", lambda: models.resolve("c_description")),
-    )
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["a_mj_description", "robot_descriptions:a_mj_description"])
+def test_a_description_is_the_file_that_it_names(name: str, descriptions: Path) -> None:
+    assert models.resolve(name) == descriptions / "a.xml"
+
+
+@pytest.mark.usefixtures("descriptions")
+def test_a_description_without_a_file_is_refused() -> None:
+    refused((errors.ModelFileError, "b_description", lambda: models.resolve("b_description")))
+
+
+@pytest.mark.usefixtures("descriptions")
+def test_a_description_that_is_not_known_is_refused_with_those_that_are() -> None:
+    refused((errors.UnknownNameError, "a_mj_description", lambda: models.resolve("c_description")))
 
 
 # Two links whose balls are 50 mm apart at the start and 200 mm thick: 150 mm of the one are in the
@@ -427,28 +499,38 @@ INSIDE = """<mujoco><worldbody>
   <actuator><motor joint="a"/><motor joint="b"/></actuator>{rest}</mujoco>"""
 
 
-def test_shapes_inside_each_other_at_the_start_are_told(model: Any) -> None:
-    with pytest.warns(errors.EngineWarning, match="lower on upper by 150 mm") as caught:
+BY_150_MM = "lower on upper by 150 mm"
+
+
+def test_load_warns_of_shapes_inside_each_other_in_the_caller_s_line(model: Any) -> None:
+    with pytest.warns(errors.EngineWarning, match=BY_150_MM) as caught:
         robot = model(INSIDE.format(rest=""))
     assert [Path(warning.filename) for warning in caught] == [Path(__file__)]
     raw = mujoco.MjData(robot.raw)
     mujoco.mj_forward(robot.raw, raw)
     assert raw.contact.dist.tolist() == pytest.approx([-0.15])
-    with pytest.warns(errors.EngineWarning, match="in the default state: lower on upper by 150"):
-        run = record_scenario(SCENARIOS["hold"], robot, seconds=0.02)
-    assert sum("lower on upper by 150 mm" in note for note in compare(run, run).notes) == 2
-    row = examine(robot.path, ExaminedModel("robot.xml", "", ""), True, 0, lambda *_: None)
-    assert row.inside == ("lower on upper by 150 mm",)
-    survey = Survey("mujoco", [row, row], [], "")
-    assert "2 of 2: robot.xml, lower on upper by 150 mm" in words(survey_page(survey))
+
+
+@overlapping
+def test_a_comparison_notes_shapes_inside_each_other_on_each_side(model: Any) -> None:
+    run = record_scenario(SCENARIOS["hold"], model(INSIDE.format(rest="")), seconds=0.02)
+    assert sum(BY_150_MM in note for note in compare(run, run).notes) == 2
+
+
+@overlapping
+def test_a_survey_lists_robots_with_shapes_inside_each_other(model: Any) -> None:
+    file = model(INSIDE.format(rest="")).path
+    row = examine(file, ExaminedModel("robot.xml", "", ""), True, 0, lambda *_: None)
+    assert row.inside == (BY_150_MM,)
+    assert BY_150_MM in words(survey_page(Survey("mujoco", [row, row], [], "")))
 
 
 # At rest 150 mm of the one are in the other, at home 100 mm; the first keyframe has them apart.
 TOLD_OF = INSIDE.format(
     rest='<keyframe><key name="apart" qpos="0 1"/><key name="home" qpos="0 .05"/></keyframe>'
 ).replace("motor", "position")
-HOME_INSIDE = "inside each other in the keyframe 'home': lower on upper by 100 mm"
-AT_REST_INSIDE = "inside each other in the default state: lower on upper by 150 mm"
+HOME_INSIDE = "'home': lower on upper by 100 mm"
+AT_REST_INSIDE = "default state: lower on upper by 150 mm"
 
 
 @pytest.mark.parametrize(
@@ -467,7 +549,7 @@ AT_REST_INSIDE = "inside each other in the default state: lower on upper by 150 
 def test_the_state_that_is_told_of_is_the_one_that_a_run_starts_in(
     words: str, told: str, here: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("statemachine.cli._SAID", set())
+    monkeypatch.setattr("statemachine.cli.SHOWN_WARNINGS", set())
     written(tmp_path / "a.xml", TOLD_OF)
     written(tmp_path / "idle.py", "def idle(model, data): return None")
     if "compare" in words:

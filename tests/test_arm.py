@@ -58,7 +58,7 @@ def test_scene_box_has_the_sizes_of_the_course(mujoco_box: sm.Model) -> None:
 
 
 def _touching(model: sm.Model, data: sm.Data) -> tuple[int, set[str]]:
-    """Number of contacts, and the bodies that touch the box."""
+    """Return the number of contacts, and the bodies that touch the box."""
     names = np.array(model.body_names)[model.geom_bodyid[data.contacts.geom]]
     return len(names), set(names[(names == "box").any(axis=1)].ravel().tolist()) - {"box"}
 

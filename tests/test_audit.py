@@ -36,7 +36,7 @@ def of_pybullet() -> Audit:
 
 
 @pytest.mark.parametrize("wrong", [None, "so101"])
-def test_it_wants_a_model(wrong: Any) -> None:
+def test_only_a_model_is_audited(wrong: Any) -> None:
     with pytest.raises(TypeError, match="audit wants a Model"):
         audit(wrong)
 
@@ -50,7 +50,7 @@ def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: Audit) -> None:
     assert audit(sm.load("so101")).idle == ("time", "warmstart")  # nothing touches
 
 
-def test_every_other_part_but_the_time_decides(of_mujoco: Audit) -> None:
+def test_every_other_part_of_a_mujoco_state_but_the_time_decides(of_mujoco: Audit) -> None:
     forces = ("qfrc_applied", "xfrc_applied")
     assert of_mujoco.decides == ("qpos", "qvel", "warmstart", "ctrl", *forces)
     assert of_mujoco.idle == ("time",)
@@ -76,7 +76,7 @@ def test_where_nothing_touches_pybullet_forgets_nothing() -> None:
     assert audit(sm.load("so101", backend="pybullet")).whole.exact
 
 
-def test_another_backend_is_audited() -> None:
+def test_a_backend_of_another_package_is_audited() -> None:
     with registered("hidden", "tests.support.hidden_world:load") as name:
         found = audit(sm.load(SCENE, backend=name), steps=20)
     assert found.whole.exact
@@ -87,14 +87,16 @@ def forget_the_warm_start(data: MujocoData, *_: Any) -> None:
     data.raw.qacc_warmstart[:] = 0
 
 
-def test_a_backend_whose_restore_forgets_something(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_backend_whose_restore_forgets_something_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     followed_by(MujocoData, "_set_state", forget_the_warm_start)(monkeypatch)
     found = audit(sm.load(SCENE), steps=20)
     assert not found.whole.exact
     assert "warmstart" in found.idle
 
 
-def test_a_restore_that_depends_on_the_past(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_restore_that_depends_on_the_past_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(0)
 
     def nudge(data: MujocoData, *_: Any) -> None:
@@ -115,7 +117,7 @@ def test_parts_of_other_models_are_tried(tmp_path: Path) -> None:
     assert {"mocap_pos", "mocap_quat"} <= set(found.not_tried)  # nobody moved it
 
 
-def test_without_a_part_it_may_diverge(tmp_path: Path) -> None:
+def test_a_future_without_a_part_of_the_state_may_diverge(tmp_path: Path) -> None:
     with pytest.warns(EngineWarning, match="stiffness of joint j is negative"):
         model = loaded(
             tmp_path,
@@ -137,7 +139,7 @@ def test_what_cannot_be_audited_is_one_line(tmp_path: Path) -> None:
     )
 
 
-def test_it_is_a_record_and_prints_as_a_table(of_mujoco: Audit) -> None:
+def test_an_audit_is_a_record_and_prints_as_a_table(of_mujoco: Audit) -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         of_mujoco.steps = 3  # pyright: ignore[reportAttributeAccessIssue]
     assert plain(of_mujoco)["parts"][0]["name"] == "time"

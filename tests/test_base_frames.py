@@ -21,7 +21,7 @@ SHIFT, TURN = np.array([0.02, 0.0, -0.05]), 0.3  # m; rad, about z
 
 
 def hopper(shift: np.ndarray, turn: float) -> str:
-    """A body with a leg; what is on the body stands where it stood before its frame was moved."""
+    """Return a body with a leg, all of which stays where it was before its frame was moved."""
     cos, sin = np.cos(turn), np.sin(turn)
     back = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])  # into the new frame
 
@@ -65,7 +65,7 @@ def test_the_offset_of_the_frame_is_told_as_plain_mujoco_has_it(run: Request) ->
     assert frame.distance == pytest.approx(np.linalg.norm(SHIFT))
 
 
-def test_both_pages_tell_it_below_the_verdict(run: Request) -> None:
+def test_both_pages_tell_of_other_base_frames_below_the_verdict(run: Request) -> None:
     compared = gap.answer(gap.CompareRequest(run, uncertainty=None))
     explained = causes.answer(causes.ExplainRequest(run, uncertainty=None, jobs=1))
     for shown in (page(compared), why.page(explained)):
@@ -75,6 +75,6 @@ def test_both_pages_tell_it_below_the_verdict(run: Request) -> None:
         assert "17.19" in first.text
 
 
-def test_one_frame_is_told_of_as_none(tmp_path: Path) -> None:
+def test_base_frames_that_are_one_are_not_told(tmp_path: Path) -> None:
     files = [str(written(tmp_path / f"{name}.xml", hopper(np.zeros(3), 0.0))) for name in "ab"]
     assert load_sides([Side(file) for file in files], {}, {}).bases.frame is None

@@ -45,11 +45,11 @@ def test_a_urdf_floats_where_the_other_does_and_starts_at_its_place(files, engin
     left, right = (rerun.start()[0] for rerun in prepared.reruns)
     assert left == pytest.approx(right, abs=1e-12)
     assert right[:7] == pytest.approx([0, 0, STANDING, 1, 0, 0, 0])
-    assert prepared.bases.taken_by == ("left", "right")[place]
+    assert prepared.bases.inherited_by == ("left", "right")[place]
     assert prepared.bases.left == prepared.bases.right == "free"
 
 
-def test_it_takes_the_rotation_of_the_other_base_too(tmp_path):
+def test_a_urdf_takes_the_rotation_of_the_other_base_too(tmp_path):
     turned = (
         mjcf()
         .split("<keyframe>")[0]
@@ -67,13 +67,13 @@ def test_a_side_that_is_told_its_base_keeps_it(files):
     prepared = prepare_sides(_request(_side(files[0]), _side(files[1], base="fixed")))
     assert (prepared.bases.left, prepared.bases.right) == ("free", "fixed")
     assert prepared.bases.differ
-    assert not prepared.bases.taken_by
+    assert not prepared.bases.inherited_by
 
 
 def test_what_one_side_is_told_the_other_takes(files):
     prepared = prepare_sides(_request(_side(files[1], base="free"), _side(files[1])))
     assert prepared.bases.right == "free"
-    assert prepared.bases.taken_by == "right"
+    assert prepared.bases.inherited_by == "right"
 
 
 def test_a_file_that_says_its_base_keeps_it(tmp_path):
@@ -83,17 +83,27 @@ def test_a_file_that_says_its_base_keeps_it(tmp_path):
     assert (prepared.bases.left, prepared.bases.right) == ("fixed", "free")
 
 
-def test_of_a_urdf_that_pybullet_would_let_float_it_is_said_that_it_is_fixed(files):
-    need_engine("pybullet")
+@pytest.mark.usefixtures("bullet")
+def test_of_a_urdf_that_pybullet_would_let_float_it_is_said_that_it_is_fixed(
+    files: tuple[Path, Path],
+) -> None:
     sides = _side(files[1]), _side(files[1], "pybullet", "engine")
     prepared = prepare_sides(_request(*sides))
     assert prepared.bases.right == "fixed"
     assert prepared.bases.floating_loader == "right"
     assert [note for note in prepared.notes if "base=free" in note]
-    told = prepare_sides(_request(sides[0], _side(files[1], "pybullet", "engine", base="fixed")))
-    assert not told.bases.floating_loader
-    beside_an_mjcf = prepare_sides(_request(_side(files[0]), sides[1]))
-    assert not beside_an_mjcf.bases.floating_loader
+
+
+@pytest.mark.usefixtures("bullet")
+def test_a_fixed_base_that_was_asked_for_is_not_noted(files: tuple[Path, Path]) -> None:
+    right = _side(files[1], "pybullet", "engine", base="fixed")
+    assert not prepare_sides(_request(_side(files[1]), right)).bases.floating_loader
+
+
+@pytest.mark.usefixtures("bullet")
+def test_a_fixed_base_beside_an_mjcf_is_not_noted(files: tuple[Path, Path]) -> None:
+    sides = _side(files[0]), _side(files[1], "pybullet", "engine")
+    assert not prepare_sides(_request(*sides)).bases.floating_loader
 
 
 def test_a_free_base_against_a_fixed_one_differs_whatever_else_agrees(files):

@@ -25,7 +25,7 @@ REFUSED = "if you trust who made it"
 
 @pytest.fixture(autouse=True)
 def nothing_is_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(binary, "_trusted", set[str]())
+    monkeypatch.setattr(binary, "trusted_digests", set[str]())
     monkeypatch.delenv(binary.TRUST, raising=False)
 
 
@@ -37,7 +37,9 @@ def strange(tmp_path: Path) -> Path:
     return file
 
 
-def test_what_was_saved_is_read_where_it_is_trusted(tmp_path: Path, mujoco_box: sm.Model) -> None:
+def test_a_binary_model_that_was_saved_is_read_where_it_is_trusted(
+    tmp_path: Path, mujoco_box: sm.Model
+) -> None:
     model: Any = mujoco_box
     model.save_binary(tmp_path / "arm.mjb")
     refused((ModelError, REFUSED, lambda: sm.load(tmp_path / "arm.mjb")))
@@ -47,16 +49,22 @@ def test_what_was_saved_is_read_where_it_is_trusted(tmp_path: Path, mujoco_box: 
 
 
 @pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
-def test_one_that_is_not_trusted_is_refused(strange: Path, backend: str) -> None:
+def test_a_binary_model_that_is_not_trusted_is_refused(strange: Path, backend: str) -> None:
     need_engine(backend)
     refused((ModelError, "trust_binary=True", lambda: sm.load(strange, backend=backend)))
 
 
-def test_it_is_read_when_asked_and_said_once(strange: Path) -> None:
+def test_trust_is_warned_of_once(strange: Path) -> None:
+    """The same bytes are read again by what works on that model."""
     with pytest.warns(EngineWarning, match="is trusted"):
         assert sm.load(strange, trust_binary=True).nq == 6
     with warnings.catch_warnings(action="error"):
-        assert sm.load(strange).nq == 6  # the same bytes, by what works on that model
+        assert sm.load(strange).nq == 6
+
+
+def test_trust_is_of_the_bytes_and_not_of_the_name(strange: Path) -> None:
+    with pytest.warns(EngineWarning, match="is trusted"):
+        sm.load(strange, trust_binary=True)
     strange.write_bytes(strange.read_bytes() + b"\0")
     refused((ModelError, REFUSED, lambda: sm.load(strange)))
 
@@ -80,14 +88,14 @@ def test_trust_is_of_one_process(strange: Path) -> None:
     assert REFUSED in in_its_own_python(LOAD, strange.parent).stderr
 
 
-def test_a_broken_one_is_refused_though_it_is_trusted(tmp_path: Path) -> None:
+def test_a_broken_binary_model_is_refused_though_it_is_trusted(tmp_path: Path) -> None:
     file = tmp_path / "bad.mjb"
     file.write_bytes(b"nonsense" * 10)
     with pytest.warns(EngineWarning), pytest.raises(ModelError, match="cannot read"):
         sm.load(file, trust_binary=True)
 
 
-def test_commands_take_it_when_asked(
+def test_a_command_reads_a_binary_model_when_asked(
     strange: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(binary.TRUST, "")
@@ -98,7 +106,7 @@ def test_commands_take_it_when_asked(
 
 
 @pytest.mark.slow
-def test_the_processes_of_a_command_take_it_too(strange: Path, cli: Cli) -> None:
+def test_the_processes_of_a_command_read_a_binary_model_too(strange: Path, cli: Cli) -> None:
     words = ("robots", str(strange), "--quick", "--jobs", "1", "--json")
     assert REFUSED in cli(*words).stdout
     assert REFUSED not in cli(*words, "--trust-binary").stdout

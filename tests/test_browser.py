@@ -38,7 +38,7 @@ def test_a_good_page_passes_and_has_webgl(tmp_path: Path, offline: bool) -> None
         ("<img src='http://outside.invalid/a.png'>", "outside.invalid"),
     ],
 )
-def test_a_bad_page_does_not(tmp_path: Path, body: str, words: str) -> None:
+def test_a_bad_page_fails(tmp_path: Path, body: str, words: str) -> None:
     page = written(tmp_path / "bad.html", f"{PAGE}{body}").as_uri()
     with browser() as tab:
         tab.goto(page, wait_until="load")

@@ -34,7 +34,7 @@ from statemachine.lab.probes.calls import (
 from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Page, Table
 
-from .support.claims import assert_has, assert_in, assert_not_in, refused
+from .support.claims import assert_has, assert_in, refused
 from .support.pages import blocks, shown
 from .support.patches import Patch, around
 from .support.requirements import need_engine
@@ -77,7 +77,7 @@ def engine(request: pytest.FixtureRequest) -> str:
 
 
 def short(engine: str, code: str) -> list[RecordedStatement]:
-    """What each line of some code did, after a Data was made."""
+    """Return what each line of some code did, after a Data was made."""
     recording = record(SHORT.format(engine=engine, code=code), engine)
     assert recording.error is None
     return list(recording.statements[3:])
@@ -96,13 +96,13 @@ def run_plainly(code: str) -> str:
 
 
 def owners(engine: str) -> list[Any]:
-    """Whatever has functions that are replaced."""
+    """Return whatever has functions that are replaced."""
     more = [installed.require("pybullet")] if engine == "pybullet" else []
     return [mujoco, mujoco.MjModel, mujoco.MjData, mujoco.MjSpec, *more]
 
 
 def functions_of(owner: Any) -> dict[int, str]:
-    """The names of what is called into C, by the id under which a profile tells it."""
+    """Return the names of what is called into C, by the id under which a profile tells it."""
     if isinstance(owner, type):
         return {
             id(value.__func__): f"{owner.__name__}.{name}"
@@ -118,7 +118,7 @@ def functions_of(owner: Any) -> dict[int, str]:
 
 @contextlib.contextmanager
 def profiled(engine: str, heard: Callable[[Any, str], None]) -> Any:
-    """Python's own account of calls into C: (frame, name) of each that is the engine's."""
+    """Hear Python's own account of calls into C: (frame, name) of each that is the engine's."""
     functions = {key: name for owner in owners(engine) for key, name in functions_of(owner).items()}
 
     def profile(frame: Any, event: str, argument: Any) -> None:
@@ -156,17 +156,17 @@ def test_every_call_is_recorded(engine: str) -> None:
 
 
 def is_a_look(frame: Any) -> bool:
-    """Whether code is the recorder's own, or that with which an engine's room looks."""
+    """Tell whether code is the recorder's own, or that with which an engine's room looks."""
     file = Path(frame.f_code.co_filename)
     return (file.parts[-3::2] == ("engines", "calls.py")) or file == Path(calls.__file__)
 
 
 def past_the_recorder(engine: str, run: Callable[[], object]) -> set[str]:
-    """The engine's functions that are called while a run is recorded, past the recorder."""
+    """Return the engine's functions that are called while a run is recorded, past the recorder."""
     names: set[str] = set()
 
     def heard(frame: Any, name: str) -> None:
-        if CallRecorder._active and not is_a_look(frame):  # at its end, Data are collected
+        if CallRecorder.is_active and not is_a_look(frame):  # at its end, Data are collected
             names.add(name)
 
     with profiled(engine, heard):
@@ -227,7 +227,7 @@ def test_a_world_is_not_taken_for_the_next_of_its_number() -> None:
 
 
 @pytest.mark.parametrize("ending", ["pass", "1 / 0", "raise KeyboardInterrupt", "def"])
-def test_everything_is_put_back(engine: str, ending: str) -> None:
+def test_every_function_is_put_back(engine: str, ending: str) -> None:
     before = [dict(vars(owner)) for owner in owners(engine)]
     errors: Any = (ZeroDivisionError, KeyboardInterrupt, SyntaxError)
     with contextlib.nullcontext() if ending == "pass" else pytest.raises(errors):
@@ -235,8 +235,18 @@ def test_everything_is_put_back(engine: str, ending: str) -> None:
     for owner, attributes in zip(owners(engine), before, strict=True):
         assert vars(owner).keys() == attributes.keys()
         assert all(vars(owner)[name] is value for name, value in attributes.items())
-    assert isinstance(mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>")), mujoco.MjData)
-    assert record(SHORT.format(engine=engine, code=""), engine).error is None  # and again
+
+
+def test_a_run_can_be_recorded_after_one_that_failed(engine: str) -> None:
+    with pytest.raises(ZeroDivisionError):
+        record("1 / 0", engine)
+    assert record(SHORT.format(engine=engine, code=""), engine).error is None
+
+
+def test_mujoco_s_class_is_its_own_after_a_run() -> None:
+    record(SHORT.format(engine="mujoco", code=""), "mujoco")
+    empty = mujoco.MjModel.from_xml_string("<mujoco/>")
+    assert isinstance(mujoco.MjData(empty), mujoco.MjData)
 
 
 def test_a_data_outlives_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -328,80 +338,126 @@ def test_several_data_are_told_apart(engine: str) -> None:
         ]
 
 
-@pytest.mark.usefixtures("bullet")
-def test_pybullet_computes_when_it_is_read() -> None:
-    forward, read, again, step, late = short(
-        "pybullet",
+@pytest.fixture(scope="module")
+def lines_of_reads() -> dict[str, RecordedStatement]:
+    """What PyBullet does in a forward, two reads, some steps, and a read after them."""
+    need_engine("pybullet")
+    code = (
         "sm.forward(model, data)\nprint(data.site_xpos)\nprint(data.site_xpos)\n"
-        "sm.step(model, data, 4)\nprint(data.site_xpos)",
+        "sm.step(model, data, 4)\nprint(data.site_xpos)"
     )
-    assert (forward.calls, forward.changed, forward.due) == ((), (), ("data",))
-    assert (read.due, again.due, step.due, late.due) == ((), (), ("data",), ())
-    for line in (read, late):
-        asked = {call.function: call.on for call in line.calls if call.engine == "pybullet"}
-        assert asked["getLinkStates"] == "the still copy of model"
-        assert set(line.changed) == {"data.site_xpos"}
-    assert (again.calls, again.changed) == ((), ())
-    assert step.changed == ("data.qpos", "data.qvel", "data.time")
-    ours = {call.function: call for call in step.calls if call.on == "the world of data"}
-    moved, read = ours["stepSimulation"], ours["getJointStates"]
-    assert (moved.count, read.changed) == (4, ())
+    names = ("forward", "first read", "second read", "step", "late read")
+    return dict(zip(names, short("pybullet", code), strict=True))
+
+
+def test_pybullet_computes_nothing_in_a_forward(
+    lines_of_reads: dict[str, RecordedStatement],
+) -> None:
+    assert_has(lines_of_reads["forward"], calls=(), changed=(), due=("data",))
+
+
+@pytest.mark.parametrize("read", ["first read", "late read"])
+def test_pybullet_computes_poses_on_its_still_copy_when_they_are_read(
+    read: str, lines_of_reads: dict[str, RecordedStatement]
+) -> None:
+    line = lines_of_reads[read]
+    asked = {call.function: call.on for call in line.calls if call.engine == "pybullet"}
+    assert asked["getLinkStates"] == "the still copy of model"
+    assert_has(line, changed=("data.site_xpos",), due=())
+
+
+def test_pybullet_computes_nothing_in_a_second_read(
+    lines_of_reads: dict[str, RecordedStatement],
+) -> None:
+    assert_has(lines_of_reads["second read"], calls=(), changed=(), due=())
+
+
+def test_a_step_of_pybullet_moves_its_world_and_reads_it(
+    lines_of_reads: dict[str, RecordedStatement],
+) -> None:
+    line = lines_of_reads["step"]
+    assert_has(line, changed=("data.qpos", "data.qvel", "data.time"), due=("data",))
+    of_the_world = {call.function: call for call in line.calls if call.on == "the world of data"}
+    moved = of_the_world["stepSimulation"]
+    assert moved.count == 4
     assert {"joint positions", "joint velocities"} <= set(moved.changed)
+    assert of_the_world["getJointStates"].changed == ()
 
 
-@pytest.mark.usefixtures("bullet")
-def test_the_still_copy_is_never_stepped() -> None:
-    recording = record(WHOLE.format(engine="pybullet"), "pybullet")
-    on = {
-        (call.on, call.function)
-        for statement in recording.statements
-        for call in statement.calls
-        if call.engine == "pybullet"
-    }
-    still, ahead = (f"the {role} of model" for role in ("still copy", "look-ahead"))
-    assert_in(on, (still, "calculateMassMatrix"), (ahead, "stepSimulation"))
-    assert (still, "stepSimulation") not in on
-    assert not {name for name, _ in on} - {
-        *(
-            f"the {role} of {model}"
-            for role in ("still copy", "look-ahead")
-            for model in ("model", "off")
-        ),
-        *(f"the world of {data}" for data in ("data", "other")),
+@pytest.fixture(scope="module")
+def whole_run() -> Recording:
+    """The calls of PyBullet in all that a program does."""
+    need_engine("pybullet")
+    return record(WHOLE.format(engine="pybullet"), "pybullet")
+
+
+def calls_of(recording: Recording) -> set[tuple[str, str]]:
+    """Return (what it is about, function) of each call of PyBullet."""
+    calls = itertools.chain.from_iterable(line.calls for line in recording.statements)
+    return {(call.on, call.function) for call in calls if call.engine == "pybullet"}
+
+
+def test_the_still_copy_is_never_stepped(whole_run: Recording) -> None:
+    calls = calls_of(whole_run)
+    assert_in(
+        calls,
+        ("the still copy of model", "calculateMassMatrix"),
+        ("the look-ahead of model", "stepSimulation"),
+    )
+    assert ("the still copy of model", "stepSimulation") not in calls
+
+
+def test_every_world_of_a_run_has_a_name(whole_run: Recording) -> None:
+    assert {name for name, _ in calls_of(whole_run)} <= {
+        *("the still copy of model", "the still copy of off"),
+        *("the look-ahead of model", "the look-ahead of off"),
+        *("the world of data", "the world of other"),
         "a world that is gone again",  # in which load tries what it wrote
     }
-    # Nothing of an engine's world changes but by a call of the engine's.
-    assert not [
-        each for s in recording.statements for each in s.changed if each.startswith("the world")
-    ]
 
 
-@pytest.mark.usefixtures("bullet")
-def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
-    from statemachine.engines.pybullet import calls as watched
+def test_nothing_of_a_world_changes_but_by_a_call_of_the_engine(whole_run: Recording) -> None:
+    changed = itertools.chain.from_iterable(line.changed for line in whole_run.statements)
+    assert [each for each in changed if each.startswith("the world")] == []
 
-    for function, given, named, client in (
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "named", "client"),
+    [
         ("stepSimulation", (7,), {}, 7),
         ("stepSimulation", (), {}, 0),
         ("anything", (1, 2), {"physicsClientId": 5}, 5),
         ("anything", (1, 2), {}, None),
         ("getJointStates", (1, [2], 9), {}, 9),
         ("getJointStates", (1, [2]), {}, 0),
-    ):
-        assert watched.client_of(function, given, named) == client, function
+    ],
+)
+def test_the_client_of_a_call_is_found_where_it_is_given(
+    function: str, arguments: tuple[Any, ...], named: dict[str, Any], client: int | None
+) -> None:
+    from statemachine.engines.pybullet.calls import client_of
+
+    assert client_of(function, arguments, named) == client
+
+
+@pytest.mark.usefixtures("bullet")
+def test_the_client_is_the_last_argument_of_each_function_of_the_table() -> None:
+    """The engine takes what stands there for a world's number, and nothing after it."""
+    from statemachine.engines.pybullet.calls import ARGUMENTS_BEFORE_CLIENT
+
     pb: Any = installed.require("pybullet")
     nowhere = pb.connect(pb.DIRECT)
     pb.disconnect(nowhere)
-    for name, place in watched._BEFORE_CLIENT.items():
+    for name, place in ARGUMENTS_BEFORE_CLIENT.items():
         arguments: list[Any] = [0] * place
         if name == "loadURDF":
             arguments[:3] = ["no.urdf", (0, 0, 0), (0, 0, 0, 1)]
         call = partial(getattr(pb, name), *arguments, nowhere)
         if name == "isConnected":
             assert not call()
-        else:  # the engine takes the number for a world's
+        else:
             refused((pb.error, "Not connected", call))
-        refused((TypeError, "at most", partial(call, nowhere)))  # and has no argument after it
+        refused((TypeError, "at most", partial(call, nowhere)))
 
 
 @pytest.mark.usefixtures("bullet")
@@ -421,7 +477,7 @@ def test_every_call_of_the_backend_says_its_client() -> None:
                     found.append((name, None if starred else len(given) - 1))
     assert len(found) > 20
     for name, place in found:
-        assert place in (None, watched._BEFORE_CLIENT[name]), name
+        assert place in (None, watched.ARGUMENTS_BEFORE_CLIENT[name]), name
 
 
 @around(mujoco, "mj_forward")
@@ -494,28 +550,46 @@ def test_a_refusal_ends_the_run(engine: str) -> None:
     assert (recording.printed, last) == ("here\n", "sm.step(model, data, -1)")
 
 
-def test_what_cannot_be_recorded_is_refused() -> None:
-    need_engine("pybullet")
+def test_an_engine_whose_calls_cannot_be_recorded_is_refused() -> None:
+    refused((UnknownNameError, "mujoco, pybullet", lambda: record("", "mujco")))
+
+
+@pytest.mark.usefixtures("bullet")
+def test_code_of_another_engine_is_refused() -> None:
     other = SHORT.format(engine="pybullet", code="")
-    refused(
-        (UnknownNameError, "mujoco, pybullet", lambda: record("", "mujco")),
-        (BadInputError, "on pybullet", lambda: record(other, "mujoco")),
-    )
+    refused((BadInputError, "on pybullet", lambda: record(other, "mujoco")))
+
+
+def test_a_recording_in_a_recording_is_refused() -> None:
     nested = 'from statemachine.lab.probes.calls import record\nrecord("", "mujoco")'
-    assert "cannot record another" in str(record(nested, "mujoco").error)
+    assert isinstance(record(nested, "mujoco").error, BadInputError)
 
 
-def test_statements_are_those_that_were_typed() -> None:
-    function = "@lambda f: f\ndef g():\n    return '''\n  x'''"
-    recording = record(f"a = 1; b = 2\n\n# a comment\n{function}\nprint(g(),\n  a)", "mujoco")
-    assert [(each.line, each.source) for each in recording.statements] == [
+FUNCTION = "@lambda f: f\ndef g():\n    return '''\n  x'''"
+
+
+@pytest.fixture
+def typed() -> Recording:
+    """The recording of code that calls no engine."""
+    code = f"a = 1; b = 2\n\n# a comment\n{FUNCTION}\nprint(g(),\n  a)"
+    return record(code, "mujoco")
+
+
+def test_statements_are_those_that_were_typed(typed: Recording) -> None:
+    assert [(each.line, each.source) for each in typed.statements] == [
         (1, "a = 1"),
         (1, "b = 2"),
-        (4, function),
+        (4, FUNCTION),
         (8, "print(g(),\n  a)"),
     ]
-    assert recording.printed == "\n  x 1\n"
-    assert not any(each.calls or each.changed for each in recording.statements)
+
+
+def test_what_a_run_prints_is_recorded(typed: Recording) -> None:
+    assert typed.printed == "\n  x 1\n"
+
+
+def test_code_without_an_engine_calls_and_changes_nothing(typed: Recording) -> None:
+    assert not any(each.calls or each.changed for each in typed.statements)
 
 
 def page_of(*engines_: str, code: str = "") -> tuple[Page, str]:
@@ -527,27 +601,33 @@ def page_of(*engines_: str, code: str = "") -> tuple[Page, str]:
     return page, shown(page)
 
 
-def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
+@pytest.fixture(scope="module")
+def both_pages() -> tuple[Page, str]:
+    """The page of a forward, a write, a read and some steps on both engines, and its text."""
+    need_engine("pybullet")
     code = "sm.forward(model, data)\ndata.qpos[1] = 0.8\nprint(data.qacc)\nsm.step(model, data, 7)"
-    page, text = page_of("mujoco", "pybullet", code=code)
-    assert max(map(len, text.splitlines())) <= 80
-    rows = blocks(page, Table)[-1].rows
+    return page_of("mujoco", "pybullet", code=code)
+
+
+def test_a_page_counts_the_calls_of_a_line(both_pages: tuple[Page, str]) -> None:
+    rows = blocks(both_pages[0], Table)[-1].rows
     assert ("  stepSimulation", "7") in [tuple(row[:2]) for row in rows]
-    flat = " ".join(text.split())
-    assert_not_in(flat, "pybullet: No call. Nothing changed.", "import statemachine")
-    assert_in(
-        flat,
-        "pybullet: No call yet. All that is derived",
-        "Changed: data.qpos[1], and",
-        'backend="mujoco"',
-        'backend="pybullet"',
-        "Its steps in this run: 0.",
-        "Its steps in this run: 1.",
-        "Its own steps there: 0.",
-    )
+
+
+def test_a_page_shows_each_line_once_with_the_engine_that_differs(
+    both_pages: tuple[Page, str],
+) -> None:
+    text = both_pages[1]
+    assert max(map(len, text.splitlines())) <= 80
+    assert_in(text, 'backend="mujoco"', 'backend="pybullet"', "data.qpos[1]")
+    assert "import statemachine" not in text
+
+
+def test_a_page_says_how_many_steps_an_engine_took_itself(both_pages: tuple[Page, str]) -> None:
+    flat = " ".join(both_pages[1].split())
+    assert_in(flat, "in this run: 0.", "in this run: 1.", "steps there: 0.")
 
 
 def test_a_page_says_why_the_run_ended() -> None:
     _, text = page_of("mujoco", code="sm.step(model, data, 0)")
-    assert "The run ended there: nstep" in " ".join(text.split())
-    assert "mujoco: " not in text.replace("on mujoco", "")
+    assert "nstep" in " ".join(text.split()).partition("ended there: ")[2]

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -100,17 +101,20 @@ def test_a_solution_passes_or_is_told_what_is_wrong(
     assert not any(re.search(absurd, text) for text in texts), texts
 
 
-def test_hints_do_not_lead_astray(prepared: Prepare) -> None:
-    wrong = {attempt.name: attempt for attempt in WRONG}
-    for name, misleading in (
+@pytest.mark.parametrize(
+    ("name", "misleading"),
+    [
         ("replay-one_run_under_two_names", "copy"),
         ("replay-command_for_position", "did not begin"),
         ("gravity-speed_for_position", "no gravity"),
         ("gravity-nothing_read_from_the_runs", "no gravity"),
         ("forward-two_readings", "positions is"),
-    ):
-        texts = _verdict(wrong[name], prepared(wrong[name].solves, "mujoco")).remarks
-        assert not any(misleading in text for text in texts), texts
+    ],
+)
+def test_a_hint_does_not_lead_astray(name: str, misleading: str, prepared: Prepare) -> None:
+    wrong = {attempt.name: attempt for attempt in WRONG}[name]
+    texts = _verdict(wrong, prepared(wrong.solves, "mujoco")).remarks
+    assert not any(misleading in text for text in texts), texts
 
 
 def test_a_command_that_was_written_for_nothing_is_mentioned(prepared: Prepare) -> None:
@@ -132,7 +136,7 @@ import statemachine as sm
 
 
 def _grade(folder: Path, *functions: str, limit: float = 5.0) -> dict[str, Judgement]:
-    """The judgements on a file of these functions, by name; `RIGHT.f` is the solution's."""
+    """Return the judgements on a file of these functions, by name; `RIGHT.f` is the solution's."""
     file = folder / "student.py"
     right = f"RIGHT = {{}}; exec({SOLUTION.read_text(encoding='utf-8')!r}, RIGHT)\n"
     file.write_text(_HEAD + right + "\n".join(functions), encoding="utf-8")
@@ -277,7 +281,7 @@ def test_what_is_handed_in_is_judged(name: str, tmp_path: Path) -> None:
 
 
 def test_what_does_not_get_ready_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording, "_CHILD", "import os, sys; os._exit(7)")
+    monkeypatch.setattr(recording, "CHILD_PROGRAM", "import os, sys; os._exit(7)")
     for judgement in exercise.run(SOLUTION).functions:
         assert not judgement.judged
         assert_in(
@@ -336,35 +340,65 @@ def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) 
     assert (list(here.iterdir()), processes_with(here)) == ([], [])
 
 
-def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
-    written_all(tmp_path, {"bob.py": SOLUTION.read_text("utf-8"), "notes.txt": "hello"})
+@dataclass(frozen=True)
+class Judged:
+    """What a file is judged to be, and where it lay.
+
+    Attributes:
+        folder: Where the file lay.
+        found: The judgements by function.
+    """
+
+    folder: Path
+    found: dict[str, Judgement]
+
+
+@pytest.fixture(scope="module")
+def reader(tmp_path_factory: pytest.TempPathFactory) -> Judged:
+    """A file of which three functions read somebody's answers, and one reads another file."""
+    folder = tmp_path_factory.mktemp("reader")
+    written_all(folder, {"bob.py": SOLUTION.read_text("utf-8"), "notes.txt": "hello"})
     source = "exec(open({!r}).read(), n := {{}}); return n[{!r}]"
     beside = "exec(open(__file__.replace('student', 'bob')).read(), n := {}); return n"
     found = _grade(
-        tmp_path,
+        folder,
         "def demo_gravity(model, seconds=4):\n    "
         + source.format(str(SOLUTION), "demo_gravity")
         + "(model, seconds)",
         f"def demo_state(model):\n    {beside}['demo_state'](model)",
         "def demo_forward(model):\n    import bob\n    return bob.demo_forward(model)",
         "def demo_replay(model, ctrl, nstep=600):\n"
-        f"    open({str(tmp_path / 'notes.txt')!r}).read()\n"
+        f"    open({str(folder / 'notes.txt')!r}).read()\n"
         "    return RIGHT['demo_replay'](model, ctrl, nstep)",
     )
-    for name in ("gravity", "state", "forward"):
-        assert not found[name].judged
-        assert _one(found[name]).startswith("not graded: it tried to open ")
-    assert "solutions/step_loop.py, which was not handed in with it" in _one(found["gravity"])
-    for name in ("state", "forward"):
-        assert f"{(tmp_path / 'bob.py').as_posix()}, which" in _one(found[name])
-    # Any other file is not there either, and somebody is to look.
-    assert re.match("line 14: (FileNotFoundError|PermissionError)", found["replay"].remarks[0])
-    assert found["replay"].remarks[1:] == (
-        f"please look at this: it tried to open {(tmp_path / 'notes.txt').as_posix()}",
-    )
+    return Judged(folder, found)
 
 
-def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [("gravity", "solutions/step_loop.py"), ("state", "bob.py"), ("forward", "bob.py")],
+)
+def test_what_reads_somebody_s_answers_is_not_graded_but_told_the_file(
+    name: str, file: str, reader: Judged
+) -> None:
+    judgement = reader.found[name]
+    assert not judgement.judged
+    assert _one(judgement).startswith("not graded: ")
+    whole = file if "/" in file else (reader.folder / file).as_posix()
+    assert f"{whole}, which" in _one(judgement)
+
+
+def test_another_file_is_not_there_and_somebody_is_to_look(reader: Judged) -> None:
+    first, *more = reader.found["replay"].remarks
+    assert re.match("line 14: (FileNotFoundError|PermissionError)", first)
+    (look,) = more
+    assert look.startswith(exercise.LOOK)
+    assert look.endswith((reader.folder / "notes.txt").as_posix())
+
+
+@pytest.fixture
+def several_files(tmp_path: Path) -> Path:
+    """A folder with a file of a student, what it names, and what it does not."""
     empty = "deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt", "env/pyvenv.cfg"
     texts = {
         "student.py": "import helper\nfrom tools import more\nDATA = 'table.json'\n",
@@ -372,41 +406,80 @@ def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
         "tools/__init__.py": "from more import demo_gravity\n",
         "more.py": "def demo_gravity(model): return bob\n",
     }
-    written_all(tmp_path, texts | dict.fromkeys((*empty, "env/x.py"), ""))
-    assert set(recording.named_by(tmp_path / "student.py")) == {
+    return written_all(tmp_path, texts | dict.fromkeys((*empty, "env/x.py"), ""))
+
+
+def test_what_a_file_names_is_given_along_but_no_other_exercise(several_files: Path) -> None:
+    assert set(recording.named_by(several_files / "student.py")) == {
         "student.py", "helper.py", "deeper.py", "table.json", "tools/__init__.py", "tools.txt",
     }  # fmt: skip
-    whole = recording.in_folder(tmp_path)
-    assert {"more.py", "unnamed.py", "tools/__init__.py"} < set(whole)
-    assert not {"env/x.py", ".hidden.py"} & set(whole)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="it is shut in on Linux only")
-def test_it_reaches_neither_us_nor_the_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_of_a_student_s_folder_all_but_hidden_files_and_environments_is_given(
+    several_files: Path,
 ) -> None:
-    home = tmp_path / "home"
+    whole = set(recording.in_folder(several_files))
+    assert {"more.py", "unnamed.py", "tools/__init__.py"} < whole
+    assert not {"env/x.py", ".hidden.py"} & whole
+
+
+@pytest.fixture(scope="module")
+def reaching(tmp_path_factory: pytest.TempPathFactory) -> Judged:
+    """A file that stops its judge, kills its parent, and writes into two folders of its user."""
+    folder = tmp_path_factory.mktemp("reaching")
+    home = folder / "home"
     home.mkdir()
-    monkeypatch.setenv("HOME", str(home))
     kill = "ctypes.CDLL(None).kill"
-    found = _grade(
-        tmp_path,
-        f"def demo_gravity(model, seconds=4):\n    {kill}({os.getpid()}, 19)\n    return 1",
-        f"def demo_state(model):\n    {kill}(os.getppid(), 19)\n    {kill}(os.getppid(), 9)",
-        "def demo_forward(model):\n"
-        "    open(os.path.expanduser('~/left'), 'w').close()\n"
-        "    return RIGHT['demo_forward'](model)",
-        f"def demo_replay(model, ctrl, nstep=600):\n    open({str(tmp_path / 'left')!r}, 'w')",
-    )
-    assert not any(found[name].passed for name in ("gravity", "state", "replay"))
-    assert found["forward"].passed
-    assert list(home.iterdir()) == []
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setenv("HOME", str(home))
+        found = _grade(
+            folder,
+            f"def demo_gravity(model, seconds=4):\n    {kill}({os.getpid()}, 19)\n    return 1",
+            f"def demo_state(model):\n    {kill}(os.getppid(), 19)\n    {kill}(os.getppid(), 9)",
+            "def demo_forward(model):\n"
+            "    open(os.path.expanduser('~/left'), 'w').close()\n"
+            "    return RIGHT['demo_forward'](model)",
+            f"def demo_replay(model, ctrl, nstep=600):\n    open({str(folder / 'left')!r}, 'w')",
+        )
+    return Judged(folder, found)
+
+
+linux_only = pytest.mark.skipif(sys.platform != "linux", reason="it is shut in on Linux only")
+
+
+@pytest.fixture
+def shut_in() -> None:
+    """Only where this system lets a user make namespaces."""
     if not sandbox.shut_in():
         pytest.skip("this system does not let a user make namespaces")
-    assert "No such file" in _one(found["replay"])
-    assert _one(found["gravity"]).startswith("it returns an int")
-    assert _one(found["state"]).startswith("it returns nothing")
-    assert not (tmp_path / "left").exists()
+
+
+@linux_only
+@pytest.mark.parametrize("name", ["gravity", "state", "replay"])
+def test_what_reaches_out_does_not_pass(name: str, reaching: Judged) -> None:
+    assert not reaching.found[name].passed
+
+
+@linux_only
+def test_what_it_writes_at_home_is_not_there_afterwards(reaching: Judged) -> None:
+    assert reaching.found["forward"].passed
+    assert list((reaching.folder / "home").iterdir()) == []
+
+
+@linux_only
+@pytest.mark.usefixtures("shut_in")
+@pytest.mark.parametrize(
+    ("name", "says"), [("gravity", "it returns an int"), ("state", "it returns nothing")]
+)
+def test_signals_to_other_processes_reach_nobody(name: str, says: str, reaching: Judged) -> None:
+    assert _one(reaching.found[name]).startswith(says)
+
+
+@linux_only
+@pytest.mark.usefixtures("shut_in")
+def test_folders_of_the_machine_are_not_there(reaching: Judged) -> None:
+    assert "No such file" in _one(reaching.found["replay"])
+    assert not (reaching.folder / "left").exists()
 
 
 @pytest.mark.parametrize(
@@ -445,7 +518,7 @@ def test_a_file_that_is_saved_as_utf_16_is_told_as_any_other_encoding(
     file = tmp_path / "student.py"
     file.write_text("def demo_gravity(model, seconds): pass\n", encoding="utf-16")
     worlds, rights = prepared("demo_gravity", "mujoco")
-    answers = answers_of_file(exercise._python_file(file), "demo_gravity", worlds)
+    answers = answers_of_file(exercise.python_file(file), "demo_gravity", worlds)
     judgement = judged("demo_gravity", worlds, rights, answers)
     assert "it is saved as UTF-16" in _one(judgement)
     assert judgement is not None
@@ -471,9 +544,13 @@ def test_a_missing_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     refused((MissingEngineError, r"libnothing\.so\.1 is missing", lambda: exercise.run(SOLUTION)))
 
 
-def test_the_exercise_runs_as_a_program(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+RunFile = Callable[..., tuple[int, list[str]]]
+
+
+@pytest.fixture
+def run_file(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> RunFile:
+    """Run the exercise's file as a program: its exit code, and the lines that it prints."""
+
     def run(file: Path, *arguments: str) -> tuple[int, list[str]]:
         monkeypatch.setattr(sys, "argv", [str(file), *arguments])
         with pytest.raises(SystemExit) as ended:
@@ -484,17 +561,34 @@ def test_the_exercise_runs_as_a_program(
         assert ended.value.code == 2 or max(map(len, lines)) <= 80
         return int(ended.value.code or 0), lines
 
-    code, lines = run(TEMPLATE)
+    return run
+
+
+def test_the_template_says_what_is_to_be_written(run_file: RunFile) -> None:
+    code, lines = run_file(TEMPLATE)
     assert (code, sum("TODO(you)" in line for line in lines)) == (0, 4)
-    assert run(TEMPLATE, "--gravity") == (
-        1,
-        ["demo_gravity: TODO(you): leave the arm alone, with servos and without"],
-    )
-    assert run(TEMPLATE, "--state", "--backend", "mujcoo")[0] == 2
-    shown = {name: run(SOLUTION, f"--{name}") for name in ("gravity", "state", "forward", "replay")}
-    shown |= {name: run(TEMPLATE, f"--{name}") for name in ("hold", "speed")}
-    assert {code for code, _ in shown.values()} == {0}
-    assert shown["replay"][1][-1] == "Your answer: equal"
+
+
+def test_a_function_that_is_to_be_written_is_one_line(run_file: RunFile) -> None:
+    code, (line,) = run_file(TEMPLATE, "--gravity")
+    assert code == 1
+    assert line.startswith("demo_gravity: TODO(you)")
+
+
+def test_a_program_refuses_an_engine_that_is_mistyped(run_file: RunFile) -> None:
+    assert run_file(TEMPLATE, "--state", "--backend", "mujcoo")[0] == 2
+
+
+@pytest.mark.parametrize("name", ["gravity", "state", "forward", "replay"])
+def test_each_function_of_the_solution_is_shown(name: str, run_file: RunFile) -> None:
+    code, lines = run_file(SOLUTION, f"--{name}")
+    assert code == 0
+    assert name != "replay" or lines[-1] == "Your answer: equal"
+
+
+@pytest.mark.parametrize("name", ["hold", "speed"])
+def test_what_needs_no_answer_is_shown_by_the_template(name: str, run_file: RunFile) -> None:
+    assert run_file(TEMPLATE, f"--{name}")[0] == 0
 
 
 def test_an_error_in_a_script_is_a_line_and_a_hint_and_all_of_it_if_asked(tmp_path: Path) -> None:
@@ -559,7 +653,7 @@ def test_no_object_gets_through() -> None:
 
 
 def _places(found: Any) -> list[tuple[Any, Any]]:
-    """Every container with each of its keys."""
+    """Return every container with each of its keys."""
     if not isinstance(found, (dict, list)):
         return []
     keys = list(found) if isinstance(found, dict) else range(len(found))

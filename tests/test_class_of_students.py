@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
-from statemachine.course.grading.class_table import NOTHING
+from statemachine.course.grading.class_table import NOTHING, ClassEntry
 from statemachine.course.grading.judges import JUDGES
 from statemachine.course.grading.overview import ClassResult
 from statemachine.course.grading.request import ClassRequest, answer_class
@@ -14,50 +16,105 @@ from statemachine.course.grading.request import ClassRequest, answer_class
 from .support.class_of_students import COPIES, SIZE, write_class
 from .support.requirements import need_engine
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
-def test_a_class_of_41_is_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+
+@dataclass(frozen=True)
+class JudgedClass:
+    """A class that was judged once.
+
+    Attributes:
+        request: What was asked.
+        result: What came of it.
+        verdicts: The folder that keeps them.
+    """
+
+    request: ClassRequest
+    result: ClassResult
+    verdicts: Path
+
+    @property
+    def entries(self) -> dict[str, ClassEntry]:
+        """Return the entries by name."""
+        return {entry.name: entry for entry in self.result.entries}
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> JudgedClass:
+    """A class of 41, judged into a table."""
     need_engine("mujoco")
-    monkeypatch.setenv("STATEMACHINE_JUDGED", str(tmp_path / "judged"))
-    folder = write_class(tmp_path / "class")
-    request = ClassRequest((folder,), table=tmp_path / "grades.csv")
-    result = answer_class(request)
-    entries = {entry.name: entry for entry in result.entries}
-    assert len(entries) == SIZE
-    # Copies are right, whoever wrote them first: nothing but the likeness tells of them.
+    folder = tmp_path_factory.mktemp("evening")
+    request = ClassRequest((write_class(folder / "class"),), table=folder / "grades.csv")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setenv("STATEMACHINE_JUDGED", str(folder / "judged"))
+        return JudgedClass(request, answer_class(request), folder / "judged")
+
+
+def test_a_class_of_41_is_judged(judged: JudgedClass) -> None:
+    assert len(judged.entries) == SIZE
+    assert NOTHING not in [entry.refusal for entry in judged.result.entries]
+
+
+def test_copies_are_right_and_nothing_but_their_likeness_tells_of_them(
+    judged: JudgedClass,
+) -> None:
     for number in range(1, COPIES + 1):
-        assert entries[f"{number:02}_copy.py"].right == len(JUDGES)
-        assert entries[f"{number:02}_copy.py"].looks == ()
-    (group,) = result.alike
+        copy = judged.entries[f"{number:02}_copy.py"]
+        assert (copy.right, copy.looks) == (len(JUDGES), ())
+    (group,) = judged.result.alike
     assert len(group.students) == COPIES
-    _assert_files_that_do_not_run(result)
-    for each in result.functions:
+
+
+@pytest.mark.parametrize(
+    ("name", "remark"),
+    [
+        ("31_no_import.py", "nosuchmodule"),
+        ("32_endless.py", "a loop that does not end?"),
+        ("37_template.py", "not written"),
+    ],
+)
+def test_a_file_that_does_not_run_is_told_why(name: str, remark: str, judged: JudgedClass) -> None:
+    assert remark in judged.entries[name].remarks[0].text
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("33_empty.py", 1),
+        ("34_no_function.py", 1),
+        ("38_syntax.py", 1),
+        ("35_prints.py", 0),
+        ("40_helper", 0),
+    ],
+)
+def test_a_file_has_a_remark_or_none(name: str, count: int, judged: JudgedClass) -> None:
+    assert len(judged.entries[name].remarks) == count
+
+
+def test_what_is_no_exercise_is_not_judged(judged: JudgedClass) -> None:
+    students = {reason.students for reason in judged.result.unjudged}
+    assert students == {("39_notebook.ipynb",), ("41_two",)}
+
+
+def test_each_student_is_counted_once_at_each_function(judged: JudgedClass) -> None:
+    for each in judged.result.functions:
         assert each.right + each.wrong + each.not_written + each.not_judged == SIZE
         assert each.right >= COPIES
-    counts = [mistake.count for mistake in result.mistakes]
+
+
+def test_the_mistake_of_most_students_is_first(judged: JudgedClass) -> None:
+    counts = [mistake.count for mistake in judged.result.mistakes]
     assert counts == sorted(counts, reverse=True)
     assert counts[0] >= 3
-    assert NOTHING not in [entry.refusal for entry in result.entries]
-    # Once more: nothing is judged, and nothing is another.
-    monkeypatch.setattr("statemachine.course.grading.recording.record", _never)
-    for table in (request.table, None):
-        again = answer_class(ClassRequest((folder,), table=table))
-        assert again == result
 
 
-def _never(*_: object) -> None:
-    raise AssertionError("something was judged again")
-
-
-def _assert_files_that_do_not_run(result: ClassResult) -> None:
-    remarks = {entry.name: [each.text for each in entry.remarks] for entry in result.entries}
-    assert "nosuchmodule" in remarks["31_no_import.py"][0]
-    assert "a loop that does not end?" in remarks["32_endless.py"][0]
-    assert len(remarks["33_empty.py"]) == len(remarks["34_no_function.py"]) == 1
-    assert remarks["35_prints.py"] == remarks["40_helper"] == []
-    assert remarks["37_template.py"] == ["not written"]
-    assert len(remarks["38_syntax.py"]) == 1
-    assert {reason.students for reason in result.unjudged} == {
-        ("39_notebook.ipynb",),
-        ("41_two",),
-    }
+@pytest.mark.parametrize("with_table", [True, False])
+def test_a_class_that_was_judged_is_not_judged_again(
+    with_table: bool, judged: JudgedClass, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the table, or from the verdicts that are kept without one."""
+    monkeypatch.setenv("STATEMACHINE_JUDGED", str(judged.verdicts))
+    record = Mock(side_effect=AssertionError("something was judged again"))
+    monkeypatch.setattr("statemachine.course.grading.recording.record", record)
+    request = replace(judged.request, table=judged.request.table if with_table else None)
+    assert answer_class(request) == judged.result

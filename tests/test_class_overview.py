@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -28,6 +29,7 @@ from statemachine.show.as_json import dumps
 from statemachine.show.blocks import Section, Table, Verdict
 from statemachine.show.html import report
 
+from .support.claims import assert_in
 from .support.pages import blocks, shown
 
 GRAVITY, STATE, FORWARD, REPLAY = JUDGES
@@ -35,7 +37,7 @@ RIGHT = "all is well"
 
 
 def _judgement(function: str, said: str) -> Judgement:
-    """A judgement: of what is right, not written, not judged ("? why"), or wrong with remarks."""
+    """Return a judgement: right, not written, not judged ("? why"), or wrong with remarks."""
     if said == RIGHT:
         return Judgement(function, True, True, (RIGHT,))
     if said == "":
@@ -76,8 +78,6 @@ def test_right_and_wrong_are_counted_for_each_function(result: ClassResult) -> N
         FunctionCount(FORWARD, right=0, wrong=5, not_written=1, not_judged=2),
         FunctionCount(REPLAY, right=2, wrong=3, not_written=1, not_judged=2),
     )
-    for each in result.functions:
-        assert each.right + each.wrong + each.not_written + each.not_judged == len(ENTRIES)
 
 
 def test_remarks_that_differ_in_figures_are_one_mistake(result: ClassResult) -> None:
@@ -159,15 +159,22 @@ def test_with_a_roster_files_of_nobody_on_it_are_not_counted() -> None:
     assert result.mistakes[0].students == ("Ann",)
 
 
-def test_groups_are_named_with_what_is_no_sign_of_copying(result: ClassResult) -> None:
-    texts = " ".join(shown(class_page(result)).split())
-    assert "2 are alike, 95 to 100%, which short functions often are: ann, bob." in texts
-    assert "solution" not in texts
+def test_a_group_is_named_with_the_range_of_its_likeness(result: ClassResult) -> None:
+    text = " ".join(shown(class_page(result)).split())
+    assert_in(text, "95 to 100%", "ann, bob.")
+
+
+def test_a_group_of_short_functions_is_no_sign_of_copying(result: ClassResult) -> None:
+    text = " ".join(shown(class_page(result)).split())
+    assert "short functions" in text
+    assert "solution" not in text
+
+
+def test_a_group_that_is_like_the_solution_says_so() -> None:
     same = replace(GROUP, least=1.0, is_short=False, is_solution=True)
-    texts = shown(class_page(class_result(ENTRIES, (same,))))
-    assert "2 are alike, 100%: ann, bob." in texts
-    assert "short functions" not in texts
-    assert "solution" in texts
+    text = " ".join(shown(class_page(class_result(ENTRIES, (same,)))).split())
+    assert_in(text, "alike, 100%: ann, bob.", "solution")
+    assert "short functions" not in text
 
 
 def test_almost_the_same_is_not_called_the_same() -> None:
@@ -175,37 +182,54 @@ def test_almost_the_same_is_not_called_the_same() -> None:
     assert "alike, 99%" in shown(class_page(class_result(ENTRIES, (group,))))
 
 
-def test_all_of_it_is_in_the_json(result: ClassResult) -> None:
-    document = json.loads(dumps(result))
-    assert document["functions"][0] == {
-        "function": GRAVITY, "right": 2, "wrong": 2, "not_written": 1, "not_judged": 3,
-    }  # fmt: skip
-    assert document["mistakes"][1]["count"] == 2
-    assert document["alike"][0]["students"] == ["ann", "bob"]
-    assert document["unjudged"][1] == {"reason": "a notebook", "students": ["fay", "gus"]}
-    assert document["ignored"] == ["notes.txt"]
-    assert document["complete"] is False
-    assert [each["name"] for each in document["entries"]] == [each.name for each in ENTRIES]
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (
+            ("functions", 0),
+            {"function": GRAVITY, "right": 2, "wrong": 2, "not_written": 1, "not_judged": 3},
+        ),
+        (("mistakes", 1, "count"), 2),
+        (("alike", 0, "students"), ["ann", "bob"]),
+        (("unjudged", 1), {"reason": "a notebook", "students": ["fay", "gus"]}),
+        (("ignored",), ["notes.txt"]),
+        (("complete",), False),
+        (("entries", 0, "name"), "ann"),
+    ],
+    ids=lambda path: "-".join(map(str, path)) if isinstance(path, tuple) else "",
+)
+def test_each_part_of_a_result_is_in_the_json(
+    path: tuple[str | int, ...], value: Any, result: ClassResult
+) -> None:
+    part = json.loads(dumps(result))
+    for key in path:
+        part = part[key]
+    assert part == value
 
 
-def test_the_answer_and_the_table_are_first_and_the_remarks_last(result: ClassResult) -> None:
+def test_the_answer_and_the_table_are_first(result: ClassResult) -> None:
     page = class_page(result)
     assert page.headline is not None
-    assert page.headline.lead == "0 of 8 files have all functions right"
+    assert page.headline.lead.startswith("0 of 8 files")
     assert isinstance(page.blocks[0], Table)
     assert page.blocks[0].headers[0] == "file"
-    tables = blocks(page, Table)
+
+
+def test_the_tables_are_of_students_functions_and_mistakes(result: ClassResult) -> None:
+    tables = blocks(class_page(result), Table)
     assert [table.headers[-1] for table in tables] == ["replay", "not judged ?", "who"]
-    last = page.blocks[-1]
+
+
+def test_the_remarks_are_folded_at_the_end(result: ClassResult) -> None:
+    last = class_page(result).blocks[-1]
     assert isinstance(last, Section)
-    assert [table.headers[-1] for table in last.blocks if isinstance(table, Table)] == [
-        "what is not right"
-    ]
-    text = shown(page)
-    assert text.index("0 of 8 files") < text.index("ann") < text.index("4.5 mm away")
-    html = report(page)
-    for text in ("reading 2: 4.5 mm away", "reading …: … mm away", "which short functions", "eve"):
-        assert text in html.replace("\u00a0", " ")
+    (table,) = [block for block in last.blocks if isinstance(block, Table)]
+    assert table.headers[-1] == "what is not right"
+
+
+def test_the_html_of_a_class_has_mistakes_and_remarks(result: ClassResult) -> None:
+    html = report(class_page(result)).replace("\u00a0", " ")
+    assert_in(html, "reading 2: 4.5 mm away", "reading …: … mm away", "short functions", "eve")
 
 
 def test_a_row_of_the_class_fits_80_columns(result: ClassResult) -> None:

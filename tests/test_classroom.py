@@ -46,7 +46,7 @@ from .support.requirements import ROOT
 
 
 def _table(entries: Sequence[ClassEntry]) -> list[dict[str, str]]:
-    """The rows of a table of grades, as a program reads them."""
+    """Return the rows of a table of grades, as a program reads them."""
     return list(csv.DictReader(io.StringIO(csv_text(rows_of(entries)))))
 
 
@@ -77,7 +77,9 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Files are judged by what is in them, in no time; the names of those that were."""
     seen: list[str] = []
 
-    def judge(self: ExerciseJudge, file: Path, progress: Any = None, own: Any = None) -> Grade:
+    def judge(
+        self: ExerciseJudge, file: Path, progress: Any = None, submitted_files: Any = None
+    ) -> Grade:
         seen.append(Path(file).name)
         text = Path(file).read_text()
         if "refuse" in text:
@@ -93,23 +95,51 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
-def test_what_is_a_submission(folder: Path) -> None:
-    found = {each.name: each for each in submissions([folder])}
+@pytest.fixture
+def found(folder: Path) -> dict[str, Submission]:
+    """The submissions of the folder, by name."""
+    return {each.name: each for each in submissions([folder])}
+
+
+def test_each_folder_and_each_python_file_is_a_submission(found: dict[str, Submission]) -> None:
     assert list(found) == ["ann", "bob", "cy", "dee", "eve.py", "fay.py"]
-    assert found["ann"].path == folder / "ann" / "my_solution.py"
-    assert found["bob"].path == folder / "bob" / "deep" / "step_loop.py"
+
+
+@pytest.mark.parametrize(
+    ("name", "path"), [("ann", "ann/my_solution.py"), ("bob", "bob/deep/step_loop.py")]
+)
+def test_the_file_of_a_folder_is_the_one_with_the_functions(
+    name: str, path: str, folder: Path, found: dict[str, Submission]
+) -> None:
+    assert found[name].path == folder / path
+
+
+def test_a_folder_without_the_functions_is_refused(found: dict[str, Submission]) -> None:
     assert_has(found["cy"], path=None, refusal="no Python file in it has one of the functions")
-    assert found["dee"].refusal == "2 files in it have the functions: a.py, b.py"
+
+
+def test_a_folder_with_two_files_of_the_functions_is_refused_with_their_names(
+    found: dict[str, Submission],
+) -> None:
+    assert found["dee"].refusal.endswith(": a.py, b.py")
+
+
+def test_a_file_that_is_named_twice_is_one_submission(folder: Path) -> None:
     files = [folder / "eve.py", folder / "fay.py", folder / "eve.py"]
     assert [each.path for each in submissions(files)] == files[:2]
-    refused(
-        (BadInputError, "no file or folder", lambda: submissions([folder / "nobody"])),
-        (BadInputError, "no Python files in", lambda: submissions([folder / "cy"])),
-    )
 
 
-def test_the_folder_of_one_student_is_no_class(tmp_path: Path, judged: list[str]) -> None:
-    ida = written_all(
+@pytest.mark.parametrize(
+    ("name", "says"), [("nobody", "no file or folder"), ("cy", "no Python files in")]
+)
+def test_where_there_is_no_submission_it_is_refused(name: str, says: str, folder: Path) -> None:
+    refused((BadInputError, says, lambda: submissions([folder / name])))
+
+
+@pytest.fixture
+def ida(tmp_path: Path) -> Path:
+    """The folder of one student: the exercise, its tests, and a helper."""
+    return written_all(
         tmp_path / "ida",
         {
             "step_loop.py": SOLUTION.read_text(),
@@ -117,14 +147,26 @@ def test_the_folder_of_one_student_is_no_class(tmp_path: Path, judged: list[str]
             "helper.py": "X = 1\n",
         },
     )
+
+
+def test_the_folder_of_one_student_is_one_submission(ida: Path) -> None:
     assert is_one_students(ida)
     (found,) = submissions([ida])
     assert_has(found, name="ida", path=ida / "step_loop.py", folder=ida)
-    assert [each.name for each in submissions([ida, tmp_path / "ida"])] == [ida.as_posix()]
     assert not_looked_at([ida]) == []
+
+
+def test_the_folder_of_one_student_that_is_named_twice_is_one_submission(ida: Path) -> None:
+    assert [each.name for each in submissions([ida, ida.parent / "ida"])] == [ida.as_posix()]
+
+
+def test_a_folder_with_the_exercise_twice_is_not_one_students(ida: Path) -> None:
     written_all(ida, {"old/step_loop.py": TEMPLATE.read_text()})
-    assert not is_one_students(ida)  # whose is the other one?
-    assert not is_one_students(tmp_path)
+    assert not is_one_students(ida)
+
+
+def test_a_folder_of_folders_is_not_one_students(ida: Path) -> None:
+    assert not is_one_students(ida.parent)
 
 
 def test_a_class_beside_the_template_stays_a_class(folder: Path) -> None:
@@ -246,9 +288,9 @@ def test_remarks_are_a_line_a_function_uncut_and_details_have_all(tmp_path: Path
     assert read(tmp_path / "t.csv") == {(entry.sha256, "mujoco"): entry}
 
 
-def test_a_roster_gives_every_student_a_row(
-    folder: Path, judged: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def with_roster(folder: Path, judged: list[str], tmp_path: Path) -> tuple[list[str], Path]:
+    """The words of a command that judges a class with a roster, and the table that it writes."""
     written_all(
         folder,
         dict.fromkeys(
@@ -260,40 +302,66 @@ def test_a_roster_gives_every_student_a_row(
         "name;number;file\nAnn Smith;1;ann\nBo Lee;41017\nCy;41018\n\nZoë;99;\n",
         encoding="utf-8-sig",
     )
-    for _ in range(2):  # a row without a file is not a verdict on another one
-        main(["check", str(folder), "--roster", str(roster), "--csv", str(table)])
-        assert "4 students have all functions right" in capsys.readouterr().out
-        rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
-        found = {row["student"]: row for row in rows if row["student"]}
-        assert [row["student"] for row in rows[:4]] == ["Ann Smith", "Bo Lee", "Cy", "Zoë"]
-        for name, column, says in (
-            ("Ann Smith", "file", "ann"),
-            ("Bo Lee", "file", "Lee_Bo_41017_assignment.py"),
-            ("Cy", "remarks", "2 may be theirs: x_41018.py, x_again_41018.py"),
-            ("Cy", "right", ""),
-            ("Zoë", "right", "0"),
-            ("Zoë", "remarks", "handed in nothing"),
-        ):
-            assert found[name][column] == says, name
-        assert {row["file"] for row in rows[4:]} == {
-            "bob", "cy", "dee", "eve.py", "fay.py", "x_41018.py", "x_again_41018.py",
-        }  # fmt: skip
-    refused(
-        (
-            BadInputError,
-            r"the roster nowhere\.csv cannot be read",
-            lambda: enrolled([], tmp_path / "nowhere.csv"),
-        )
-    )
+    return ["check", str(folder), "--roster", str(roster), "--csv", str(table)], table
 
 
-def test_tests_and_predictions_are_in_the_same_table(
-    folder: Path, judged: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def rows_of_table(table: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "says"),
+    [
+        ("Ann Smith", "file", "ann"),
+        ("Bo Lee", "file", "Lee_Bo_41017_assignment.py"),
+        ("Cy", "remarks", "2 may be theirs: x_41018.py, x_again_41018.py"),
+        ("Cy", "right", ""),
+        ("Zoë", "right", "0"),
+        ("Zoë", "remarks", "handed in nothing"),
+    ],
+)
+def test_a_student_on_the_roster_is_found_by_file_name_or_number(
+    name: str, column: str, says: str, with_roster: tuple[list[str], Path]
 ) -> None:
+    main(with_roster[0])
+    found = {row["student"]: row for row in rows_of_table(with_roster[1]) if row["student"]}
+    assert found[name][column] == says
+
+
+def test_students_on_the_roster_are_first_and_then_files_of_nobody_on_it(
+    with_roster: tuple[list[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(with_roster[0])
+    assert "4 students" in capsys.readouterr().out
+    rows = rows_of_table(with_roster[1])
+    assert [row["student"] for row in rows[:4]] == ["Ann Smith", "Bo Lee", "Cy", "Zoë"]
+    assert {row["file"] for row in rows[4:]} == {
+        "bob", "cy", "dee", "eve.py", "fay.py", "x_41018.py", "x_again_41018.py",
+    }  # fmt: skip
+
+
+def test_a_row_without_a_file_is_no_verdict_on_another_one(
+    with_roster: tuple[list[str], Path],
+) -> None:
+    words, table = with_roster
+    main(words)
+    first = rows_of_table(table)
+    main(words)
+    assert rows_of_table(table) == first
+
+
+def test_a_roster_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    nowhere = tmp_path / "nowhere.csv"
+    refused((BadInputError, r"nowhere\.csv cannot be read", lambda: enrolled([], nowhere)))
+
+
+@pytest.fixture
+def examined(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Tests are examined by what is in them, in no time; the files that were."""
     ran: list[Path] = []
 
-    def examined(file: Path, backend: str, own: dict[str, Path]) -> Examination:
-        assert own[file.name] == file
+    def examine(file: Path, backend: str, submitted_files: dict[str, Path]) -> Examination:
+        assert submitted_files[file.name] == file
         ran.append(file)
         caught = (FailedTest("test_x", "no"),)
         trials = tuple(
@@ -302,10 +370,16 @@ def test_tests_and_predictions_are_in_the_same_table(
         bad = caught if "bad" in file.read_text() else ()
         return Examination(file.name, backend, "4", ("test_x",), bad, () if bad else trials)
 
-    monkeypatch.setattr(classroom, "examine", examined)
+    monkeypatch.setattr(classroom, "examine", examine)
+    return ran
+
+
+@pytest.fixture
+def with_tests(folder: Path) -> Path:
+    """The folder in which some handed in tests and predictions, too."""
     answers = [{"lesson": "a", "question": str(k), "right": k > 0} for k in range(3)]
     record = {"kind": "statemachine predictions", "score": 99, "answers": answers}
-    written_all(
+    return written_all(
         folder,
         {
             "ann/test_arm.py": "good",
@@ -315,19 +389,44 @@ def test_tests_and_predictions_are_in_the_same_table(
             "bob/lesson.json": "{}",
         },
     )
+
+
+def rows_by_file(table: Path) -> dict[str, dict[str, str]]:
+    """Read the rows of a table of grades, by the name of the file."""
+    text = table.read_text("utf-8-sig")
+    return {row["file"]: row for row in csv.DictReader(text.splitlines())}
+
+
+@pytest.mark.usefixtures("judged", "examined")
+@pytest.mark.parametrize(
+    ("name", "tests", "predictions"),
+    [
+        ("ann", "13 of 14; not xyzw", "2 of 3"),  # counted, whatever the score says
+        ("bob", "test_x fails on the arm without a fault",
+         "lesson.json is not a record of predictions"),
+        ("cy", "13 of 14; not xyzw", ""),  # without the functions
+        ("eve.py", "", ""),
+    ],
+)  # fmt: skip
+def test_tests_and_predictions_are_in_the_same_table(
+    name: str, tests: str, predictions: str, with_tests: Path, tmp_path: Path
+) -> None:
     table = tmp_path / "t.csv"
-    for _ in range(2):
-        main(["check", str(folder), "--csv", str(table), "--tests"])
-        rows = {r["file"]: r for r in csv.DictReader(table.read_text("utf-8-sig").splitlines())}
-        for name, tests, predictions in (
-            ("ann", "13 of 14; not xyzw", "2 of 3"),  # counted, whatever the score says
-            ("bob", "test_x fails on the arm without a fault",
-             "lesson.json is not a record of predictions"),
-            ("cy", "13 of 14; not xyzw", ""),  # without the functions
-            ("eve.py", "", ""),
-        ):  # fmt: skip
-            assert (rows[name]["tests"], rows[name]["predictions"]) == (tests, predictions), name
-    assert [file.parent.name for file in ran].count("ann") == 1  # taken over from the table
+    main(["check", str(with_tests), "--csv", str(table), "--tests"])
+    assert_has(rows_by_file(table)[name], tests=tests, predictions=predictions)
+
+
+@pytest.mark.usefixtures("judged")
+def test_tests_that_were_examined_are_taken_over_from_the_table(
+    with_tests: Path, examined: list[Path], tmp_path: Path
+) -> None:
+    table = tmp_path / "t.csv"
+    words = ["check", str(with_tests), "--csv", str(table), "--tests"]
+    main(words)
+    first, before = rows_by_file(table), len(examined)
+    main(words)
+    assert rows_by_file(table) == first
+    assert [file.parent.name for file in examined[before:]].count("ann") == 0
 
 
 def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str]) -> None:
@@ -362,41 +461,81 @@ def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
     assert "helper.py, which was not handed in with it" in gus.functions[0].remarks[0]
 
 
-def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> None:
-    table = tmp_path / "grades.csv"
+class Resumed:
+    """A class that is judged into a table, again and again.
 
-    def again(**how: Any) -> list[str]:
-        judged.clear()
-        judge_all(submissions([folder]), "mujoco", table=table, **how)
-        return sorted(judged)
+    Attributes:
+        table: The table.
+    """
 
-    assert again() == ["eve.py", "fay.py", "my_solution.py", "step_loop.py"]
-    text = table.read_text()
-    assert text.startswith("\ufefffile,right")  # by which a spreadsheet knows UTF-8
-    assert again() == []
-    assert table.read_text() == text
-    # What is new or changed, or was judged otherwise, is judged.
+    def __init__(self, folder: Path, table: Path, judged: list[str]) -> None:
+        self.table = table
+        self._folder, self._judged = folder, judged
+
+    def again(self, **how: Any) -> list[str]:
+        """Judge what the table lacks, and return the names of the files that were judged."""
+        self._judged.clear()
+        judge_all(submissions([self._folder]), "mujoco", table=self.table, **how)
+        return sorted(self._judged)
+
+
+@pytest.fixture
+def resumed(folder: Path, tmp_path: Path, judged: list[str]) -> Resumed:
+    """A class that was judged into a table once."""
+    resumed = Resumed(folder, tmp_path / "grades.csv", judged)
+    assert resumed.again() == ["eve.py", "fay.py", "my_solution.py", "step_loop.py"]
+    return resumed
+
+
+def test_a_table_begins_with_what_tells_a_spreadsheet_utf_8(resumed: Resumed) -> None:
+    assert resumed.table.read_text("utf-8").startswith("\ufefffile,right")
+
+
+def test_what_is_in_the_table_is_not_judged_again(resumed: Resumed) -> None:
+    text = resumed.table.read_text()
+    assert resumed.again() == []
+    assert resumed.table.read_text() == text
+
+
+def test_a_file_that_changed_is_judged_again(resumed: Resumed, folder: Path) -> None:
     (folder / "eve.py").write_text("return 1\n")
-    assert again() == ["eve.py"]
-    assert len(again(time_limit=7.0)) == 4
-    # A helper that a student's file may import is a part of what was judged.
+    assert resumed.again() == ["eve.py"]
+
+
+def test_a_helper_that_changed_has_its_file_judged_again(resumed: Resumed, folder: Path) -> None:
     (folder / "ann" / "helper.py").write_text("X = 2\n")
-    assert again(time_limit=7.0) == ["my_solution.py"]
-    # A spreadsheet may have written it with semicolons, or with the ends of lines of Windows.
+    assert resumed.again() == ["my_solution.py"]
+
+
+def test_all_is_judged_again_with_another_time_limit(resumed: Resumed) -> None:
+    assert len(resumed.again(time_limit=7.0)) == 4
+
+
+def test_a_table_with_semicolons_is_taken_over(resumed: Resumed) -> None:
     rewritten = io.StringIO()
-    csv.writer(rewritten, delimiter=";").writerows(csv.reader(io.StringIO(table.read_text())))
-    table.write_text(rewritten.getvalue())
-    assert again(time_limit=7.0) == []
-    saved = table.read_bytes().replace(b"\n", b"\r\n")
-    for content in (saved, saved.removeprefix(b"\xef\xbb\xbf")):  # with the mark and without
-        table.write_bytes(content)
-        assert again(time_limit=7.0) == []
-    # A table that ended in the middle of a file is one with fewer rows.
-    table.write_text("".join(text.splitlines(keepends=True)[:2]))
-    assert again()
-    table.write_text("name,mark\nann,1\n")
-    refused((BadInputError, "not the columns of a table of grades", again))
-    assert table.read_text() == "name,mark\nann,1\n"
+    rows = csv.reader(io.StringIO(resumed.table.read_text()))
+    csv.writer(rewritten, delimiter=";").writerows(rows)
+    resumed.table.write_text(rewritten.getvalue())
+    assert resumed.again() == []
+
+
+@pytest.mark.parametrize("mark", [b"\xef\xbb\xbf", b""], ids=["mark", "no mark"])
+def test_a_table_with_ends_of_lines_of_windows_is_taken_over(mark: bytes, resumed: Resumed) -> None:
+    content = resumed.table.read_bytes().removeprefix(b"\xef\xbb\xbf").replace(b"\n", b"\r\n")
+    resumed.table.write_bytes(mark + content)
+    assert resumed.again() == []
+
+
+def test_a_table_that_ended_early_is_one_with_fewer_rows(resumed: Resumed) -> None:
+    lines = resumed.table.read_text().splitlines(keepends=True)
+    resumed.table.write_text("".join(lines[:2]))
+    assert resumed.again()
+
+
+def test_a_table_of_something_else_is_refused_and_left(resumed: Resumed) -> None:
+    resumed.table.write_text("name,mark\nann,1\n")
+    refused((BadInputError, "not the columns", resumed.again))
+    assert resumed.table.read_text() == "name,mark\nann,1\n"
 
 
 def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -> None:
@@ -413,7 +552,9 @@ def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:
     assert entry.judged
 
 
-def test_what_gradescope_reads(judged: list[str]) -> None:
+@pytest.fixture
+def gradescope() -> dict[str, dict[str, Any]]:
+    """What Gradescope reads of a file, by the name of the function."""
     marks = (
         Judgement("demo_gravity", True, True, ("good",)),
         Judgement("demo_state", True, False, ("bad", "worse")),
@@ -421,15 +562,27 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
         Judgement("demo_replay", True, False, ("busy",), judged=False),
     )
     grade = Grade("step_loop.py", "0", "mujoco", {"mujoco": "4"}, marks)
-    read = json.loads(gradescope_results(grade))
-    tests = {each["name"]: each for each in read["tests"]}
-    assert list(tests) == list(JUDGES)
-    told = [(each["score"], each["max_score"], each["status"]) for each in tests.values()]
-    assert told == [(1, 1, "passed"), *[(0, 1, "failed")] * 3]
-    assert tests["demo_state"]["output"] == "wrong\nbad\nworse"
-    assert tests["demo_replay"]["output"] == "not judged\nbusy"
-    refused = json.loads(gradescope_results(None, "there is no file"))
-    assert {each["output"] for each in refused["tests"]} == {"there is no file"}
+    return {each["name"]: each for each in json.loads(gradescope_results(grade))["tests"]}
+
+
+def test_gradescope_reads_a_point_for_each_function_that_is_right(
+    gradescope: dict[str, dict[str, Any]],
+) -> None:
+    assert list(gradescope) == list(JUDGES)
+    rows = [(each["score"], each["max_score"], each["status"]) for each in gradescope.values()]
+    assert rows == [(1, 1, "passed"), *[(0, 1, "failed")] * 3]
+
+
+def test_gradescope_reads_the_remarks_below_the_verdict(
+    gradescope: dict[str, dict[str, Any]],
+) -> None:
+    assert gradescope["demo_state"]["output"] == "wrong\nbad\nworse"
+    assert gradescope["demo_replay"]["output"] == "not judged\nbusy"
+
+
+def test_gradescope_reads_at_each_function_why_there_is_no_grade() -> None:
+    read = json.loads(gradescope_results(None, "there is no file"))
+    assert [each["output"] for each in read["tests"]] == ["there is no file"] * len(JUDGES)
 
 
 @pytest.mark.parametrize("option", ["--csv", "--gradescope"])
@@ -488,7 +641,7 @@ def test_what_was_not_judged_last_time_is_told(
     told: list[int] = []
     for is_judged in (True, False):
         verdicts = tuple(Judgement(name, True, True, ("a",), judged=is_judged) for name in JUDGES)
-        entry = ClassEntry(ann.name, digest(ann.own), verdicts, "", "mujoco")
+        entry = ClassEntry(ann.name, digest(ann.files), verdicts, "", "mujoco")
         replace_csv(table, rows_of([entry]))
         answer_class(ClassRequest((tmp_path / "class",), table=table))
         told.append(sum("not judged last time" in str(each.message) for each in recwarn.list))

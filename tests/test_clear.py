@@ -31,7 +31,7 @@ CLEAR = [
 
 
 def rules_broken(source: str) -> set[str]:
-    """The rules that a source breaks."""
+    """Return the rules that a source breaks."""
     return {rule for node in ast.walk(ast.parse(source)) for rule, _ in clear.faults_of(node)}
 
 

@@ -21,7 +21,7 @@ from .support.claims import assert_has, assert_in, assert_not_in
 from .support.explained import with_changes
 from .support.files import written
 from .support.pages import QUICK
-from .support.processes import Cli, without_estimates
+from .support.processes import Cli, run_main, without_estimates
 from .support.requirements import ROOT
 from .support.small_models import mjcf
 
@@ -44,31 +44,64 @@ def test_every_lesson_runs_and_reads_well_piped(here: Cli, lesson: str, backend:
     assert "nan" not in done.stdout.lower().split()
 
 
-def test_gravity_prints_the_table_of_the_course(here: Cli) -> None:
-    page = here("lesson", "gravity").stdout
-    for row in ("0.000° 0.00°", "0.033° 23.88°", "0.033° 23.89°", "0.033° 23.90°", "0.033° 23.92°"):
-        assert re.search(row.replace(" ", r"\s+").replace(".", r"\."), page), row
-    found = _json(here, "lesson", "gravity")["mujoco"]
-    off = found["servos_off"]
+@pytest.mark.parametrize(
+    "row", ["0.000° 0.00°", "0.033° 23.88°", "0.033° 23.89°", "0.033° 23.90°", "0.033° 23.92°"]
+)
+def test_gravity_prints_the_table_of_the_course(row: str, gravity_page: str) -> None:
+    assert re.search(row.replace(" ", r"\s+").replace(".", r"\."), gravity_page)
+
+
+@pytest.fixture(scope="module")
+def gravity_page() -> str:
+    """What the lesson on gravity prints."""
+    return run_main("lesson", "gravity").stdout
+
+
+@pytest.fixture(scope="module")
+def gravity() -> dict[str, Any]:
+    """The JSON of the lesson on gravity, of MuJoCo."""
+    return json.loads(run_main("lesson", "gravity", "--json").stdout)["mujoco"]
+
+
+def test_the_floor_holds_the_fallen_arm_and_not_damping_or_dry_friction(
+    gravity: dict[str, Any],
+) -> None:
+    off = gravity["servos_off"]
     assert_has(off, ctrl_untouched=True, touching=["gripper on floor (fixed_stud_1)"])
-    # The floor holds the fallen arm, not damping or dry friction.
     assert off["forces"]["contact"] / off["forces"]["bias"] > 0.95
     assert abs(off["forces"]["friction"]) < 0.052
-    assert 0.5 < min(off["touches"].values()) < 1.0
-    for run in (found["servos_on"], off):
-        assert abs(run["forces"]["total"]) < 1e-5
-    assert found["servos_on"]["forces"]["contact"] == 0.0
+
+
+def test_the_falling_arm_touches_the_floor_before_a_second(gravity: dict[str, Any]) -> None:
+    assert 0.5 < min(gravity["servos_off"]["touches"].values()) < 1.0
+
+
+@pytest.mark.parametrize("run", ["servos_on", "servos_off"])
+def test_forces_of_an_arm_at_rest_add_up_to_nothing(run: str, gravity: dict[str, Any]) -> None:
+    assert abs(gravity[run]["forces"]["total"]) < 1e-5
+
+
+def test_nothing_touches_an_arm_that_is_held(gravity: dict[str, Any]) -> None:
+    assert gravity["servos_on"]["forces"]["contact"] == 0.0
 
 
 @pytest.mark.slow
-def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
-    page = cli("lesson", "gravity", "--menagerie", str(menagerie)).stdout
+def test_gravity_on_the_public_scene_is_the_table_of_the_course(here: Cli, menagerie: Path) -> None:
+    page = here("lesson", "gravity", "--menagerie", menagerie).stdout
     assert "robotstudio_so101/scene.xml" in page
     assert re.search(r"0\.033°\s+23\.92°", page)
+
+
+@pytest.mark.slow
+def test_the_folder_of_the_arm_stands_for_that_of_all_robots(cli: Cli, menagerie: Path) -> None:
     inside = cli("lesson", "reset", MENAGERIE=str(menagerie / "robotstudio_so101"))
     assert "'pickup'" in inside.stdout
-    for lesson in LESSONS:
-        cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()), code=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_a_lesson_runs_on_the_public_scenes(here: Cli, menagerie: Path, lesson: str) -> None:
+    here("lesson", lesson, "--menagerie", menagerie, *QUICK.get(lesson, ()), code=0)
 
 
 def test_fingertip_of_other_models_and_frames(here: Cli, pinocchio: None) -> None:
@@ -128,7 +161,7 @@ def test_the_help_of_lesson_lists_the_lessons_in_order(here: Cli) -> None:
 
 
 def in_a_shell(command: str) -> subprocess.CompletedProcess[str]:
-    """What becomes of a command of ours with something behind it."""
+    """Return what becomes of a command of ours with something behind it."""
     done = subprocess.run(
         ["sh", "-c", f"{sys.executable} -m statemachine {command}"],
         capture_output=True,
@@ -179,7 +212,7 @@ def test_the_doctor_says_what_the_viewer_lacks(cli: Cli, tmp_path: Path) -> None
     assert "[view]" in viewer["found"]
 
 
-def test_version(cli: Cli) -> None:
+def test_the_command_says_its_version(cli: Cli) -> None:
     from statemachine import __version__
 
     assert cli("--version").stdout.split() == ["statemachine", __version__]

@@ -28,6 +28,7 @@ from statemachine.lab.recordings import Trace
 from statemachine.show.blocks import Code, Section, Table
 from statemachine.show.first_screen import COLUMNS, LINES
 
+from .support.claims import assert_in
 from .support.compared import page_of, result_of
 from .support.files import written
 from .support.pages import blocks, shown
@@ -46,12 +47,12 @@ def short(what: str, number: int) -> str:
 
 
 def long(what: str, number: int) -> str:
-    """A name as converters write it: what tells two apart comes last, and in the middle."""
+    """Return a name as converters write it: what tells two apart comes last, and in the middle."""
     return f"robot/upper_extremity_{number % 2}/humanoid_proximal_interphalangeal_{what}_{number}"
 
 
 def humanoid(joints: int, mass: float = 0.1, namer: Namer = short, floor: bool = True) -> str:
-    """A floating trunk with a chain of hinges, each with a servo; nothing of it collides."""
+    """Return a floating trunk with a chain of hinges, each with a servo; nothing of it collides."""
     plane = '<geom name="floor" type="plane" size="9 9 1"/>' if floor else ""
     links = ""
     for k in range(joints):
@@ -87,23 +88,20 @@ PENDULUM = """<robot name="pendulum"><link name="base"/><joint name="swing" type
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
 
 
-def test_timesteps_that_meet_seldom_are_compared_where_they_meet_and_it_says_so(
-    tmp_path: Path, bullet: None
-) -> None:
-    import mujoco
-    import pybullet
-
+@pytest.fixture
+def seldom(tmp_path: Path, bullet: None) -> CompareResult:
+    """A pendulum at MuJoCo's timestep of 2 ms and at PyBullet's own, which meet each 50 ms."""
     file = written(tmp_path / "pendulum.urdf", PENDULUM)
     sides = Side(str(file)), Side(str(file), "pybullet", "engine")
     run = Request(("gravity",), sides=sides, seconds=0.5)
-    result = answer(CompareRequest(run, uncertainty=None))
-    comparison = result.comparison
-    assert (comparison.moments, comparison.gap_of_moments) == (11, pytest.approx(0.05))
-    said = " ".join(" ".join(printed(result)).split())
-    assert "2 ms" in said
-    assert "4.167 ms" in said
-    assert "11 common moments, every 0.050 s" in said
-    # Raw: each engine with its own timestep, at the moments k * 50 ms.
+    return answer(CompareRequest(run, uncertainty=None))
+
+
+def _raw_gap_at_common_moments(file: Path) -> float:
+    """Return how far the plain engines are apart at each 50 ms of half a second [rad]."""
+    import mujoco
+    import pybullet
+
     model = mujoco.MjModel.from_xml_path(str(file))
     data, ours = mujoco.MjData(model), [0.0]
     client = pybullet.connect(pybullet.DIRECT)
@@ -117,8 +115,24 @@ def test_timesteps_that_meet_seldom_are_compared_where_they_meet_and_it_says_so(
         ours.append(float(data.qpos[0]))
         theirs.append(pybullet.getJointState(robot, 0, physicsClientId=client)[0])
     pybullet.disconnect(client)
+    return float(np.abs(np.subtract(ours, theirs)).max())
+
+
+def test_timesteps_that_meet_seldom_are_compared_where_they_meet(
+    seldom: CompareResult, tmp_path: Path
+) -> None:
+    comparison = seldom.comparison
+    assert (comparison.moments, comparison.gap_of_moments) == (11, pytest.approx(0.05))
     (swing,) = [each for each in comparison.agreements if each.kind == "joint"]
-    assert swing.max == pytest.approx(float(np.abs(np.subtract(ours, theirs)).max()), rel=1e-6)
+    raw = _raw_gap_at_common_moments(tmp_path / "pendulum.urdf")
+    assert swing.max == pytest.approx(raw, rel=1e-6)
+
+
+def test_a_page_says_at_which_moments_timesteps_that_meet_seldom_are_compared(
+    seldom: CompareResult,
+) -> None:
+    text = " ".join(" ".join(printed(seldom)).split())
+    assert_in(text, "2 ms", "4.167 ms", "11 common moments", "0.050 s")
 
 
 def test_actuators_that_an_experiment_switches_off_are_missed_by_nobody(tmp_path: Path) -> None:
@@ -248,7 +262,7 @@ def test_a_run_that_ends_early_takes_one_screen(tmp_path: Path) -> None:
 def test_long_notes_and_reasons_take_one_screen(heavier: CompareResult, rows: int) -> None:
     """Whatever is said of how the sides were run is a count on the first screen."""
     said = tuple(f"PyBullet: a remark on number {k} " + "x" * 70 for k in range(rows))
-    result = replace(heavier, run=replace(heavier.run, said=said))
+    result = replace(heavier, run=replace(heavier.run, notes=said))
     assert_one_screen(printed(result))
     assert said[-1] in shown(page(result, details=True)).replace("\n", "")[: 10**6] or True
     assert side_counts(result).notes >= rows
@@ -339,7 +353,7 @@ def test_details_have_all_quantities_tolerances_and_contacts(heavier: CompareRes
 
 
 def blocks_of(found: Any, kind: type) -> list[Any]:
-    """The blocks of a kind, those within sections too."""
+    """Return the blocks of a kind, those within sections too."""
     every: list[Any] = []
     for block in found:
         if isinstance(block, kind):

@@ -213,23 +213,42 @@ def test_every_question_has_facts() -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_figures_are_those_of_closed_forms() -> None:
-    """Not what the engines gave before: what they must give."""
-    for words, expected, rel in (
+@pytest.mark.parametrize(
+    ("question", "engine_name", "of", "expected", "rel"),
+    [
         # A tip at 0.8 m and 0.4 rad is a chord away from where it was.
-        (("write", "mujoco", "the tip"), 0.8 * 2 * 0.198669331, 1e-6),
+        ("write", "mujoco", "the tip", 0.8 * 2 * 0.198669331, 1e-6),
         # It lags by its way in one step: speed · timestep.
-        (("step", "mujoco", "the contact"), 3 * 0.002, 1e-6),
-        (("step", "mujoco", "the tip"), 0.8 * 3 * 0.002, 0.02),
-        (("step", "pybullet", "the tip"), 0.8 * 3 / 240, 0.02),
-    ):
-        assert figures(*words)["off by"] == pytest.approx(expected, rel), words
+        ("step", "mujoco", "the contact", 3 * 0.002, 1e-6),
+        ("step", "mujoco", "the tip", 0.8 * 3 * 0.002, 0.02),
+        ("step", "pybullet", "the tip", 0.8 * 3 / 240, 0.02),
+    ],
+)
+def test_what_is_stale_is_off_by_a_closed_form(
+    question: str, engine_name: str, of: str, expected: float, rel: float
+) -> None:
+    """Not what the engines gave before: what they must give."""
+    assert figures(question, engine_name, of)["off by"] == pytest.approx(expected, rel)
+
+
+@pytest.mark.usefixtures("bullet")
+def test_pybullet_s_own_motor_holds_the_weight_of_the_pendulum() -> None:
     held = figures("actuation", "pybullet", "as loaded")
     assert held["moves"] == pytest.approx(0, abs=1e-6)
     assert -held["its motor exerts"] == pytest.approx(9.81 * 0.5)
-    for words, coefficient in ((("pybullet",), 0.25 * 0.75), (("mujoco", "equal priority"), 0.75)):
-        slopes = figures("friction", *words)
-        assert slopes == pytest.approx(dict.fromkeys(slopes, coefficient), rel=0.05)
+
+
+@pytest.mark.usefixtures("bullet")
+@pytest.mark.parametrize(
+    ("words", "coefficient"),
+    [(("pybullet",), 0.25 * 0.75), (("mujoco", "equal priority"), 0.75)],
+    ids=["their product", "the larger"],
+)
+def test_two_coefficients_of_friction_act_as_one(
+    words: tuple[str, ...], coefficient: float
+) -> None:
+    slopes = figures("friction", *words)
+    assert slopes == pytest.approx(dict.fromkeys(slopes, coefficient), rel=0.05)
 
 
 @pytest.mark.slow
@@ -239,13 +258,13 @@ def test_a_second_look_sees_the_same() -> None:
     assert probe(engines_here) == probe(engines_here)
 
 
-def test_the_limp_pendulum_keeps_its_energy() -> None:
+@pytest.mark.parametrize("seconds", [0.1, 0.25, 0.4])
+def test_the_limp_pendulum_keeps_its_energy(seconds: float) -> None:
     """Half I ω² is what gravity gave; ω by a difference of two angles."""
     h = 1e-4
-    for seconds in (0.1, 0.25, 0.4):
-        rate = (samples.limp(seconds + h) - samples.limp(seconds - h)) / (2 * h)
-        fallen = -samples.tip_at(samples.limp(seconds))[2] / samples.TIP
-        assert rate**2 == pytest.approx(2 * samples.RATE * fallen, rel=1e-5)
+    rate = (samples.limp(seconds + h) - samples.limp(seconds - h)) / (2 * h)
+    fallen = -samples.tip_at(samples.limp(seconds))[2] / samples.TIP
+    assert rate**2 == pytest.approx(2 * samples.RATE * fallen, rel=1e-5)
 
 
 def test_no_two_orders_of_the_joints_are_the_same() -> None:
@@ -254,10 +273,13 @@ def test_no_two_orders_of_the_joints_are_the_same() -> None:
     assert all(sorted(order) == sorted(moving[0]) for order in moving)
 
 
-def test_what_nothing_explains_is_undecided() -> None:
+def test_the_closest_hypothesis_comes_with_the_next() -> None:
     assert closest({"a": 0.1, "b": 1.0, "c": 2.0}) == BestHypothesis("a", 0.1, 1.0)
-    for a, b in ((0.9, 1.0), (0.0, 0.0)):
-        assert closest({"a": a, "b": b}).hypothesis == UNDECIDED
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.9, 1.0), (0.0, 0.0)])
+def test_what_nothing_or_all_explains_is_undecided(a: float, b: float) -> None:
+    assert closest({"a": a, "b": b}).hypothesis == UNDECIDED
 
 
 # An engine that behaved otherwise would get another answer.
@@ -338,7 +360,7 @@ def joints_by_alphabet(right: Any, body: int, k: int, client: int) -> Any:
 
 @around(pybullet, "changeDynamics")
 def rooted_friction(right: Any, *of: Any, lateralFriction: float, **more: Any) -> None:  # noqa: N803
-    """The product of two roots is the geometric mean."""
+    """Return the product of two roots, which is the geometric mean."""
     right(*of, lateralFriction=lateralFriction**0.5, **more)
 
 
@@ -465,7 +487,7 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     )
     found = {call.concept: call for call in run_phrases(["pybullet"]).engines["pybullet"]}
     assert found["state"].works
-    assert found["step"].said == "RuntimeError: as seeded"
+    assert found["step"].fault == "RuntimeError: as seeded"
     assert bullet_clients() <= before
     assert not list(tmp_path.iterdir())
 
@@ -558,19 +580,19 @@ def test_a_room_of_another_package_may_have_some_of_the_methods(
         "        return Phrases(('a.txt', '7'), {'load': load})\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
+    monkeypatch.setattr(engines, "ROOMS", dict(engines.ROOMS))
     engines.register("theirs", "their_room:Theirs")
     assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
     assert ask("timestep", "theirs") is None
     (phrase,) = run_phrases(["theirs"]).engines["theirs"]
-    assert_has(phrase, concept="load", works=True, said="")
+    assert_has(phrase, concept="load", works=True, fault="")
     refused((UnknownNameError, "calls can be recorded", lambda: record("", "theirs")))
 
 
 def test_a_room_that_cannot_be_imported_is_left_out(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
+    monkeypatch.setattr(engines, "ROOMS", dict(engines.ROOMS))
     engines.register("broken", "no_such_package")
     assert "broken" not in engines.raw_engines_with("measurement")
     refused(

@@ -33,6 +33,7 @@ from statemachine.show.text_blocks import ASCII
 
 from .support.browser import browser
 from .support.claims import assert_in
+from .support.colours import contrast
 from .support.files import written
 from .support.small_models import loaded, mjcf, model_of
 
@@ -317,24 +318,24 @@ def test_what_is_emulated_is_what_the_capabilities_say() -> None:
 # How they look.
 
 
-@pytest.fixture(
-    params=[
-        pytest.param((MIXED, MOTOR), id="mixed"),
-        pytest.param((chain(60, "<freejoint/>"), ""), id="sixty"),
-        pytest.param((free_bodies(150), ""), id="free"),
-        pytest.param(("<geom size='.1'/>", ""), id="static"),
-        pytest.param(
-            (
-                f"<body><joint name='{quoted(HOSTILE)}' type='ball'/><geom size='.1'/>"
-                "<body><joint name='关节关节关节关节关节关节关节'/><geom size='.1'/></body></body>",
-                "",
-            ),
-            id="hostile",
-        ),
-    ]
-)
+# What is in the world of a model, and its actuators; how they look is looked at in each.
+LOOKS: dict[str, Callable[[], tuple[str, str]]] = {
+    "mixed": lambda: (MIXED, MOTOR),
+    "sixty": lambda: (chain(60, "<freejoint/>"), ""),
+    "free": lambda: (free_bodies(150), ""),
+    "static": lambda: ("<geom size='.1'/>", ""),
+    "hostile": lambda: (
+        f"<body><joint name='{quoted(HOSTILE)}' type='ball'/><geom size='.1'/>"
+        "<body><joint name='关节关节关节关节关节关节关节'/><geom size='.1'/></body></body>",
+        "",
+    ),
+}
+
+
+@pytest.fixture(params=LOOKS)
 def drawn(request: pytest.FixtureRequest, tmp_path: Path) -> list[Diagram]:
-    model = loaded(tmp_path, *request.param)
+    """The three diagrams of a model."""
+    model = loaded(tmp_path, *LOOKS[request.param]())
     return [draw(model) for draw in THREE]
 
 
@@ -462,7 +463,9 @@ def test_markdown_has_it_as_one_block_of_html(drawn: Sequence[Diagram]) -> None:
 
 
 @pytest.mark.parametrize("name", ["objects", "state", "forward"])
-def test_each_stands_in_its_lesson_and_in_no_fold(name: str, backend: str, tmp_path: Path) -> None:
+def test_each_diagram_stands_in_its_lesson_and_in_no_fold(
+    name: str, backend: str, tmp_path: Path
+) -> None:
     entry = LESSONS[name]
     model = loaded(tmp_path, MIXED.replace("ball", "hinge"), MOTOR, backend=backend)
     options = {"site": "tip", "joint": "knee"} if name == "forward" else {}
@@ -497,51 +500,72 @@ def test_a_page_of_html_has_each_of_them_once(mixed: sm.Model) -> None:
     assert [page.count(figure(diagram)) for diagram in diagrams] == [1, 1, 1]
 
 
+@pytest.fixture(scope="module")
+def page_of_all(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page with the diagrams of every model."""
+    folder = tmp_path_factory.mktemp("diagrams")
+    diagrams: list[Diagram] = []
+    for texts in LOOKS.values():
+        model = loaded(folder, *texts())
+        diagrams += [draw(model) for draw in THREE]
+    file = folder / "page.html"
+    file.write_text(report(Page("t", "o", diagrams)), encoding="utf-8")
+    return file
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [480, 1200])
-def test_a_browser_shows_it_whole_and_readable(
-    drawn: Sequence[Diagram], width: int, scheme: str, tmp_path: Path
+def test_a_browser_shows_each_text_whole_and_inside_its_picture(
+    page_of_all: Path, width: int
 ) -> None:
-    file = tmp_path / "page.html"
-    file.write_text(report(Page("t", "o", list(drawn))), encoding="utf-8")
-    with browser(width=width, color_scheme=scheme) as tab:
-        tab.goto(file.as_uri())
+    with browser(width=width) as tab:
+        tab.goto(page_of_all.as_uri())
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
-        for number, element in enumerate(tab.page.query_selector_all("figure.diagram svg")):
-            frame = element.bounding_box()
-            texts_of = element.query_selector_all("text")
-            assert len(texts_of) >= 1
-            for text in texts_of:
-                place = text.bounding_box()
-                assert frame["x"] <= place["x"] + 1
-                assert place["x"] + place["width"] <= frame["x"] + frame["width"] + 1, number
-                assert place["height"] >= 9  # pixels
-        ink, paper = tab.evaluate(
-            "[getComputedStyle(document.querySelector('svg text')).fill,"
-            " getComputedStyle(document.body).backgroundColor]"
-        )
-        assert _contrast(ink, paper) > 7
-        selected = tab.evaluate(
-            "(() => { getSelection().selectAllChildren(document.querySelector('svg'));"
-            " return getSelection().toString(); })()"
-        )
-        assert "Model" in selected
+        elements = tab.page.query_selector_all("figure.diagram svg")
+        assert len(elements) == len(LOOKS) * len(THREE)
+        for number, places in enumerate(tab.evaluate(_PLACES)):
+            frame, *texts = places
+            assert texts, number
+            for left, right, height in texts:
+                assert frame[0] <= left + 1, number
+                assert right <= frame[1] + 1, number
+                assert height >= 9, number  # pixels
         tab.nothing_wrong()
 
 
-def _contrast(one: str, other: str) -> float:
-    """Return the contrast of two colours as the WCAG reckon it."""
-    low, high = sorted(_luminance(re.findall(r"\d+", colour)[:3]) for colour in (one, other))
-    return (high + 0.05) / (low + 0.05)
+# Of each picture (left, right, height) of itself and of each of its texts, in pixels.
+_PLACES = """
+[...document.querySelectorAll('figure.diagram svg')].map(svg =>
+    [svg, ...svg.querySelectorAll('text')].map(element => {
+        const place = element.getBoundingClientRect();
+        return [place.left, place.right, place.height];
+    }))
+"""
 
 
-def _luminance(channels: Sequence[str]) -> float:
-    linear = [
-        value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
-        for value in (int(channel) / 255 for channel in channels)
-    ]
-    return float(np.dot((0.2126, 0.7152, 0.0722), linear))
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_browser_shows_texts_in_contrast_to_the_page(page_of_all: Path, scheme: str) -> None:
+    with browser(width=1200, color_scheme=scheme) as tab:
+        tab.goto(page_of_all.as_uri())
+        inks, paper = tab.evaluate(
+            "[[...document.querySelectorAll('figure.diagram svg')].map("
+            "svg => getComputedStyle(svg.querySelector('text')).fill),"
+            " getComputedStyle(document.body).backgroundColor]"
+        )
+    assert all(contrast(ink, paper) > 7 for ink in inks)
+
+
+@pytest.mark.slow
+def test_texts_of_a_picture_can_be_selected_in_a_browser(page_of_all: Path) -> None:
+    with browser(width=1200) as tab:
+        tab.goto(page_of_all.as_uri())
+        selected = tab.evaluate(
+            "[...document.querySelectorAll('svg')].filter("
+            "svg => svg.closest('figure.diagram')).map(svg => {"
+            " getSelection().selectAllChildren(svg); return getSelection().toString(); })"
+        )
+    assert sum("Model" in text for text in selected) >= len(LOOKS)
 
 
 # The painter.

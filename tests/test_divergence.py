@@ -78,7 +78,7 @@ def test_the_bound_follows_the_timestep_and_the_size(tmp_path: Path) -> None:
 
 
 def explode(model: sm.Model) -> DivergedError:
-    """A step with contacts as hard as the engine makes them, until it raises."""
+    """Step with contacts as hard as the engine makes them, until it raises."""
     import pybullet as pb
 
     with sm.make_data(model) as data:
@@ -104,18 +104,34 @@ def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
     assert error.quantity == "qvel"
 
 
-def test_the_bound_can_be_set(tmp_path: Path) -> None:
-    """At load and by replace, one number or one of each; a variant keeps what was set."""
-    model = loaded(tmp_path, ROTOR.format(timestep=0.002, actuator=""), max_qvel=500)
-    assert np.array_equal(bound(model), np.full(8, 500.0))
-    assert np.array_equal(bound(model.replace(timestep=0.001)), bound(model))
-    each = model.replace(max_qvel=[1000, *[1e5] * 7])
-    for variant, top in ((model, 499), (each, 999)):
-        with opened(variant, qvel=[top, *[0] * 7], nstep=3) as (_, data):
-            data.qvel[0] = top + 2
-            says = r"qvel\[0\] \(rotor\) = .* went beyond max_"
-            refused((DivergedError, says, partial(sm.step, variant, data)))
-    after(each, 3, qvel=[0, 5000, *[0] * 6])  # another joint may be faster
+@pytest.fixture
+def rotor_of_500(tmp_path: Path) -> sm.Model:
+    """A rotor whose bound was set at load."""
+    return loaded(tmp_path, ROTOR.format(timestep=0.002, actuator=""), max_qvel=500)
+
+
+def test_one_number_bounds_every_coordinate(rotor_of_500: sm.Model) -> None:
+    assert np.array_equal(bound(rotor_of_500), np.full(8, 500.0))
+
+
+def test_a_variant_keeps_the_bound_that_was_set(rotor_of_500: sm.Model) -> None:
+    assert np.array_equal(bound(rotor_of_500.replace(timestep=0.001)), bound(rotor_of_500))
+
+
+@pytest.mark.parametrize(("value", "top"), [(500, 499), ([1000, *[1e5] * 7], 999)])
+def test_a_coordinate_beyond_the_bound_that_was_set_diverged(
+    value: Any, top: float, rotor_of_500: sm.Model
+) -> None:
+    variant = rotor_of_500.replace(max_qvel=value)
+    with opened(variant, qvel=[top, *[0] * 7], nstep=3) as (_, data):
+        data.qvel[0] = top + 2
+        error = refused((DivergedError, "max_", partial(sm.step, variant, data)))
+    assert (error.quantity, error.index) == ("qvel", 0)
+
+
+def test_another_joint_may_be_faster_where_each_has_a_bound(rotor_of_500: sm.Model) -> None:
+    each = rotor_of_500.replace(max_qvel=[1000, *[1e5] * 7])
+    after(each, 3, qvel=[0, 5000, *[0] * 6])
 
 
 @pytest.mark.parametrize(
@@ -136,12 +152,20 @@ def test_a_bad_bound_is_refused_in_a_line(tmp_path: Path, value: object, says: s
     refused((BadInputError, says, lambda: loaded(tmp_path, text, max_qvel=value)))
 
 
-def test_the_record_shows_the_bound(tmp_path: Path, mujoco_arm: sm.Model) -> None:
+@pytest.mark.parametrize(
+    ("options", "words"), [({}, "5e+05 to 1.1e+06"), ({"max_qvel": 700}, "700")]
+)
+def test_the_record_shows_the_bound(options: dict[str, Any], words: str, tmp_path: Path) -> None:
     text = ROTOR.format(timestep=0.002, actuator="")
-    for options, told in ({}, "5e+05 to 1.1e+06"), ({"max_qvel": 700}, "700"):
-        record = str(loaded(tmp_path, text, **options).capabilities)
-        assert f"where qvel is beyond {told} (max_qvel)" in record
-    assert "beyond 1e+10, the engine's own bound" in str(mujoco_arm.capabilities)
+    record = str(loaded(tmp_path, text, **options).capabilities)
+    assert f"beyond {words} (max_qvel)" in record
+
+
+def test_the_record_of_mujoco_shows_the_engine_s_own_bound(mujoco_arm: sm.Model) -> None:
+    assert "beyond 1e+10" in str(mujoco_arm.capabilities)
+
+
+def test_mujoco_takes_no_other_bound(mujoco_arm: sm.Model) -> None:
     refused((UnsupportedError, "max_qvel", lambda: mujoco_arm.replace(max_qvel=1e5)))
 
 
@@ -163,7 +187,7 @@ def test_a_comparison_in_which_a_side_diverges_says_that(
 @pytest.mark.filterwarnings(
     "ignore:.*kv of actuator number 0 is negative:statemachine.errors.EngineWarning"
 )
-def test_both_sides_may_diverge(tmp_path: Path) -> None:
+def test_both_sides_of_a_comparison_may_diverge(tmp_path: Path) -> None:
     """A motor that pushes the faster, the faster its wheel turns."""
     path = written(
         tmp_path / "runaway.xml",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import re
 import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,37 +20,44 @@ import statemachine as sm
 from statemachine.course import notebook as md
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.session import page_of_lesson, take
-from statemachine.course.notebook import _opening, build, lesson
+from statemachine.course.notebook import build, lesson, opening_text
 from statemachine.errors import BadInputError
 from statemachine.show import terminal
 from statemachine.show.blocks import Heading, Page, Printed, Question, Table, Text
 from statemachine.show.charts import drawn
 from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Label
-from statemachine.show.pictures import Diagram, Traces
+from statemachine.show.pictures import Diagram, Picture, Traces
 from tools.docs_pages import make_path
 
 from .support.claims import assert_in, refused
 from .support.pages import blocks
 from .support.processes import of_python
-from .support.requirements import ROOT
+from .support.requirements import ROOT, need_engine
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 
 
-_BOX = Box(0, 0, 9, 3, "call", "step", is_rounded=True)
-_BRACKET = Bracket(11, 0, 2, "step")
+PICTURES: dict[str, Callable[[], Picture]] = {
+    "curve": lambda: Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
+    "curves on a logarithmic axis": lambda: Traces(
+        "t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True
+    ),
+    "diagram": lambda: Diagram(
+        "d",
+        "w",
+        (
+            Box(0, 0, 9, 3, "call", "step", is_rounded=True),
+            Label("a", 2, 1, 5),
+            Arrow(((9, 1), (4, 1))),
+            Bracket(11, 0, 2, "step"),
+        ),
+    ),
+}
 
 
-@pytest.mark.parametrize(
-    "picture",
-    [
-        Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
-        Traces("t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True),
-        Diagram("d", "w", (_BOX, Label("a", 2, 1, 5), Arrow(((9, 1), (4, 1))), _BRACKET)),
-    ],
-    ids=lambda each: type(each).__name__,
-)
-def test_a_picture_is_the_same_each_time(picture: Traces) -> None:
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_picture_is_the_same_each_time_and_has_its_words_as_text(name: str) -> None:
+    picture = PICTURES[name]()
     text = drawn([picture], "svg")
     assert text == drawn([picture], "svg")
     ElementTree.fromstring(text)
@@ -117,65 +126,163 @@ _SMALL: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LESSONS)
-def test_no_page_of_the_path_shows_its_answers_open(name: str) -> None:
-    entry = LESSONS[name]
-    taken = take(entry, sm.load(entry.model), "mujoco", _SMALL.get(name, {}))
+@dataclass(frozen=True)
+class PathPage:
+    """A page of the path, as Markdown.
+
+    Attributes:
+        page: The page.
+        opening: What the notebook shows before the cell that answers.
+        text: The whole page, its pictures left out.
+        printed: What the lesson's code printed.
+    """
+
+    page: Page
+    opening: str
+    text: str
+    printed: str
+
+    @property
+    def questions(self) -> list[Question]:
+        """Return the questions of the page."""
+        return blocks(self.page, Question)
+
+    @property
+    def unfolded(self) -> str:
+        """Return what stands open on the page, but for the diagram."""
+        return _DIAGRAM.sub("", _FOLDED.sub("", self.text))
+
+
+@pytest.fixture(scope="module", params=LESSONS)
+def path_page(request: pytest.FixtureRequest) -> PathPage:
+    """The page of each lesson of the path, on MuJoCo."""
+    entry = LESSONS[request.param]
+    taken = take(entry, sm.load(entry.model), "mujoco", _SMALL.get(request.param, {}))
     page = page_of_lesson(entry, {"mujoco": taken})
-    questions = blocks(page, Question)
-    assert questions
     text = md.markdown(page, lambda _: "picture")
-    shown, asks = _DIAGRAM.sub("", _FOLDED.sub("", text)), _opening(page)
-    # The notebook asks before the cell that answers.
-    assert not re.search("[✓✗]", shown + asks)
-    before, _, after = shown.partition(md.asked(questions[0]))
-    for question, fold in zip(questions, _FOLDED.findall(text), strict=True):
-        asked = md.asked(question)
+    return PathPage(page, opening_text(page), text, taken.printed)
+
+
+@pytest.mark.slow
+def test_no_verdict_on_the_path_stands_open(path_page: PathPage) -> None:
+    assert not re.search("[✓✗]", path_page.unfolded + path_page.opening)
+
+
+@pytest.mark.slow
+def test_each_answer_on_the_path_is_in_a_fold(path_page: PathPage) -> None:
+    folds = _FOLDED.findall(path_page.text)
+    assert path_page.questions
+    for question, fold in zip(path_page.questions, folds, strict=True):
         assert md.answer(question) in fold
-        assert asked in shown
-        assert asked in asks
-        assert question.because not in asks
-        after = after.replace(asked, "")
-    assert not after.strip()
-    printed = {line for line in taken.printed.splitlines() if line.strip()}
+        assert question.because not in path_page.opening
+
+
+@pytest.mark.slow
+def test_nothing_stands_open_below_the_first_question_of_a_page_but_questions(
+    path_page: PathPage,
+) -> None:
+    asked = [md.asked(question) for question in path_page.questions]
+    _, _, rest = path_page.unfolded.partition(asked[0])
+    for question in asked:
+        assert question in path_page.unfolded
+        assert question in path_page.opening
+        rest = rest.replace(question, "")
+    assert not rest.strip()
+
+
+@pytest.mark.slow
+def test_nothing_that_the_code_prints_stands_above_the_questions(path_page: PathPage) -> None:
+    before, _, _ = path_page.unfolded.partition(md.asked(path_page.questions[0]))
+    printed = {line for line in path_page.printed.splitlines() if line.strip()}
     assert not printed & set(before.splitlines())
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("bullet")
-def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
-    source = tmp_path / "docs"
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The documentation as HTML, made of runs on one engine, without a warning."""
+    need_engine("pybullet")
+    folder = tmp_path_factory.mktemp("documentation")
+    source = folder / "docs"
     shutil.copytree(
         ROOT / "docs",
         source,
         ignore=shutil.ignore_patterns("_build", "path", "reference", "comparisons", "__pycache__"),
     )
     for name in ("models", "statemachine", "CONTRIBUTING.md"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    words = ("-m", "sphinx", "-W", "-q", "-b", "html", source, tmp_path / "o")
-    of_python(*words, code=0, HOME=str(tmp_path), STATEMACHINE_DOCS_BACKENDS="mujoco")
-    pages = [page.read_text() for page in (tmp_path / "o" / "path").glob("*.html")]
-    assert len(pages) == len(LESSONS)
-    for text in pages:
-        assert not _ELSEWHERE.findall(text)
+        (folder / name).symlink_to(ROOT / name)
+    words = ("-m", "sphinx", "-W", "-q", "-b", "html", source, folder / "o")
+    of_python(
+        *words,
+        code=0,
+        HOME=str(folder),
+        STATEMACHINE_DOCS_BACKENDS="mujoco",
+        STATEMACHINE_DOCS_COMPARISONS="hold",
+    )
+    return folder / "o"
+
+
+@pytest.fixture(scope="module")
+def built_path(built: Path) -> list[str]:
+    """The pages of the path."""
+    return [page.read_text() for page in (built / "path").glob("*.html")]
+
+
+@pytest.mark.slow
+def test_the_documentation_builds_without_a_warning_with_a_page_of_each_lesson(
+    built_path: list[str],
+) -> None:
+    assert len(built_path) == len(LESSONS)
+
+
+@pytest.mark.slow
+def test_a_page_of_the_path_loads_nothing_from_elsewhere(built_path: list[str]) -> None:
+    assert [_ELSEWHERE.findall(text) for text in built_path] == [[]] * len(LESSONS)
+
+
+@pytest.mark.slow
+def test_no_page_of_the_path_fails_or_shows_a_verdict_above_its_folds(
+    built_path: list[str],
+) -> None:
+    for text in built_path:
         assert "✗" not in text
         assert "✓" not in _FOLDED.sub("", text)
-    assert sum(len(_DIAGRAM.findall(_FOLDED.sub("", text))) for text in pages) == 3
-    for file in (tmp_path / "o").rglob("*.html"):
-        assert not _RAW_TABLE.search(file.read_text()), file
-    images = re.findall(r"<img\b[^>]*>", "".join(pages))
+
+
+@pytest.mark.slow
+def test_three_pages_of_the_path_have_an_open_diagram(built_path: list[str]) -> None:
+    assert sum(len(_DIAGRAM.findall(_FOLDED.sub("", text))) for text in built_path) == 3
+
+
+@pytest.mark.slow
+def test_every_image_of_the_path_says_what_it_shows(built_path: list[str]) -> None:
+    images = re.findall(r"<img\b[^>]*>", "".join(built_path))
     assert len(images) >= 5
     assert all(re.search(r'\balt="[^"]', image) for image in images)
-    for page, text in (
+
+
+@pytest.mark.slow
+def test_no_table_of_the_documentation_is_left_as_text(built: Path) -> None:
+    files = list(built.rglob("*.html"))
+    assert len(files) > 20
+    assert [file for file in files if _RAW_TABLE.search(file.read_text())] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("page", "text"),
+    [
         ("path/06-gravity", "53.89°"),
         ("path/09-time", "--realtime"),
         ("reference/conventions", "xyzw"),
         ("reference/calls", "mj_forward"),
-        ("comparisons/hold", "one count of a 12-bit encoder"),
+        ("comparisons/hold", "12-bit encoder"),
         ("comparisons/hold-why", "servo law"),
-    ):
-        assert text in (tmp_path / "o" / f"{page}.html").read_text(), page
+    ],
+)
+def test_a_page_of_the_documentation_has_what_was_computed(
+    page: str, text: str, built: Path
+) -> None:
+    assert text in (built / f"{page}.html").read_text()
 
 
 @pytest.mark.slow
@@ -197,78 +304,153 @@ def test_the_notebook_is_what_the_lessons_make() -> None:
     assert _NOTEBOOK.read_text(encoding="utf-8") == build(), "run: make notebook"
 
 
-def test_the_notebook_has_the_whole_path_asks_before_the_code_and_has_no_outputs() -> None:
+@pytest.fixture
+def cells() -> dict[str, str]:
+    """The source of each cell of the notebook of the path, by its id."""
     notebook = nbformat.read(_NOTEBOOK, as_version=4)
     nbformat.validate(notebook)
+    return {cell.id: cell.source for cell in notebook.cells}
+
+
+@pytest.mark.parametrize("file", ["path.ipynb", "comparing.ipynb"])
+def test_a_notebook_is_kept_without_outputs(file: str) -> None:
+    notebook = nbformat.read(_NOTEBOOK.with_name(file), as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
-    cells = {cell.id: cell.source for cell in notebook.cells}
+
+
+def test_the_notebook_begins_with_what_is_to_be_installed(cells: dict[str, str]) -> None:
     assert list(cells)[1:3] == ["install", "setup"]
+
+
+def test_the_notebook_has_the_whole_path(cells: dict[str, str]) -> None:
     parts = [f"{name}-{part}" for name in LESSONS for part in ("text", "prediction", "run")]
     assert [cell for cell in cells if cell in parts] == parts
+
+
+def test_the_notebook_asks_before_the_code_and_judges_what_was_typed(
+    cells: dict[str, str],
+) -> None:
+    names = list(cells)
     for name in LESSONS:
-        assert list(cells).index(f"{name}-prediction") == list(cells).index(f"{name}-text") + 1
+        assert names.index(f"{name}-prediction") == names.index(f"{name}-text") + 1
         assert f'lesson("{name}", BACKEND, prediction)' in cells[f"{name}-run"]
 
 
-@pytest.mark.slow
-def test_the_notebook_runs_headless(backend: str) -> None:
+def run_notebook(backend: str, *lessons: str) -> list[str]:
+    """Run the notebook on a backend, and return what is shown of each lesson.
+
+    Args:
+        backend: What BACKEND is set to.
+        lessons: Those that are run, all if none is named; the cells of the others are left out.
+    """
     notebook = nbformat.read(_NOTEBOOK, as_version=4)
     setup = next(cell for cell in notebook.cells if cell.id == "setup")
     setup.source = setup.source.replace('BACKEND = "mujoco"', f'BACKEND = "{backend}"')
+    left_out = set(LESSONS) - set(lessons or LESSONS)
+    notebook.cells = [cell for cell in notebook.cells if cell.id.rpartition("-")[0] not in left_out]
     NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(ROOT)}}).execute()
-    shown = [
+    return [
         output["data"]["text/markdown"]
         for cell in notebook.cells
         for output in cell.get("outputs", ())
         if output["output_type"] == "execute_result"
     ]
-    assert ["run says" in text for text in shown] == [True] * len(LESSONS)
-    assert "✗" not in "".join(shown)
-    assert "data:image/svg+xml;base64," in "".join(shown)
+
+
+@pytest.mark.slow
+def test_the_notebook_runs_headless() -> None:
+    pages = run_notebook("mujoco")
+    assert ["run says" in page for page in pages] == [True] * len(LESSONS)
+    assert "✗" not in "".join(pages)
+    assert "data:image/svg+xml;base64," in "".join(pages)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
+def test_the_notebook_runs_on_the_engine_that_its_setup_names() -> None:
+    """Each lesson on each engine is run by the tests of lessons."""
+    (page,) = run_notebook("pybullet", "forward")
+    assert "run says" in page
+    assert "✗" not in page
+    assert "pybullet" in page
 
 
 _COMPARING = ROOT / "notebooks" / "comparing.ipynb"
 
 
-def test_the_notebook_of_questions_is_short_and_has_no_outputs() -> None:
+def test_the_notebook_of_questions_is_short() -> None:
     notebook = nbformat.read(_COMPARING, as_version=4)
     nbformat.validate(notebook)
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert 10 <= len(code) <= 14
-    assert not any(cell.outputs for cell in code)
+    assert 10 <= sum(cell.cell_type == "code" for cell in notebook.cells) <= 14
+
+
+@pytest.fixture(scope="module")
+def answers() -> dict[str, list[Any]]:
+    """The outputs of the notebook of questions, by the id of the cell."""
+    notebook = nbformat.read(_COMPARING, as_version=4)
+    NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
+    return {cell.id: cell.outputs for cell in notebook.cells if cell.cell_type == "code"}
 
 
 @pytest.mark.slow
-def test_the_notebook_of_questions_runs_and_shows_its_answers() -> None:
-    notebook = nbformat.read(_COMPARING, as_version=4)
-    NotebookClient(notebook, timeout=300, kernel_name="python3").execute()
-    outputs = {cell.id: cell.outputs for cell in notebook.cells if cell.cell_type == "code"}
-    printed = outputs["compare"][0]["text"]
-    assert_in(printed, "✗", "shoulder", "lab.why(")
-    for cell in ("html", "why-html", "descriptions"):
-        assert '<div class="statemachine-result">' in outputs[cell][0]["data"]["text/html"]
-    shares = ast.literal_eval(outputs["why"][0]["data"]["text/plain"])
+def test_a_comparison_is_printed_in_the_notebook_of_questions(
+    answers: dict[str, list[Any]],
+) -> None:
+    assert_in(answers["compare"][0]["text"], "✗", "shoulder", "lab.why(")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cell", ["html", "why-html", "descriptions"])
+def test_a_result_is_html_in_the_notebook_of_questions(
+    cell: str, answers: dict[str, list[Any]]
+) -> None:
+    assert '<div class="statemachine-result">' in answers[cell][0]["data"]["text/html"]
+
+
+@pytest.mark.slow
+def test_shares_of_the_notebook_of_questions_add_up(answers: dict[str, list[Any]]) -> None:
+    shares = ast.literal_eval(answers["why"][0]["data"]["text/plain"])
     assert set(shares) == {"gains of elbow", "mass of fore"}
     assert sum(shares.values()) == pytest.approx(1.0, abs=0.02)
-    assert "image/png" in outputs["plot"][-1]["data"]
-    assert float(outputs["model"][0]["data"]["text/plain"]) > 1e-3
-    assert "mass matrix" in outputs["one-step"][0]["data"]["text/plain"]
 
 
-def test_a_lesson_in_a_notebook(backend: str) -> None:
-    shown = lesson("forward", backend)
-    text = shown._repr_markdown_()
-    assert_in(text, backend, "The run says: b) 2 and 3.")
+@pytest.mark.slow
+def test_the_notebook_of_questions_draws_a_picture(answers: dict[str, list[Any]]) -> None:
+    assert "image/png" in answers["plot"][-1]["data"]
+
+
+@pytest.mark.slow
+def test_the_notebook_of_questions_compares_a_model_and_names_a_stage(
+    answers: dict[str, list[Any]],
+) -> None:
+    assert float(answers["model"][0]["data"]["text/plain"]) > 1e-3
+    assert "mass matrix" in answers["one-step"][0]["data"]["text/plain"]
+
+
+def test_a_lesson_in_a_notebook_is_of_the_engine_that_is_asked_for(backend: str) -> None:
+    result = lesson("forward", backend)
+    text = result._repr_markdown_()  # as a notebook shows it
+    assert_in(text, backend, "run says: b)")
     assert "import statemachine" not in text
-    assert "notebook" in repr(shown)
-    refused(
-        (KeyError, "Did you mean 'gravity'", lambda: lesson("gravty")),
-        (KeyError, "seconds", lambda: lesson("hold", backend, second=1.0)),
-    )
+    assert "notebook" in repr(result)
 
 
-def test_a_prediction_in_the_notebook_is_judged() -> None:
-    for given, said in (("c", "You predicted it: c."), (" A ", "You predicted a; it is c.")):
-        assert said in lesson("state", prediction=given)._repr_markdown_()
-    wrong = (partial(lesson, "state", prediction=letters) for letters in ("d", "cc", "1", "?"))
-    refused(*((BadInputError, "a prediction is a letter", call) for call in wrong))
+def test_a_lesson_of_a_notebook_is_refused_by_its_name() -> None:
+    refused((KeyError, "Did you mean 'gravity'", lambda: lesson("gravty")))
+
+
+def test_an_option_of_a_lesson_in_a_notebook_is_refused_by_its_name() -> None:
+    refused((KeyError, "seconds", lambda: lesson("hold", "mujoco", second=1.0)))
+
+
+@pytest.mark.parametrize(
+    ("letter", "says"), [("c", "predicted it: c."), (" A ", "predicted a; it is c.")]
+)
+def test_a_prediction_in_the_notebook_is_judged(letter: str, says: str) -> None:
+    assert says in lesson("state", prediction=letter)._repr_markdown_()
+
+
+@pytest.mark.parametrize("letters", ["d", "cc", "1", "?"])
+def test_what_is_no_letter_of_a_question_is_refused(letters: str) -> None:
+    call = partial(lesson, "state", prediction=letters)
+    refused((BadInputError, "a prediction is a letter", call))

@@ -11,8 +11,7 @@ import pytest
 
 import statemachine as sm
 from statemachine import rotations
-from statemachine.show.drawing import Drawing, Part, Surface, drawing_of
-from statemachine.show.drawing import _drawing as shapes
+from statemachine.show.drawing import Drawing, Part, Surface, drawing_of, shapes
 from statemachine.show.drawing.scene import Camera
 
 from .support.claims import overlapping, refused
@@ -22,13 +21,13 @@ from .support.small_models import CLOTH, EVERY_SHAPE, TOUCHING_ONLY, model_of
 
 
 def _volume(shape: Surface | Part) -> float:
-    """By the divergence theorem: positive if every normal points outward."""
+    """Return the volume by the divergence theorem: positive if every normal points outward."""
     a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
 def _is_closed(shape: Surface | Part) -> bool:
-    """Every edge is walked once each way: no hole, and all faces wound alike."""
+    """Tell whether every edge is walked once each way: no hole, all faces wound alike."""
     f = shape.faces
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
     there, back = {tuple(e) for e in edges.tolist()}, {tuple(e[::-1]) for e in edges.tolist()}
@@ -110,10 +109,11 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[sm.Model, Draw
     return model, drawing_of(model)
 
 
-def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(everything) -> None:
+def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(
+    everything: tuple[sm.Model, Drawing],
+) -> None:
     model, drawing = everything
-    parts = {model.geom_names[part.geom]: part for part in drawing.parts}
-    assert {name: part.kind for name, part in parts.items()} == {
+    assert {model.geom_names[part.geom]: part.kind for part in drawing.parts} == {
         "ground": "plane",
         "table": "plane",
         "hill": "hfield",
@@ -124,16 +124,36 @@ def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(everything) -> None:
         "brick": "box",
         "wedge": "mesh",
     }
+    assert drawing.left_out == ()
+
+
+@pytest.fixture
+def parts(everything: tuple[sm.Model, Drawing]) -> dict[str, Part]:
+    """The parts of the drawing, by the name of the geom."""
+    model, drawing = everything
+    return {model.geom_names[part.geom]: part for part in drawing.parts}
+
+
+def test_a_plane_without_a_size_is_endless(parts: dict[str, Part]) -> None:
     assert [name for name, part in parts.items() if part.endless] == ["ground"]
     assert np.ptp(parts["table"].vertices[:, :2], axis=0).tolist() == [4, 6]
+
+
+def test_a_height_field_is_as_high_as_its_highest_point(parts: dict[str, Part]) -> None:
     assert parts["hill"].vertices[:, 2].max() == pytest.approx(0.5)
+
+
+def test_a_part_has_the_colour_of_its_geom_times_its_texture(parts: dict[str, Part]) -> None:
     assert parts["ball"].rgba == pytest.approx((0.1, 0.2, 0.3, 0.4))
-    assert parts["egg"].rgba == pytest.approx((0.2, 0.2, 0.6, 0.7), abs=0.002)  # texture × rgba
-    assert drawing.left_out == ()
+    assert parts["egg"].rgba == pytest.approx((0.2, 0.2, 0.6, 0.7), abs=0.002)
+
+
+def test_each_body_with_a_part_is_in_the_drawing(everything: tuple[sm.Model, Drawing]) -> None:
+    drawing = everything[1]
     assert {part.body for part in drawing.parts} == set(drawing.bodies) == {0, 1}
 
 
-def test_parts_are_where_the_engine_has_them(everything) -> None:
+def test_parts_are_where_the_engine_has_them(everything: tuple[sm.Model, Drawing]) -> None:
     """MuJoCo's own boxes around its geoms, against ours, in the frame of the world."""
     model, drawing = everything
     data = mujoco.MjData(model.raw)
@@ -147,22 +167,43 @@ def test_parts_are_where_the_engine_has_them(everything) -> None:
         centre, half = np.split(model.raw.geom_aabb[part.geom], 2)
         ends = [own.max(axis=0), own.min(axis=0)]
         np.testing.assert_allclose(ends, [centre + half, centre - half], atol=2e-6)
-    (wedge,) = (part for part in moving if part.kind == "mesh")
+
+
+def test_a_mesh_is_drawn_with_its_volume_in_its_place(parts: dict[str, Part]) -> None:
+    wedge = parts["wedge"]
     assert _volume(wedge) == pytest.approx(1 / 6, rel=1e-5)
     np.testing.assert_allclose(wedge.vertices.min(axis=0), (0.5, 0, 0), atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["so101", "so101/scene_box"])
-def test_the_whole_arm_is_there(name: str) -> None:
-    model = sm.load(name)
-    drawing, raw = drawing_of(model), model.raw
+@pytest.fixture(params=["so101", "so101/scene_box"])
+def arm_drawn(request: pytest.FixtureRequest) -> tuple[sm.Model, Drawing]:
+    """The arm alone, and above a floor with a box."""
+    model = sm.load(request.param)
+    return model, drawing_of(model)
+
+
+def test_the_whole_arm_is_there(arm_drawn: tuple[sm.Model, Drawing]) -> None:
+    model, drawing = arm_drawn
+    raw = model.raw
     assert {part.geom for part in drawing.parts} == {*np.flatnonzero(raw.geom_group < 3).tolist()}
     assert sum(part.kind == "mesh" for part in drawing.parts) == raw.nmesh == 22
     assert set(range(1, 9)) <= set(drawing.bodies)
-    # Closed, outward: its parts overlap, so the sum is above the solid's volume.
-    assert all(_volume(part) > 0 and _is_closed(part) for part in drawing.parts if part.body)
-    assert {part.rgba for part in drawing.parts} >= {(1, 0.77, 0.12, 1), (0.08, 0.08, 0.09, 1)}
-    assert sum(len(part.faces) for part in drawing.parts) < 10_000  # a page carries it
+
+
+def test_parts_of_the_arm_are_closed_with_their_normals_outward(
+    arm_drawn: tuple[sm.Model, Drawing],
+) -> None:
+    moving = [part for part in arm_drawn[1].parts if part.body]
+    assert all(_volume(part) > 0 and _is_closed(part) for part in moving)
+
+
+def test_the_arm_has_the_colours_of_its_materials(arm_drawn: tuple[sm.Model, Drawing]) -> None:
+    colours = {part.rgba for part in arm_drawn[1].parts}
+    assert colours >= {(1, 0.77, 0.12, 1), (0.08, 0.08, 0.09, 1)}
+
+
+def test_the_arm_has_few_enough_faces_for_a_page(arm_drawn: tuple[sm.Model, Drawing]) -> None:
+    assert sum(len(part.faces) for part in arm_drawn[1].parts) < 10_000
 
 
 @pytest.mark.usefixtures("bullet")

@@ -41,9 +41,18 @@ def test_provenance_covers_included_files(tmp_path: Path) -> None:
     assert_has(found, model_sha256=digest, model_file="so101/scene_box.xml")
 
 
-def test_milestones() -> None:
-    rows = {4.0: [0, 1, 2, 3, 4], 0.5: [0, 0.5], 60: [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]}
-    assert {seconds: milestones(seconds) for seconds in rows} == rows
+@pytest.mark.parametrize(
+    ("seconds", "rows"),
+    [
+        (4.0, [0, 1, 2, 3, 4]),
+        (0.5, [0, 0.5]),
+        (60, [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]),
+    ],
+)
+def test_a_fall_is_shown_each_second_and_later_at_round_times(
+    seconds: float, rows: list[float]
+) -> None:
+    assert milestones(seconds) == rows
 
 
 def test_forces_sum_with_the_bias_on_the_other_side() -> None:
@@ -59,6 +68,12 @@ def test_gravity_is_read_at_the_moment_of_the_end(mujoco_scene: sm.Model) -> Non
     with opened(mujoco_scene, nstep=200, derived=True) as (_, data):
         assert found.servos_on.forces.actuator == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
+
+
+def test_the_first_touch_of_the_falling_arm_is_the_first_step_with_a_contact(
+    mujoco_scene: sm.Model,
+) -> None:
+    found = lesson_result("gravity", mujoco_scene, seconds=1.0)
     touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]
     with opened(mujoco_scene.replace(actuation=False)) as (limp, data):
         while data.time < touch - 1e-9:
@@ -83,8 +98,9 @@ def test_hold_that_ends_at_the_first_touch_says_so() -> None:
     assert found.first_contact == pytest.approx(whole.first_contact)
 
 
-def test_replay_compares_what_it_says(mujoco_box: sm.Model) -> None:
+def test_replay_compares_a_run_with_one_that_is_commanded_late(mujoco_box: sm.Model) -> None:
     found = lesson_result("replay", mujoco_box, steps=30, **{"break": "late-ctrl"})
+    assert found.identical is False
     with started(mujoco_box) as one, started(mujoco_box) as two:
         one.time = two.time = 0.0
         one.ctrl = found.ctrl
@@ -96,7 +112,9 @@ def test_replay_compares_what_it_says(mujoco_box: sm.Model) -> None:
             assert found.difference[k + 1] == np.abs(gap).max()
             assert found.apart[k + 1] == np.linalg.norm(gap[6:9], axis=-1)  # without BLAS
         assert one.time == pytest.approx(0.15)
-    assert found.identical is False
+
+
+def test_a_replay_that_is_commanded_in_time_is_close(mujoco_box: sm.Model) -> None:
     assert lesson_result("replay", mujoco_box, steps=5).close is True
 
 
@@ -110,7 +128,7 @@ def test_a_loop_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> _loop_cost.LoopCost:
-    """What a loop costs by a clock that only `cost` moves: of a call of n steps, after so many."""
+    """Return what a loop costs by a clock that `cost` moves: of a call of n steps, after some."""
     now, calls = [0.0], [0]
 
     def step(_model: Any, _data: Any, n: int = 1) -> None:
@@ -127,20 +145,28 @@ def test_what_is_smaller_than_the_noise_is_not_told(monkeypatch: pytest.MonkeyPa
     equal = _times(monkeypatch, lambda n, _: n * noise.uniform(0.9, 1.4))
     assert not equal.told_apart
     assert equal.null.low < 1 < equal.null.high
-    # Once, something else takes the machine while it measures one way.
+
+
+def test_what_takes_the_machine_once_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     disturbed = _times(monkeypatch, lambda n, k: n * (1.0 if k != 3 else 500.0))
     assert (disturbed.told_apart, disturbed.loop.median) == (False, 1)
+
+
+def test_what_is_larger_than_the_noise_is_told_with_its_size(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    noise = random.Random(1)
     dear = _times(monkeypatch, lambda n, _: n + 0.3 + noise.uniform(-0.1, 0.1))
     assert dear.told_apart
     assert (dear.loop.median, dear.null.median) == pytest.approx((1.28, 1.0), abs=0.05)
 
 
-def test_few_rounds_tell_nothing() -> None:
+@pytest.mark.parametrize(("rounds", "tells"), [(1, False), (4, False), (5, True)])
+def test_few_rounds_tell_nothing(rounds: int, tells: bool) -> None:
     null = interleaved_timing.Ratio.of("null", [1.0] * 20, [1.0] * 20)
-    for rounds in (1, 4, 5):
-        ratio = interleaved_timing.Ratio.of("dear", [3.0] * rounds, [1.0] * rounds)
-        assert_has(ratio, median=3.0, rounds=rounds)
-        assert ratio.differs_from(null) == (rounds >= 5)
+    ratio = interleaved_timing.Ratio.of("dear", [3.0] * rounds, [1.0] * rounds)
+    assert_has(ratio, median=3.0, rounds=rounds)
+    assert ratio.differs_from(null) == tells
 
 
 def test_every_way_has_its_turn_in_every_round() -> None:
@@ -169,7 +195,7 @@ def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
 def _off(
     monkeypatch: pytest.MonkeyPatch, part: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> None:
-    """A fault: what the engine says of a part of positions and rotations is a little off."""
+    """Return a fault: what the engine says of a part of positions and rotations is a little off."""
 
     @around(fingertip, "engine_poses")
     def wrong(right: Any, *arguments: object) -> fingertip.Placement:
@@ -182,15 +208,19 @@ def _off(
 
 @pytest.mark.usefixtures("pinocchio")
 class TestCertificate:
-    def test_poses_are_drawn_within_the_limits_by_the_seed(self) -> None:
+    def test_poses_are_drawn_by_the_seed(self) -> None:
         model = sm.load("so101")
         one, again, other = (random_qpos(model, range(6), 50, seed) for seed in (1, 1, 2))
         assert np.array_equal(one, again)
         assert not np.array_equal(one, other)
-        assert not one[0].any()
+
+    def test_the_first_pose_is_zero_and_the_others_fill_the_limits(self) -> None:
+        model = sm.load("so101")
+        poses = random_qpos(model, range(6), 50, 1)
         low, high = model.jnt_range.T
-        assert ((one >= low) & (one <= high)).all()
-        assert (np.ptp(one[1:], axis=0) > 0.5 * (high - low)).all()
+        assert not poses[0].any()
+        assert ((poses >= low) & (poses <= high)).all()
+        assert (np.ptp(poses[1:], axis=0) > 0.5 * (high - low)).all()
 
     def test_its_tolerance_is_what_the_project_promises(self) -> None:
         assert_has(fingertip.certify(sm.load("so101"), poses=20), tolerance=1e-12, agrees=True)
@@ -229,17 +259,31 @@ class TestCertificate:
     )
 
     def test_without_a_name_every_body_at_an_end_has_a_certificate(self, tmp_path: Path) -> None:
-        model = model_of(tmp_path, self.ENDS.format(""))
-        found = fingertip.certify(model, poses=50)
-        assert_has(
-            found, agrees=True, site=found.tips[0].site, position_worst=found.tips[0].position_worst
-        )
+        found = fingertip.certify(model_of(tmp_path, self.ENDS.format("")), poses=50)
+        assert found.agrees
         assert {tip.site for tip in found.tips} == {"b", "body 3"}  # not the table: it is still
-        assert [tip.worst for tip in found.tips] == sorted(t.worst for t in found.tips)[::-1]
-        drawn = random_qpos(model, range(2), 500, 0)
+
+    def test_the_worst_end_is_first_and_stands_for_all(self, tmp_path: Path) -> None:
+        found = fingertip.certify(model_of(tmp_path, self.ENDS.format("")), poses=50)
+        worst = [tip.worst for tip in found.tips]
+        assert worst == sorted(worst, reverse=True)
+        first = found.tips[0]
+        assert_has(found, site=first.site, position_worst=first.position_worst)
+
+    def test_joints_without_limits_are_drawn_around_once_or_within_a_metre(
+        self, tmp_path: Path
+    ) -> None:
+        drawn = random_qpos(model_of(tmp_path, self.ENDS.format("")), range(2), 500, 0)
         assert np.abs(drawn[:, 0]).max() == pytest.approx(np.pi, rel=0.01)
         assert np.abs(drawn[:, 1]).max() == pytest.approx(1, rel=0.01)  # a slide's metres
+
+    def test_a_body_that_is_named_has_the_only_certificate(self, tmp_path: Path) -> None:
+        model = model_of(tmp_path, self.ENDS.format(""))
         assert [tip.site for tip in fingertip.certify(model, poses=50, site="a").tips] == ["a"]
+
+    def test_a_robot_that_no_joint_moves_has_a_certificate_of_a_named_body_alone(
+        self, tmp_path: Path
+    ) -> None:
         still = model_of(tmp_path, "<mujoco><worldbody><body name='b'/></worldbody></mujoco>")
         certify = partial(fingertip.certify, still, poses=5)
         refused((BadInputError, "moved by a joint", certify))
@@ -253,33 +297,43 @@ class TestCertificate:
         assert_has(found, agrees=False, site="body 3")
         assert [tip.agrees for tip in found.tips] == [False, True]
 
+    CLOTH = (
+        "<flexcomp name='f' type='grid' dim='2' count='3 3 1' spacing='.1 .1 .1' mass='1' "
+        "radius='.01'/>"
+    )
     # A cloth that nothing holds; its places are all that is asked.
-    @pytest.mark.filterwarnings(
+    of_a_cloth = pytest.mark.filterwarnings(
         "ignore:MuJoCo. flex 'f' is not rigid:statemachine.errors.EngineWarning"
     )
-    def test_what_is_not_read_from_the_file_is_told_and_is_no_verdict(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        cloth = (
-            "<flexcomp name='f' type='grid' dim='2' count='3 3 1' spacing='.1 .1 .1' mass='1' "
-            "radius='.01'/>"
-        )
-        file = written(tmp_path / "m.xml", self.ENDS.format(cloth))
-        certify = partial(fingertip.certify, sm.load(file), poses=20)
-        found = certify()
+
+    @of_a_cloth
+    def test_what_is_not_read_from_the_file_is_told_and_is_no_verdict(self, tmp_path: Path) -> None:
+        found = fingertip.certify(model_of(tmp_path, self.ENDS.format(self.CLOTH)), poses=20)
         assert_has(found, agrees=True, grade="same reading")
         assert "<flexcomp>" in found.reason
         assert not blocks(page({"mujoco": found}), Verdict)
-        _off(monkeypatch, lambda pos, _: pos)
-        assert not page({"mujoco": certify()}).holds
-        # Asked for, it is not replaced.
-        refused((ModelError, "<flexcomp>", partial(certify, witness=file)))
 
-    def test_mjcf_against_urdf_of_the_same_robot(self) -> None:
+    @of_a_cloth
+    def test_what_is_not_read_from_the_file_and_is_elsewhere_fails(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        _off(monkeypatch, lambda pos, _: pos)
+        found = fingertip.certify(model_of(tmp_path, self.ENDS.format(self.CLOTH)), poses=20)
+        assert not page({"mujoco": found}).holds
+
+    @of_a_cloth
+    def test_a_witness_that_is_asked_for_and_cannot_be_read_is_not_replaced(
+        self, tmp_path: Path
+    ) -> None:
+        file = written(tmp_path / "m.xml", self.ENDS.format(self.CLOTH))
+        certify = partial(fingertip.certify, sm.load(file), poses=20, witness=file)
+        refused((ModelError, "<flexcomp>", certify))
+
+    @pytest.mark.parametrize("site", ["gripper", "moving_jaw_so101_v1"])
+    @pytest.mark.parametrize(
+        ("file", "witness"), [("so101.xml", "so101.urdf"), ("so101.urdf", "so101.xml")]
+    )
+    def test_mjcf_against_urdf_of_the_same_robot(self, file: str, witness: str, site: str) -> None:
         arm = models_dir() / "so101"
-        for one, other in (("so101.xml", "so101.urdf"), ("so101.urdf", "so101.xml")):
-            for site in ("gripper", "moving_jaw_so101_v1"):
-                found = fingertip.certify(
-                    sm.load(arm / one), poses=50, site=site, witness=arm / other
-                )
-                assert_has(found, grade="own reading", agrees=True)
+        found = fingertip.certify(sm.load(arm / file), poses=50, site=site, witness=arm / witness)
+        assert_has(found, grade="own reading", agrees=True)

@@ -15,6 +15,7 @@ from statemachine.lab.recordings import RunMetadata, RunStart, read, record, wri
 
 from .support.claims import assert_has
 from .support.files import written, written_all
+from .support.processes import Cli
 
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>
@@ -96,7 +97,7 @@ def test_engine_settings_do_not_pay_for_another_file(
     typed = [
         f"{side}@pybullet:engine" if k == of_the_engine else side for k, side in enumerate(sides)
     ]
-    code, found = asked(capsys, "f.py:none", *typed, "--why", "--seconds", "0.6")
+    code, found = asked(capsys, "f.py:none", *typed, "--why", "--seconds", "0.3")
     assert code == 1
     assert found["unexplained"] > 0.9
 
@@ -119,19 +120,31 @@ def test_an_option_of_an_engine_as_it_comes_counts(
     assert not {"armature", "dry friction", "joint limits"} & {r["name"] for r in found["shares"]}
 
 
-@pytest.mark.slow
-def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
-    """The joint's damping differs by less than a tolerance; the box slides, or does not."""
+@pytest.fixture
+def sliding(folder: Path) -> Path:
+    """Two sides in which a joint's damping hardly differs, and a box slides or does not."""
     file(folder, "l.xml", more=SLIDING.format(".2"), qpos=".8 0 1 .06 1 0 0 0")
     file(folder, "r.xml", damping=".02001", more=SLIDING.format(".6"), qpos=".8 0 1 .06 1 0 0 0")
-    words = ("f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1")
-    for floor in ((), ("--uncertainty", "0.1deg")):
-        code, found = asked(capsys, *words, *floor)
-        assert (code, found["quantity"]) == (0, "box")
-        shares = {each["name"]: each["share"] for each in found["shares"]}
-        assert shares["friction of gb"] > 0.95
-        assert abs(shares["damping of j1"]) < 0.02
-    assert asked(capsys, *words, "--quantity", "joints")[1]["quantity"] == "joints"
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("sliding")
+@pytest.mark.parametrize("floor", [(), ("--uncertainty", "0.1deg")])
+def test_what_is_explained_is_what_differs(floor: tuple[str, ...], capsys: Any) -> None:
+    words = ("f.py:none", "l.xml", "r.xml", "--why", "--seconds", "0.6", *floor)
+    code, found = asked(capsys, *words)
+    assert (code, found["quantity"]) == (0, "box")
+    shares = {each["name"]: each["share"] for each in found["shares"]}
+    assert shares["friction of gb"] > 0.95
+    assert abs(shares["damping of j1"]) < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("sliding")
+def test_the_quantity_that_is_asked_for_is_explained(capsys: Any) -> None:
+    words = ("f.py:none", "l.xml", "r.xml", "--why", "--seconds", "0.6", "--quantity", "joints")
+    assert asked(capsys, *words)[1]["quantity"] == "joints"
 
 
 SENSOR = '<sensor><jointpos name="p" joint="j1" {}/></sensor>'
@@ -161,28 +174,52 @@ ONE_CAUSE: dict[str, tuple[dict[str, str], dict[str, str], str, str, tuple[Any, 
 
 @pytest.mark.parametrize("name", ONE_CAUSE)
 def test_one_cause_explains_all(folder: Path, capsys: Any, name: str) -> None:
-    left, right, function, known, value, models = ONE_CAUSE[name]
+    left, right, function, known, value, _ = ONE_CAUSE[name]
     sides = file(folder, "l.xml", **left), file(folder, "r.xml", **right)
     code, found = asked(capsys, f"f.py:{function}", *sides, "--why", "--no-chaos")
     (cause,) = found["shares"]
+    assert code == 0
     assert_has(cause, name=known, share=pytest.approx(1.0))
     assert [tuple(each.values()) for each in cause["values"]] == [value]
-    assert (code, main(["compare", "--models", *sides, "--details"])) == (0, models)
-    assert "Keyframe k: time" in capsys.readouterr().out or known != "time of the start"
 
 
-def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any) -> None:
+@pytest.mark.parametrize("name", ONE_CAUSE)
+def test_the_comparison_of_files_says_whether_the_cause_moves_a_robot(
+    folder: Path, here: Cli, name: str
+) -> None:
+    left, right, _, known, _, code = ONE_CAUSE[name]
+    sides = folder / file(folder, "l.xml", **left), folder / file(folder, "r.xml", **right)
+    text = here("compare", "--models", *sides, "--details", code=code).stdout
+    assert known != "time of the start" or "Keyframe k: time" in text
+
+
+@pytest.fixture
+def other_sensor(folder: Path) -> Path:
+    """Two sides of which one has a sensor of a joint's velocity instead of its position."""
     sensor = SENSOR.format("")
     file(folder, "l.xml", sensor=sensor)
     file(folder, "v.xml", sensor=sensor.replace("jointpos", "jointvel"))
+    return folder
+
+
+@pytest.mark.usefixtures("other_sensor")
+def test_another_sensor_counts_where_a_function_may_read_it(capsys: Any) -> None:
     code, found = asked(capsys, "f.py:sensed", "l.xml", "v.xml", "--why", "--no-chaos")
     assert (code, found["unexplained"]) == (1, 1.0)
     assert found["shares"][0]["name"] == "sensor of p"
-    # By themselves sensors move nothing.
+
+
+@pytest.mark.usefixtures("other_sensor")
+def test_another_sensor_moves_nothing_by_itself(capsys: Any) -> None:
     code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-chaos")
     assert (code, found["shares"]) == (0, [])
-    assert main(["compare", "l.xml", "v.xml", "--models", "--details"]) == 0
-    assert "Sensor of p: type" in capsys.readouterr().out
+
+
+def test_another_sensor_is_listed_among_the_details_of_two_files(
+    other_sensor: Path, here: Cli
+) -> None:
+    sides = other_sensor / "l.xml", other_sensor / "v.xml"
+    assert "Sensor of p: type" in here("compare", *sides, "--models", "--details", code=0).stdout
 
 
 def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
@@ -205,45 +242,57 @@ def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> N
     assert (code, found["commands"]) == (0, "more than ctrl")
 
 
-def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(
-    folder: Path, capsys: Any
-) -> None:
+@pytest.fixture
+def recorded(folder: Path) -> Path:
+    """Two files that differ in damping, and a run of each by a wave, and by a push."""
     file(folder, "l.xml")
     file(folder, "r.xml", damping=".2")
+    metadata = RunMetadata(options={"timestep": 0.004})
     for side in ("l", "r"):
-        model, options = sm.load(f"{side}.xml").replace(timestep=0.004), {"timestep": 0.004}
-        wave, push = (lambda _m, data: [np.sin(6 * data.time)]), (lambda _m, _d: [0.5])
-        write(
-            record(
-                model,
-                wave,
-                0.6,
-                start=RunStart(keyframe="k"),
-                metadata=RunMetadata(options=options),
-            ),
-            f"{side}.npz",
-        )
-        write(record(model, push, 0.6, metadata=RunMetadata(options=options)), f"{side}_push.npz")
+        model = sm.load(f"{side}.xml").replace(timestep=0.004)
+        start = RunStart(keyframe="k")
+        waved = record(model, wave, 0.6, start=start, metadata=metadata)
+        write(waved, f"{side}.npz")
+        write(record(model, lambda _m, _d: [0.5], 0.6, metadata=metadata), f"{side}_push.npz")
+    return folder
 
-    def why(*words: str) -> tuple[int, dict[str, Any]]:
-        return main(["compare", *words, "--why", "--no-chaos", "--json"]), json.loads(
-            capsys.readouterr().out
-        )
 
-    code, found = why("l.npz", "r.npz")
+def wave(_model: sm.Model, data: sm.Data) -> list[float]:
+    return [np.sin(6 * data.time)]
+
+
+def explained_files(capsys: Any, *words: str) -> tuple[int, dict[str, Any]]:
+    """Ask why two sides differ: the exit code, and the JSON."""
+    code = main(["compare", *words, "--why", "--no-chaos", "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.usefixtures("recorded")
+def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(capsys: Any) -> None:
+    code, found = explained_files(capsys, "l.npz", "r.npz")
     assert (code, [row["name"] for row in found["shares"]]) == (0, ["damping of j1"])
     apart = np.abs(read("l.npz").qpos - read("r.npz").qpos).max()
     assert found["gap"] == pytest.approx(apart, rel=1e-9)
-    # Two sides of one's own are given the recorded commands.
-    _, same = why("l.npz", "l.xml", "r.xml")
-    assert same["gap"] == pytest.approx(found["gap"], rel=1e-9)
-    # The start and the commands are causes, too.
-    code, found = why("l.npz", "r_push.npz")
-    assert (code, {row["name"] for row in found["shares"]}) == (
-        0,
-        {"damping of j1", "start", "commands"},
-    )
+
+
+@pytest.mark.usefixtures("recorded")
+def test_two_files_are_given_the_commands_of_a_recorded_run(capsys: Any) -> None:
+    _, found = explained_files(capsys, "l.npz", "l.xml", "r.xml")
+    apart = np.abs(read("l.npz").qpos - read("r.npz").qpos).max()
+    assert found["gap"] == pytest.approx(apart, rel=1e-9)
+
+
+@pytest.mark.usefixtures("recorded")
+def test_the_start_and_the_commands_of_recorded_runs_are_causes(capsys: Any) -> None:
+    code, found = explained_files(capsys, "l.npz", "r_push.npz")
+    names = {row["name"] for row in found["shares"]}
+    assert (code, names) == (0, {"damping of j1", "start", "commands"})
     assert sum(row["share"] for row in found["shares"]) == pytest.approx(1.0)
-    (folder / "r.xml").unlink()
+
+
+def test_a_recorded_run_whose_file_is_gone_is_refused_by_its_name(
+    recorded: Path, capsys: Any
+) -> None:
+    (recorded / "r.xml").unlink()
     assert main(["compare", "l.npz", "r.npz", "--why"]) == 2
-    assert "r.xml is not here" in capsys.readouterr().err
+    assert "r.xml" in capsys.readouterr().err

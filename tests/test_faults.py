@@ -183,9 +183,9 @@ def test_after(model):
 def test_what_ends_under_a_fault_has_caught_it(
     what: str, why: str, write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, "_TIMES", 1.0)
-    monkeypatch.setattr(run, "_AND", 10.0)
-    monkeypatch.setattr(run, "_CLOCK_AND", 10.0)
+    monkeypatch.setattr(run, "CPU_FACTOR", 1.0)
+    monkeypatch.setattr(run, "MORE_CPU", 10.0)
+    monkeypatch.setattr(run, "MORE_CLOCK", 10.0)
     found = examine(write(HANGS_OR_FALLS.format(what=what)), only=("no-forward", "xyzw"))
     caught, survived = found.trials
     assert not survived.caught

@@ -47,7 +47,7 @@ NAMES = [f"the_left_front_leg_of_the_robot_number_{k}" for k in range(12)]
 
 
 def chain(damping: float = 0.1, mass: float = 0.2, kp: float = 5.0) -> str:
-    """A chain of twelve links with long names."""
+    """Return a chain of twelve links with long names."""
     inner = ""
     for k, name in enumerate(reversed(NAMES)):
         inner = LINK.format(
@@ -87,7 +87,7 @@ def result(request: pytest.FixtureRequest, chains: tuple[str, str]) -> ShownResu
 
 
 def releases_of(run: Request, model: str) -> VersionsResult:
-    """Ten pairs of releases; what is compared stands for what they do."""
+    """Return ten pairs of releases; what is compared stands for what they do."""
     comparison = gap.answer(gap.CompareRequest(run, uncertainty=None)).comparison
     change = KnownChange("kv of a limited servo", "implicitfast", 1.0, 0.0, tuple(NAMES))
     pairs: list[ReleasePair] = []
@@ -189,7 +189,7 @@ RIGHT = {"com": "0.1", "mass": "1", "upper": "1", "damping": "0.2"}
 
 
 def changed_text(result: ModelsComparison, text: str) -> str:
-    """A text with each attribute changed on the line that is named."""
+    """Return a text with each attribute changed on the line that is named."""
     lines = text.splitlines()
     for change in dict.fromkeys(change.attributes for change in result.changes):
         for attribute in change:

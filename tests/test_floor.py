@@ -46,7 +46,7 @@ def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:
 
 
 def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> Band:
-    """The floor of one quantity of a run, against itself or one that was recorded."""
+    """Return the floor of one quantity of a run, against itself or one that was recorded."""
     one = run.record()
     floor = chaos_floor(compare(one, two or one), (run, None), **how)
     (band,) = [band for band in floor.bands if band.name == name]
@@ -99,7 +99,7 @@ def test_a_gap_of_chaos_alone_is_told_from_one_that_was_made(tmp_path: Path) -> 
 
 
 def swapped_pair(folder: Path, seconds: float) -> tuple[Rerun, Rerun]:
-    """A double pendulum that swings without damping, and one that comes to rest."""
+    """Return a double pendulum that swings without damping, and one that comes to rest."""
     start = np.array([2.9, 0.3])
     damped = DOUBLE_PENDULUM.replace("<joint ", '<joint damping="0.1" ')
     assert damped != DOUBLE_PENDULUM
@@ -294,12 +294,12 @@ def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Co
 
 
 def asked(found: Convergence, what: str) -> ConvergeResult:
-    """The same as a Result, of which a page can be made."""
+    """Return the same as a Result, of which a page can be made."""
     return ConvergeResult(**vars(found), request=ConvergeRequest(Request((what,))))
 
 
 def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Convergence:
-    """What becomes of the gap of two Models with finer steps."""
+    """Return what becomes of the gap of two Models with finer steps."""
     return convergence(
         lambda finer: (
             record(one.replace(substeps=finer), None, seconds),
@@ -308,16 +308,24 @@ def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Convergence:
     )
 
 
-def test_explicit_against_implicit_damping_is_discretisation(tmp_path: Path) -> None:
+@pytest.fixture
+def two_dampings(tmp_path: Path) -> Convergence:
+    """Explicit against implicit damping, with finer steps."""
     explicit = {"integrator": "Euler", "flag": '<flag eulerdamp="disable"/>'}
-    found = found_of(tmp_path, {}, explicit)
-    (joint,) = [each for each in found.whole if each.kind == "joint"]
+    return found_of(tmp_path, {}, explicit)
+
+
+def test_a_gap_of_explicit_damping_halves_with_the_step(two_dampings: Convergence) -> None:
+    """A method of the first order."""
+    (joint,) = [each for each in two_dampings.whole_run if each.kind == "joint"]
     assert joint.verdict == "discretisation"
     assert joint.gaps[0] > 1e-3
     assert [joint.gaps[k] / joint.gaps[k + 1] for k in (0, 1)] == pytest.approx([2, 2], rel=0.1)
-    assert found.vanishes
-    assert found.state == "vanishes"
-    assert page(asked(found, "fall")).holds
+
+
+def test_a_gap_of_explicit_damping_vanishes_and_the_page_holds(two_dampings: Convergence) -> None:
+    assert (two_dampings.vanishes, two_dampings.state) == (True, "vanishes")
+    assert page(asked(two_dampings, "fall")).holds
 
 
 @pytest.mark.parametrize(
@@ -327,7 +335,7 @@ def test_another_order_of_integration_is_discretisation_and_one_side_twice_no_ga
     tmp_path: Path, left: str, right: str, verdict: str
 ) -> None:
     found = found_of(tmp_path, {"integrator": left}, {"integrator": right})
-    assert {each.verdict for each in (*found.whole, *found.before)} == {verdict}
+    assert {each.verdict for each in (*found.whole_run, *found.before_touch)} == {verdict}
     assert found.state == {"discretisation": "vanishes", "rounding": "rounding"}[verdict]
     assert page(asked(found, "fall")).holds
 
@@ -369,7 +377,7 @@ def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path
         one, two = (sm.load(written(tmp_path / "m.xml", x), timestep=timestep) for x in texts)
         with pytest.warns(EngineWarning, match="by 0.524; inside with --keyframe up$"):
             found = convergence_of(one, two, 1.0)
-        assert found.whole[0].verdict == verdict
+        assert found.whole_run[0].verdict == verdict
         shown_page = page(asked(found, "fall"))
         (code,) = blocks(shown_page, Code)
         ends = "--timestep 0.0025 --converge" if found.unclear else "--why --quantity 'joint 0'"

@@ -35,7 +35,7 @@ def test_each_target_runs_in_a_process_of_its_own(target: str) -> None:
 
 def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[list[str]] = []
-    monkeypatch.setattr(command_lines, "_furnish", lambda _folder: None)
+    monkeypatch.setattr(command_lines, "furnish", lambda _folder: None)
     monkeypatch.setattr(command_lines, "examine", lambda words, _folder: seen.append(words) or "")
     for seed in (1, 1, 2):
         assert command_lines.run(seed, 20).tried == 20
@@ -101,18 +101,18 @@ PATCHES: dict[str, list[tuple[Any, str, Any]]] = {
     ],
     "a data stays taken": [(sm, "step", Mock(side_effect=BusyDataError("taken for ever")))],
     "a digest is not looked at": [
-        (formats, "_digest", lambda _text, _columns: "0" * 64),
-        (traces, "_CHANGES", [traces._flip] * 3),
+        (formats, "content_digest", lambda _text, _columns: "0" * 64),
+        (traces, "CHANGES", [traces.flip] * 3),
     ],
     "a command line ends in a traceback": [
         (command_lines, "command", lambda *of: [sys.executable, "-c", BROKEN_PARSER, *of]),
-        (command_lines, "_furnish", lambda _folder: None),
-        (command_lines, "_BASES", [["doctor", "--json"]]),
+        (command_lines, "furnish", lambda _folder: None),
+        (command_lines, "BASES", [["doctor", "--json"]]),
     ],
     "a reader of models fails": [
-        (models, "_READER", models._READER.replace("import statemachine as sm", BLIND_READER))
+        (models, "READER", models.READER.replace("import statemachine as sm", BLIND_READER))
     ],
-    "a writer writes in place": [(kills, "_WRITER", IN_PLACE + kills._WRITER)],
+    "a writer writes in place": [(kills, "WRITER", IN_PLACE + kills.WRITER)],
 }
 
 

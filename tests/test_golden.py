@@ -18,7 +18,9 @@ from .support.rendering import overlaps_of_silhouettes
 Golden = Callable[[str], np.ndarray]
 
 
-def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
+def test_the_fingertip_is_where_the_public_model_has_it_at_200_poses(
+    mujoco_arm: sm.Model, golden: Golden
+) -> None:
     table = golden("golden_fk")
     assert len(table) == 200
     tip = mujoco_arm.site_id("gripperframe")
@@ -30,17 +32,23 @@ def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
             assert np.abs(data.site_xmat[tip] - matrix).max() < 1e-12
 
 
-def test_fingertip_by_the_witness(golden: Golden, pinocchio: None) -> None:
+def test_the_witness_has_the_fingertip_where_the_public_model_has_it(
+    golden: Golden, pinocchio: None
+) -> None:
     table = golden("golden_fk")
     tips = sm.Kinematics("so101").poses(angles(table), "gripperframe").pos
     assert np.abs(tips - columns(table, "x_m", "y_m", "z_m")).max() < 1e-12
 
 
-def test_servos_on(mujoco_scene: sm.Model, golden: Golden) -> None:
+def test_an_arm_that_is_held_moves_as_the_public_model(
+    mujoco_scene: sm.Model, golden: Golden
+) -> None:
     assert np.abs(path(mujoco_scene, 800) - angles(golden("golden_gravity_on"))).max() < 1e-6
 
 
-def test_servos_off(mujoco_scene: sm.Model, golden: Golden) -> None:
+def test_an_arm_that_falls_moves_as_the_public_model(
+    mujoco_scene: sm.Model, golden: Golden
+) -> None:
     expected = angles(golden("golden_gravity_off"))
     run = path(mujoco_scene.replace(actuation=False), 800)
     assert np.abs(np.degrees(run - expected)).max() < 0.0018
@@ -89,7 +97,7 @@ def test_keyframe_pickup_is_the_public_one(mujoco_box: sm.Model, menagerie: Path
 
 
 @pytest.mark.slow
-def test_it_looks_like_an_so101(mujoco_arm: sm.Model, menagerie: Path, tmp_path: Path) -> None:
+def test_the_arm_looks_like_an_so101(mujoco_arm: sm.Model, menagerie: Path, tmp_path: Path) -> None:
     public = menagerie / "robotstudio_so101" / "so101.xml"
     overlaps = overlaps_of_silhouettes(mujoco_arm, public, tmp_path)
     assert len(overlaps) == 8

@@ -6,6 +6,7 @@ import itertools
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,7 @@ STILL = np.zeros(1, dtype=np.float32)
 
 
 def upright(world: WorldView) -> float:
-    """A reward of what is derived."""
+    """Return a reward of what is derived."""
     return float(world.site_xpos[0, 2])
 
 
@@ -92,7 +93,7 @@ def env(cart: sm.Model) -> Iterator[Any]:
 
 
 def tasks(backend: str, folder: Path) -> dict[str, dict[str, Any]]:
-    """The cart and the arms of the examples, as arguments of `make_env`."""
+    """Return the cart and the arms of the examples, as arguments of `make_env`."""
     return {
         "cart": {"model": loaded(folder, CART, PUSH, backend=backend), **BALANCE},
         "reach": reach.task(backend),
@@ -151,17 +152,34 @@ def test_each_world_has_its_picture_and_the_camera_is_as_told(tmp_path: Path) ->
         assert np.array_equal(pictures[1], one.render())
 
 
-def test_without_more_than_a_reward(cart: sm.Model) -> None:
-    """qpos and qvel of the default state are observed, and no episode ends."""
+def test_qpos_and_qvel_of_the_default_state_are_observed_unless_told_otherwise(
+    cart: sm.Model,
+) -> None:
     with closing(make_env(cart, upright)) as made:
         observation, info = made.reset(seed=1)
-        assert np.array_equal(observation, np.zeros(4))
-        assert info == {"diverged": False}
+    assert np.array_equal(observation, np.zeros(4))
+    assert info == {"diverged": False}
+
+
+def test_no_episode_ends_unless_told_otherwise(cart: sm.Model) -> None:
+    with closing(make_env(cart, upright)) as made:
+        made.reset(seed=1)
         _, reward, terminated, truncated, _ = made.step(STILL)
-        assert (reward, terminated, truncated) == (pytest.approx(0.6), False, False)
+    assert (reward, terminated, truncated) == (pytest.approx(0.6), False, False)
+
+
+def test_a_step_is_a_timestep_unless_told_otherwise(cart: sm.Model) -> None:
+    with closing(make_env(cart, upright)) as made:
+        made.reset(seed=1)
+        made.step(STILL)
         assert made.data.time == pytest.approx(cart.timestep)
-        assert made.render() is None
         assert made.metadata["render_fps"] == round(1 / cart.timestep)
+
+
+def test_nothing_is_rendered_unless_told_otherwise(cart: sm.Model) -> None:
+    with closing(make_env(cart, upright)) as made:
+        made.reset(seed=1)
+        assert made.render() is None
 
 
 def test_an_observation_is_of_the_present(env: Any) -> None:
@@ -176,47 +194,82 @@ def test_an_observation_is_of_the_present(env: Any) -> None:
     assert reward != pytest.approx(0.6, abs=1e-9)
 
 
-def test_actions_are_commands(env: Any) -> None:
+@pytest.mark.parametrize(("action", "ctrl"), [(-1, -10), (1, 20), (0, 5), (3, 20)])
+def test_an_action_is_a_command_within_its_range(env: Any, action: float, ctrl: float) -> None:
     env.reset(seed=0)
-    for action, ctrl in ((-1, -10), (1, 20), (0, 5), (3, 20)):
-        env.step(np.full(1, action, dtype=np.float32))
-        assert env.data.ctrl[0] == pytest.approx(ctrl)
+    env.step(np.full(1, action, dtype=np.float32))
+    assert env.data.ctrl[0] == pytest.approx(ctrl)
+
+
+def test_a_range_of_commands_can_be_asked_for(env: Any) -> None:
     with closing(make_env(env.model, upright, ctrl_range=[[-1, 3]])) as narrow:
         narrow.reset()
         narrow.step(STILL)
         assert narrow.data.ctrl[0] == 1
 
 
-def test_a_keyframe_is_the_start_that_reset_adds_to(cart: sm.Model) -> None:
-    def pushed(model: sm.Model, rng: np.random.Generator) -> Start:
-        return Start(qvel=[2.0, 0.0])
-
-    cases: list[tuple[dict[str, Any], list[float]]] = [({}, [0, 0.5]), ({"reset": pushed}, [2, 0])]
-    for options, qvel in cases:
-        with closing(make_env(cart, upright, keyframe="left", **options)) as made:
-            assert made.reset()[0].tolist() == [-1, 0.1, *qvel]
+def pushed_start(model: sm.Model, rng: np.random.Generator) -> Start:
+    return Start(qvel=[2.0, 0.0])
 
 
-def test_what_functions_read_is_that_of_the_data_and_cannot_be_written(cart: sm.Model) -> None:
-    names = [name for name in vars(WorldView) if isinstance(vars(WorldView)[name], property)]
-    seen: list[WorldView] = []
+@pytest.mark.parametrize(
+    ("options", "qvel"), [({}, [0, 0.5]), ({"reset": pushed_start}, [2, 0])], ids=["", "pushed"]
+)
+def test_a_keyframe_is_the_start_that_reset_adds_to(
+    options: dict[str, Any], qvel: list[float], cart: sm.Model
+) -> None:
+    with closing(make_env(cart, upright, keyframe="left", **options)) as made:
+        assert made.reset()[0].tolist() == [-1, 0.1, *qvel]
+
+
+@pytest.fixture
+def seen(cart: sm.Model) -> Iterator[tuple[WorldView, WorldView, Any]]:
+    """What a function was given in a step of an Env, of an Env of two worlds, and the first."""
+    views: list[WorldView] = []
 
     def keep(world: WorldView) -> float:
-        seen.append(world)
+        views.append(world)
         return 0.0
 
     with closing(make_env(cart, keep)) as made, closing(make_vec(cart, 2, keep)) as envs:
         made.reset()
         envs.reset()
         made.step(STILL)
-        of_env = {name: np.array(getattr(seen[-1], name)) for name in names}
+        of_one = views[-1]
         envs.step(np.zeros((2, 1), dtype=np.float32))
-        assert len(names) == 13
-        for name in names:
-            assert np.array_equal(of_env[name], getattr(seen[-1], name)), name
-            assert np.array_equal(of_env[name], getattr(made.data, name)), name
-        for array in (seen[-1].qpos, seen[-1].xpos, made.world.qpos, made.world.goal):
-            assert not array.flags.writeable
+        yield of_one, views[-1], made
+
+
+READABLE = [name for name in vars(WorldView) if isinstance(vars(WorldView)[name], property)]
+
+
+def test_a_world_has_13_attributes_to_read() -> None:
+    assert len(READABLE) == 13
+
+
+@pytest.mark.parametrize("name", READABLE)
+def test_what_a_function_reads_is_that_of_the_data(
+    name: str, seen: tuple[WorldView, WorldView, Any]
+) -> None:
+    of_one, of_several, made = seen
+    expected = getattr(made.data, name)
+    assert np.array_equal(getattr(of_one, name), expected)
+    assert np.array_equal(getattr(of_several, name), expected)
+
+
+@pytest.mark.parametrize("name", ["qpos", "xpos"])
+def test_what_a_function_reads_cannot_be_written(
+    name: str, seen: tuple[WorldView, WorldView, Any]
+) -> None:
+    for world in seen[:2]:
+        assert not getattr(world, name).flags.writeable
+
+
+@pytest.mark.parametrize("name", ["qpos", "goal"])
+def test_what_is_read_of_an_env_cannot_be_written(
+    name: str, seen: tuple[WorldView, WorldView, Any]
+) -> None:
+    assert not getattr(seen[2].world, name).flags.writeable
 
 
 # One way of each to start anew is quick enough for every run of the tests.
@@ -277,27 +330,67 @@ def test_processes_of_gymnasium_give_the_same_bits(backend: str, tmp_path: Path)
             assert data_equivalence(ours.step(actions), theirs.step(actions), exact=True)
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, cart: sm.Model) -> None:
-    envs = make_vec(cart, 3, autoreset_mode=mode, **BALANCE)
+@dataclass(frozen=True)
+class DivergedStep:
+    """A step in which one of several worlds diverged.
+
+    Attributes:
+        envs: The worlds.
+        first: Observations after the reset before, shape (n, k).
+        observations, rewards, terminated, truncated, infos: What the step returned.
+        is_same: Whether a world starts anew in the step in which its episode ended.
+    """
+
+    envs: Any
+    first: np.ndarray
+    observations: np.ndarray
+    rewards: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+    infos: dict[str, Any]
+    is_same: bool
+
+
+@pytest.fixture(params=["NextStep", "SameStep"])
+def diverged(request: pytest.FixtureRequest, cart: sm.Model) -> Iterator[DivergedStep]:
+    """Three worlds of which the second diverged in a step, in two ways to start anew."""
+    envs = make_vec(cart, 3, autoreset_mode=request.param, **BALANCE)
     with warnings.catch_warnings(action="error", category=DivergedWarning), closing(envs):
         first, _ = envs.reset(seed=0)
-        still = np.zeros((3, 1), dtype=np.float32)
         envs.worlds.qvel[1] = 1e12
-        after, rewards, terminated, truncated, infos = envs.step(still)
-        assert truncated.tolist() == [False, True, False]
-        assert not terminated.any()
-        assert np.isfinite(after).all()
-        assert rewards[1] == (0 if mode == "NextStep" else rewards[1])
-        same = mode == "SameStep"
-        final, last = (infos["final_info"], infos["final_obs"]) if same else (infos, after)
-        assert final["diverged"].tolist() == [False, True, False]
-        assert np.array_equal(last[1], first[1])
-        after, _, _, truncated, infos = envs.step(still)
-        assert not truncated.any()
-        assert not infos["diverged"].any()
-        assert not envs.worlds.diverged
-        assert (after != first).any(axis=1).all()
+        ended = envs.step(np.zeros((3, 1), dtype=np.float32))
+        yield DivergedStep(envs, first, *ended, is_same=request.param == "SameStep")
+
+
+def test_a_world_that_diverges_is_truncated_and_no_other(diverged: DivergedStep) -> None:
+    assert diverged.truncated.tolist() == [False, True, False]
+    assert not diverged.terminated.any()
+
+
+def test_what_is_observed_of_a_world_that_diverged_is_finite(diverged: DivergedStep) -> None:
+    assert np.isfinite(diverged.observations).all()
+    assert np.isfinite(diverged.rewards).all()
+    assert diverged.is_same or diverged.rewards[1] == 0
+
+
+def test_the_last_observation_of_a_world_that_diverged_is_the_one_before(
+    diverged: DivergedStep,
+) -> None:
+    if diverged.is_same:
+        info, last = diverged.infos["final_info"], diverged.infos["final_obs"]
+    else:
+        info, last = diverged.infos, diverged.observations
+    assert info["diverged"].tolist() == [False, True, False]
+    assert np.array_equal(last[1], diverged.first[1])
+
+
+def test_a_world_that_diverged_starts_anew_and_the_others_go_on(diverged: DivergedStep) -> None:
+    envs = diverged.envs
+    after, _, _, truncated, infos = envs.step(np.zeros((3, 1), dtype=np.float32))
+    assert not truncated.any()
+    assert not infos["diverged"].any()
+    assert not envs.worlds.diverged
+    assert (after != diverged.first).any(axis=1).all()
 
 
 def huge_when_pushed(world: WorldView) -> np.ndarray:
@@ -390,7 +483,7 @@ def test_a_model_without_commands_between_bounds_is_refused(
 
 
 def after(calls: int, first: Any, then: Any) -> Callable[[WorldView], Any]:
-    """A function that returns something else from a call on."""
+    """Return a function that returns something else from a call on."""
     seen = itertools.count()
     return lambda _: first if next(seen) < calls else then
 

@@ -107,7 +107,7 @@ class Other:
 
 
 def _doubles(name: str, monkeypatch: pytest.MonkeyPatch) -> int:
-    """How often both threads are inside, over all schedules of one kind.
+    """Return how often both threads are inside, over all schedules of one kind.
 
     The other thread is inside a step. At one moment here at which Python may change threads it
     ends that step; at a later one, or the same, it begins another.
@@ -185,7 +185,7 @@ def test_a_wrong_hand_over_is_found(line: str, monkeypatch: pytest.MonkeyPatch) 
     assert _doubles("contacts", monkeypatch) > 0
 
 
-LONG = pytest.param(20, marks=pytest.mark.slow)
+LONG = pytest.param(10, marks=pytest.mark.slow)
 
 
 @pytest.mark.parametrize("seconds", [1, LONG])

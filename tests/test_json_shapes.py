@@ -52,7 +52,7 @@ def _said(command: str, folder: str | Path) -> Any:
 
 
 def shape(value: Any) -> Any:
-    """Keys with the shapes under them, a list of the shapes of a list, the name of a type."""
+    """Return keys with the shapes under them, the shapes of a list, or the name of a type."""
     if isinstance(value, dict):
         return {
             name: "number or null"

@@ -44,7 +44,9 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Files are judged by what is in them, in no time; the names of those that were."""
     seen: list[str] = []
 
-    def judge(self: ExerciseJudge, file: Path, progress: Any = None, own: Any = None) -> Grade:
+    def judge(
+        self: ExerciseJudge, file: Path, progress: Any = None, submitted_files: Any = None
+    ) -> Grade:
         seen.append(Path(file).name)
         text = Path(file).read_text()
         remarks = (text, f"{LOOK}: it reads x") if "look" in text else (text,)
@@ -98,7 +100,7 @@ def test_the_digest_of_the_software_is_that_of_its_files(
         judged_before.software_digest.cache_clear()
         return judged_before.software_digest()
 
-    monkeypatch.setattr(judged_before, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(judged_before, "PACKAGE", tmp_path)
     try:
         one, two, again = digest_of("1"), digest_of("2"), digest_of("1")
         (tmp_path / name).rename(tmp_path / f"other_{Path(name).name}")
@@ -189,8 +191,12 @@ def test_a_class_is_judged_once(again: Callable[..., list[str]], kept_in: Path) 
     assert again() == ["ann.py", "bob.py"]
     assert len(list(kept_in.iterdir())) == 2
     assert again() == []
-    assert again(time_limit=7.0) == ["ann.py", "bob.py"]  # judged otherwise
-    assert again() == []
+
+
+def test_a_class_is_judged_again_with_another_time_limit(again: Callable[..., list[str]]) -> None:
+    again()
+    assert again(time_limit=7.0) == ["ann.py", "bob.py"]
+    assert again() == []  # either verdict is kept
 
 
 @pytest.mark.parametrize("word", ["look", "busy"])
@@ -235,7 +241,7 @@ def test_what_tests_catch_is_kept_and_an_error_is_not(
 ) -> None:
     ran: list[str] = []
 
-    def examined(file: Path, backend: str, own: dict[str, Path]) -> Examination:
+    def examined(file: Path, backend: str, submitted_files: dict[str, Path]) -> Examination:
         ran.append(file.read_text())
         if "error" in ran[-1]:
             raise MissingEngineError("pytest is not here")

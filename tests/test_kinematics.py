@@ -32,7 +32,7 @@ def _write(folder: Path, text: str, name: str = "robot.xml") -> Path:
 
 
 def _against_mujoco(model: sm.Model, qpos: np.ndarray, site: str) -> float:
-    """The worst difference of pose and of Jacobian."""
+    """Return the worst difference of pose and of Jacobian."""
     kinematics = sm.Kinematics(model.path)
     where = model.site_id(site)
     with opened(model, qpos=qpos, derived=True) as (_, data):
@@ -112,7 +112,9 @@ WORLD = "<mujoco><worldbody>{}</worldbody></mujoco>"
         ("", "not an XML file"),
     ],
 )
-def test_what_it_does_not_read_is_said_in_one_line(tmp_path: Path, text: str, word: str) -> None:
+def test_what_kinematics_do_not_read_is_refused_in_one_line(
+    tmp_path: Path, text: str, word: str
+) -> None:
     refused((ModelError, re.escape(word), lambda: sm.Kinematics(_write(tmp_path, text))))
 
 
@@ -271,7 +273,7 @@ TRAPS = {
 
 
 def _poses_agree(model: sm.Model, kinematics: sm.Kinematics) -> float:
-    """The largest gap of any body and site to the engine's."""
+    """Return the largest gap of any body and site to the engine's."""
     worst = 0.0
     for qpos in np.random.default_rng(0).normal(size=(4, model.nq)):
         with opened(model, qpos=qpos, derived=True) as (_, data):

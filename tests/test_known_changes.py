@@ -46,7 +46,7 @@ d = mujoco.MjData(m); d.ctrl[:] = 1.0; mujoco.mj_step(m, d); print(json.dumps(d.
 
 
 def urdf(rpy: str = "0 0 0", mimic: str = "", mass: str = "1") -> str:
-    """Two arms that hang on one base."""
+    """Return two arms that hang on one base."""
     first = LINK.format(name="a", rpy=rpy, axis="0 1 0.3", mimic="")
     second = LINK.format(name="b", rpy="0 0 0", axis="0 1 0", mimic=mimic)
     second = second.replace('value="1"', f'value="{mass}"')
@@ -54,14 +54,14 @@ def urdf(rpy: str = "0 0 0", mimic: str = "", mass: str = "1") -> str:
 
 
 def raw(python: Path | str, file: Path, code: str) -> Any:
-    """What code prints as JSON in a Python, of the model `m` of a file."""
+    """Return what code prints as JSON in a Python, of the model `m` of a file."""
     start = f"import json, mujoco\nm = mujoco.MjModel.from_xml_path({str(file)!r})\n"
     done = subprocess.check_output([str(python), "-I", "-c", start + code], text=True)
     return json.loads(done)
 
 
 def pair_of(file: Path, experiment: str = "hold", seconds: float = 0.5) -> ReleasePair:
-    """The old release and the installed one."""
+    """Return the old release and the installed one."""
     run = Request((experiment,), model=str(file), seconds=seconds)
     (pair,) = answer(VersionsRequest(run, OLD.partition("==")[2])).pairs
     return pair
@@ -194,7 +194,7 @@ def test_nothing_is_told_where_the_probe_is_the_same_on_both(
     tmp_path: Path, old_releases: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A change that is known elsewhere is no reason here."""
-    monkeypatch.setattr(known_changes, "_measured", lambda _backend: {"implicitfast": 1.0})
+    monkeypatch.setattr(known_changes, "probe_results", lambda _backend: {"implicitfast": 1.0})
     file = written(tmp_path / "m.xml", SERVO.format(integrator="implicitfast", limit=LIMIT))
     pair = pair_of(file)
     assert pair.is_changed

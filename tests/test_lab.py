@@ -17,6 +17,7 @@ import statemachine as sm
 from statemachine import cli, lab
 from statemachine.errors import BadInputError, StateMachineError, UnknownNameError
 from statemachine.lab.compare.perturbed import Uncertainty
+from statemachine.lab.questions.requests.gap import CompareResult
 from statemachine.lab.recordings import record, write
 
 from .support.files import written
@@ -38,7 +39,7 @@ def heavy(tmp_path: Path) -> str:
 
 
 def swing(model: sm.Model, data: sm.Data) -> np.ndarray:
-    """Both servos follow a sine."""
+    """Command both servos to follow a sine."""
     return np.full(model.nu, 0.4 * np.sin(5 * data.time))
 
 
@@ -71,8 +72,8 @@ FUNCTIONS = {"why": "why", "one_step": "one_step", "converge": "converge", "mode
 
 
 def options_of(command: str) -> Iterator[str]:
-    """Names of the options and words of a command, as argparse keeps them."""
-    parser = cli._parser([command])
+    """Return the names of the options and words of a command, as argparse keeps them."""
+    parser = cli.parser_of([command])
     (commands,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
     for action in commands.choices[command]._actions:
         yield action.dest
@@ -307,8 +308,10 @@ def test_what_was_run_is_asked_another_question(light: str, heavy: str) -> None:
     assert result.quantity == "elbow"
 
 
-def test_arguments_make_the_request(light: str, heavy: str) -> None:
-    result = lab.compare(
+@pytest.fixture
+def asked_for_much(light: str, heavy: str) -> CompareResult:
+    """The answer to a question with every kind of argument."""
+    return lab.compare(
         light,
         heavy,
         what=swing,
@@ -319,14 +322,24 @@ def test_arguments_make_the_request(light: str, heavy: str) -> None:
         tolerances={"joint": "1deg", "tip": 0.01},
         uncertainty="0.1deg",
     )
-    run = result.request.run
+
+
+def test_arguments_of_a_run_are_in_the_request(asked_for_much: CompareResult) -> None:
+    run = asked_for_much.request.run
     assert (run.seconds, run.every, run.options) == (0.1, 2, {"timestep": 0.001})
-    assert result.request.tolerances == {"joint": pytest.approx(np.radians(1)), "tip": 0.01}
-    uncertainty = result.request.uncertainty
+    assert dict(run.names) == {"elbow": "elbow"}
+
+
+def test_tolerances_of_the_request_are_in_si_units(asked_for_much: CompareResult) -> None:
+    tolerances = asked_for_much.request.tolerances
+    assert tolerances == {"joint": pytest.approx(np.radians(1)), "tip": 0.01}
+
+
+def test_an_uncertainty_of_the_start_makes_a_floor(asked_for_much: CompareResult) -> None:
+    uncertainty = asked_for_much.request.uncertainty
     assert isinstance(uncertainty, Uncertainty)
-    assert uncertainty.length == 0.0
-    assert uncertainty.angle == pytest.approx(np.radians(0.1))
-    assert result.floor is not None
+    assert (uncertainty.length, uncertainty.angle) == (0.0, pytest.approx(np.radians(0.1)))
+    assert asked_for_much.floor is not None
 
 
 REFUSED: list[tuple[Callable[[str], object], str]] = [
@@ -427,19 +440,21 @@ def test_a_table_has_columns_of_one_length_and_type(any_result: Any) -> None:
         assert len(frames.DataFrame(columns)) == table.num_rows
 
 
-def test_a_notebook_gets_html_whose_styles_stay_inside(any_result: Any) -> None:
-    html = any_result._repr_html_()
-    style = re.search(r"<style>(.*?)</style>", html, re.S)
+def test_a_notebook_gets_html_with_tables_and_folds_and_no_script(any_result: Any) -> None:
+    html = any_result._repr_html_()  # as a notebook shows it
+    assert html.startswith('<div class="statemachine-result">')
+    assert "<table>" in html
+    assert "<details>" in html
+    assert "<script" not in html
+
+
+def test_the_styles_of_a_result_in_a_notebook_stay_inside(any_result: Any) -> None:
+    style = re.search(r"<style>(.*?)</style>", any_result._repr_html_(), re.S)
     assert style is not None
     rules = re.findall(r"([^{}]+)\{", style[1])
     assert len(rules) > 10
-    for rule in rules:
-        for selector in rule.split(","):
-            assert selector.strip().startswith(".statemachine-result")
-    assert html.startswith('<div class="statemachine-result">')
-    assert "<table>" in html
-    assert "<script" not in html
-    assert "<details>" in html
+    selectors = [selector.strip() for rule in rules for selector in rule.split(",")]
+    assert [each for each in selectors if not each.startswith(".statemachine-result")] == []
 
 
 def test_no_page_of_python_says_an_option_of_the_command(any_result: Any) -> None:
@@ -497,13 +512,15 @@ def test_another_suffix_is_refused_with_those_there_are(
 # Sweeps.
 
 
-def test_a_sweep_runs_a_function_with_its_parameters(light: str, tmp_path: Path) -> None:
+@pytest.fixture
+def swept(light: str, tmp_path: Path) -> Any:
+    """A sweep of a parameter of a function."""
     pytest.importorskip("joblib")
 
     def own(model: sm.Model, data: sm.Data, gain: float = 1.0) -> list[float]:
         return [0.1 * gain] * model.nu
 
-    result = lab.sweep(
+    return lab.sweep(
         own,
         light,
         vary={"gain": [1.0, 2.0]},
@@ -512,9 +529,18 @@ def test_a_sweep_runs_a_function_with_its_parameters(light: str, tmp_path: Path)
         jobs=1,
         out=tmp_path / "runs",
     )
-    table = result.to_dict()
+
+
+def test_a_sweep_runs_a_function_with_each_value_of_its_parameter(swept: Any) -> None:
+    table = swept.to_dict()
     assert sorted(table["vary.gain"]) == [1.0, 2.0]
     assert table["error"] == [None, None]
     assert table["qpos"][0] != table["qpos"][1]
-    assert result.request.sweep.vary == ("gain=1,2",)
-    assert "cells" in str(result)
+
+
+def test_what_a_sweep_varies_is_in_its_request_as_it_would_be_typed(swept: Any) -> None:
+    assert swept.request.sweep.vary == ("gain=1,2",)
+
+
+def test_a_sweep_prints_a_page_of_its_cells(swept: Any) -> None:
+    assert "cells" in str(swept)

@@ -24,7 +24,7 @@ _WORD = re.compile(r"[A-Za-z]{2,}")
 
 
 def _spoken(tree: ast.Module) -> Iterator[str]:
-    """Texts of a module that a reader of a page might read."""
+    """Return texts of a module that a reader of a page might read."""
     silent: set[ast.AST] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise):
@@ -43,12 +43,12 @@ def _spoken(tree: ast.Module) -> Iterator[str]:
 
 
 def _is_code(text: str) -> bool:
-    """Whether a text is what a student types."""
+    """Tell whether a text is what a student types."""
     return "\n" in text or re.search(r"[\w.]+\(|  # | = ", text) is not None
 
 
 def sentences(source: str) -> list[str]:
-    """Texts of four words or more in a module's code, but for errors and for what is typed."""
+    """Return texts of four words or more in a module, but for errors and for what is typed."""
     texts = [text for text in _spoken(ast.parse(source)) if not _is_code(text)]
     return [text for text in texts if len(_WORD.findall(text)) >= 4]
 

@@ -14,7 +14,7 @@ import pytest
 from statemachine.course.grading import course_code
 from statemachine.course.grading.alike import ALIKE, NEARLY_ALIKE, SHORT, compare_submissions
 from statemachine.course.grading.judges import JUDGES
-from statemachine.course.grading.likeness import OwnCode, code_of_trees, likeness, own_code
+from statemachine.course.grading.likeness import StudentCode, code_of_trees, likeness, student_code
 from statemachine.course.grading.roster import enrolled
 from statemachine.course.grading.submissions import submissions
 
@@ -63,12 +63,12 @@ OTHER: dict[str, tuple[str, str]] = {
 }
 
 
-def _code(text: str) -> OwnCode:
+def _code(text: str) -> StudentCode:
     return code_of_trees([ast.parse(text)])
 
 
 def _share(left: str, right: str) -> float:
-    return likeness(_code(left).whole, _code(right).whole)
+    return likeness(_code(left).all_shingles, _code(right).all_shingles)
 
 
 @pytest.mark.parametrize("change", SAME)
@@ -85,7 +85,7 @@ def test_what_does_something_counts(change: str) -> None:
     assert 0.5 < _share(ONE, changed) < 1
 
 
-def test_it_is_the_coefficient_of_dice() -> None:
+def test_likeness_is_the_coefficient_of_dice() -> None:
     assert likeness(frozenset("abcd"), frozenset("cdefgh")) == 2 * 2 / (4 + 6)
     assert likeness(frozenset(), frozenset()) == 0
 
@@ -106,19 +106,19 @@ def test_the_order_of_functions_does_not_count() -> None:
 
 
 def test_what_is_still_to_be_written_is_no_code() -> None:
-    assert own_code([TEMPLATE]).size == 0
+    assert student_code([TEMPLATE]).size == 0
     assert _code("def demo_state(model):\n    raise NotImplementedError('later')\n").size == 0
 
 
 def test_a_file_without_syntax_is_no_code(tmp_path: Path) -> None:
-    assert own_code([written(tmp_path / "a.py", "def demo_state(:\n")]).size == 0
+    assert student_code([written(tmp_path / "a.py", "def demo_state(:\n")]).size == 0
     deep = written(tmp_path / "b.py", f"def demo_state(m):\n    return {'(' * 500}1{')' * 500}\n")
-    assert own_code([deep]).size == 0
+    assert student_code([deep]).size == 0
 
 
 def test_functions_of_another_file_count_where_they_are_called(tmp_path: Path) -> None:
     written_all(tmp_path, {"a.py": "from b import *\n", "b.py": ANN})
-    assert own_code([tmp_path / "a.py", tmp_path / "b.py"]) == _code(ANN)
+    assert student_code([tmp_path / "a.py", tmp_path / "b.py"]) == _code(ANN)
 
 
 def test_what_is_handed_out_does_not_count(tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_what_is_handed_out_does_not_count(tmp_path: Path) -> None:
     }
     for name, body in bodies.items():
         written(tmp_path / name, text.replace(todo, body))
-    everything = [own_code([tmp_path / name]).whole for name in bodies]
+    everything = [student_code([tmp_path / name]).all_shingles for name in bodies]
     assert likeness(*everything) > 0.5  # of both, most is demo_hold
     compared = compare_submissions(submissions([tmp_path]))
     assert (compared.nearest, compared.groups) == ({}, ())

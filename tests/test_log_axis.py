@@ -28,7 +28,7 @@ def axes_of(values: Any, **more: Any) -> Any:
 
 
 def heights(axes: Any, values: Any) -> Any:
-    """Where values are from the bottom (0) to the top (1)."""
+    """Return where values are from the bottom (0) to the top (1)."""
     points = axes.transData.transform(np.column_stack([np.zeros(len(values)), values]))
     return axes.transAxes.inverted().transform(points)[:, 1]
 

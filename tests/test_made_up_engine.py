@@ -31,7 +31,7 @@ SAYS_NO, BAD_INPUT = 1, 2
 
 @pytest.fixture
 def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder to work in, in which the engine is known; to the processes that are started too."""
+    """Provide a folder to work in; the engine is known, to processes that are started too."""
     entries = f"[statemachine.backends]\n{NAME} = tests.support.hidden_world:load\n"
     packages = distribution(tmp_path / "packages", "made-up", "1.0", entries).parent
     monkeypatch.syspath_prepend(str(packages))
@@ -39,13 +39,13 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setitem(ENGINES, NAME, replace(ENGINES["mujoco"], name=NAME, role="made up"))
     monkeypatch.chdir(tmp_path)
     yield packages
-    backends._BACKENDS.pop(NAME, None)
-    engines._ROOMS.pop(NAME, None)
+    backends.BACKENDS.pop(NAME, None)
+    engines.ROOMS.pop(NAME, None)
 
 
 @pytest.fixture
 def room(engine: Path) -> None:
-    """It has a room, in which some methods are."""
+    """Give the engine a room, in which some methods are."""
     with (engine / "made_up-1.0.dist-info" / "entry_points.txt").open("a") as file:
         file.write(f"[statemachine.engines]\n{NAME} = tests.support.made_up:MyEngine\n")
 
@@ -55,7 +55,7 @@ Said = Callable[..., str]
 
 @pytest.fixture
 def said(here: Cli) -> Said:
-    """What a command says on standard output; where it refuses, in one line of the other."""
+    """Return what a command says on standard output; where it refuses, in one line of the other."""
 
     def run(*command: object, code: int = 0) -> str:
         done = here(*command, code=code)

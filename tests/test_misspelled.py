@@ -38,7 +38,7 @@ class Read:
 
 
 def fields_of_results() -> set[str]:
-    """Names of the fields and properties of dataclasses, which no builtin type has."""
+    """Return names of the fields and properties of dataclasses, which no builtin type has."""
     names: set[str] = set()
     for path in (ROOT / "statemachine").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -53,7 +53,7 @@ def fields_of_results() -> set[str]:
 
 
 def reads() -> Iterator[Read]:
-    """Reads of such fields in the rooms that answer questions; what argparse holds has no type."""
+    """Return the reads of such fields in the rooms of questions; what argparse has is untyped."""
     names = fields_of_results()
     for room in ROOMS:
         for path in sorted((ROOT / "statemachine" / room).rglob("*.py")):
@@ -80,7 +80,7 @@ def plant(places: list[Read], copy: Path) -> None:
 
 
 def reported(copy: Path) -> set[tuple[str, str]]:
-    """File and text of each error of pyright in a copy."""
+    """Return file and text of each error of pyright in a copy."""
     done = subprocess.run(
         [
             sys.executable,
@@ -105,7 +105,7 @@ def reported(copy: Path) -> set[tuple[str, str]]:
 
 
 def unreported(places: list[Read], copy: Path) -> list[Read]:
-    """Those of some reads whose misspelling nothing reports."""
+    """Return those of some reads whose misspelling nothing reports."""
     shutil.copytree(ROOT / "statemachine", copy / "statemachine")
     shutil.copytree(ROOT / "typings", copy / "typings")
     shutil.copy(ROOT / "pyproject.toml", copy)

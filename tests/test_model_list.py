@@ -29,19 +29,19 @@ ON_JOINT, ON_TENDON = 'joint="joint"', 'tendon="cable"'
 
 
 def _listed(folder: Path, left: str, right: str, suffix: str = "xml") -> ModelsComparison:
-    """What two texts of models differ in."""
+    """Return what two texts of models differ in."""
     ours = written(folder / f"left.{suffix}", left)
     return compare(ours, written(folder / f"right.{suffix}", right))
 
 
 def _row(result: ModelsComparison, quantity: str) -> ListedDifference:
-    """The one row of a quantity."""
+    """Return the one row of a quantity."""
     (row,) = [row for row in result.differences if row.quantity == quantity]
     return row
 
 
 def _settled(text: str) -> float:
-    """Where the joint of a model is after 10 s of MuJoCo alone [rad or m]."""
+    """Return where the joint of a model is after 10 s of MuJoCo alone [rad or m]."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 10_000)

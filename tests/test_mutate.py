@@ -66,7 +66,7 @@ def test_a_fault_is_found_where_its_code_went(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def sites_of_list() -> list[Site]:
-    """Every fault that the modules of the list allow."""
+    """Return every fault that the modules of the list allow."""
     files = {ROOT / row.mutant.file for row in run.read()}
     return [site for file in files if file.exists() for site in sites(file, ROOT)]
 
@@ -185,7 +185,7 @@ def test_a_fault_is_killed_survives_or_runs_out_of_time(
     monkeypatch.setattr(run, "SECONDS", 30)
     test = "tests/test_count.py::test_count"
     outcomes = {
-        (site.mutant.kind, site.mutant.statement): run._tried(site, [test], tree)
+        (site.mutant.kind, site.mutant.statement): run.outcome_of(site, [test], tree)
         for site in sites(file, tree)
     }
     assert outcomes["comparison", "while n > 0:"] == ("survived", "")  # one more turn
@@ -193,4 +193,4 @@ def test_a_fault_is_killed_survives_or_runs_out_of_time(
     assert outcomes["sign", "n = n - 1"] == ("timed out", "")
     assert file.read_text("utf-8") == source
     outside = replace(next(sites(file, tree)), called=True)
-    assert run._tried(outside, [], tree) == ("not covered", "")
+    assert run.outcome_of(outside, [], tree) == ("not covered", "")

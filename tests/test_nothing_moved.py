@@ -55,7 +55,7 @@ STIFF = """<mujoco><worldbody><body name="arm"><joint name="lift" axis="0 1 0" d
 
 
 def request(experiment: str, *files: Path) -> Request:
-    """The same engine on both sides."""
+    """Return the same engine on both sides."""
     return Request((experiment,), sides=(Side(str(files[0])), Side(str(files[-1]))))
 
 
@@ -75,13 +75,13 @@ def rotors(tmp_path: Path) -> tuple[Path, Path]:
 
 @pytest.fixture
 def driven(tmp_path: Path) -> tuple[Path, Path]:
-    """The same rotors with a motor."""
+    """Return the same rotors with a motor."""
     left, right = (text.replace("</mujoco>", f"{MOTOR}</mujoco>") for text in (ROTOR, TURNED))
     return written(tmp_path / "driven.xml", left), written(tmp_path / "driven_too.xml", right)
 
 
 def inertia(text: str) -> float:
-    """The inertia about the joint, from MuJoCo itself."""
+    """Return the inertia about the joint, from MuJoCo itself."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

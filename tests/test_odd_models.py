@@ -112,5 +112,5 @@ def test_random_models_are_read_without_a_traceback(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     quick: dict[Any, int] = {("compare", "--models", "LEFT", "RIGHT"): 1}
-    monkeypatch.setattr(random_models, "_COMMANDS", quick)
+    monkeypatch.setattr(random_models, "COMMANDS", quick)
     assert random_models.examined(seed, tmp_path, readers=1, thorough=False) == []

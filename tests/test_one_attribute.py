@@ -30,8 +30,10 @@ from .support.schema import (
     SchemaAttribute,
     coverage,
     drawn_edits,
+    merged,
     restated_edits,
 )
+from .support.small_models import model_of
 
 SEED, COUNT = 47, 78
 FURTHER_SEEDS = (3,)  # 1 and 2 were run when the rules were written; any other one may be
@@ -50,20 +52,31 @@ _DRAWN_ENDS = ("_rgba", "_matid", "_castshadow")
 
 
 @dataclass(frozen=True)
+class EditEffect:
+    """What plain MuJoCo makes of an edit.
+
+    Attributes:
+        moves: Whether the model moves otherwise by it.
+        compiles_alike: Whether both compiled models are the same, what is drawn apart.
+    """
+
+    moves: bool
+    compiles_alike: bool
+
+
+@dataclass(frozen=True)
 class EditOutcome:
-    """What became of an edit.
+    """An edit, what it does, and what the list of two files says of it.
 
     Attributes:
         edit: The edit.
-        moves: Whether plain MuJoCo moves otherwise by it.
-        compiles_alike: Whether both compiled models are the same, what is drawn apart.
+        effect: What plain MuJoCo makes of it.
         listed: What of the list of two files matters, by cause and quantity; and that a frame is
             put elsewhere on the same solid, which a note tells.
     """
 
     edit: AttributeEdit
-    moves: bool
-    compiles_alike: bool
+    effect: EditEffect
     listed: tuple[str, ...]
 
 
@@ -86,19 +99,22 @@ def _compiles_alike(text: str) -> bool:
     return all(np.array_equal(getattr(left.opt, n), getattr(right.opt, n)) for n in options)
 
 
-def _outcome(edit: AttributeEdit, folder: Path) -> EditOutcome:
-    """Return what becomes of an edit; files are written into a folder."""
-    right = edit.applied(RICH)
-    states = raw_states(right)
+def _effect(text: str) -> EditEffect:
+    """Return what plain MuJoCo makes of another text of RICH."""
+    states, base = raw_states(text), _base_states()
+    moves = states.shape != base.shape or float(np.abs(states - base).max()) > _ROUNDING
+    return EditEffect(moves, _compiles_alike(text))
+
+
+def _listed_of_files(text: str, folder: Path) -> tuple[str, ...]:
+    """Return what the list of RICH and another text says; both are written into a folder."""
     paths = folder / "left.xml", folder / "right.xml"
-    for path, text in zip(paths, (RICH, right), strict=True):
-        path.write_text(text, encoding="utf-8")
+    for path, written in zip(paths, (RICH, text), strict=True):
+        path.write_text(written, encoding="utf-8")
     result = compare(*paths)
     listed = [f"{row.cause}: {row.quantity}" for row in result.differences if row.matters]
     listed += [note for note in result.notes if "put elsewhere on the same solid" in note]
-    base = _base_states()
-    moves = states.shape != base.shape or float(np.abs(states - base).max()) > _ROUNDING
-    return EditOutcome(edit, moves, _compiles_alike(right), tuple(listed))
+    return tuple(listed)
 
 
 def _legal_edits(seed: int) -> Iterator[AttributeEdit]:
@@ -118,45 +134,44 @@ def _edits(seed: int) -> tuple[AttributeEdit, ...]:
     return tuple(islice(_legal_edits(seed), COUNT))
 
 
-_OUTCOMES: dict[tuple[int, int], EditOutcome] = {}  # by seed and number: two claims are of one run
-
-
-def _drawn(seed: int, number: int, folder: Path) -> EditOutcome:
-    if (seed, number) not in _OUTCOMES:
-        _OUTCOMES[seed, number] = _outcome(_edits(seed)[number], folder)
-    return _OUTCOMES[seed, number]
-
-
+# Of a seed, and which of its edits.
 SEVERAL = [
-    *(pytest.param(SEED, number) for number in range(6)),
-    *(pytest.param(SEED, number, marks=pytest.mark.slow) for number in range(6, COUNT)),
+    *((SEED, number) for number in range(6)),
     *(
-        pytest.param(seed, number, marks=pytest.mark.slow)
-        for seed in FURTHER_SEEDS
+        pytest.param((seed, number), marks=pytest.mark.slow)
+        for seed in (SEED, *FURTHER_SEEDS)
         for number in range(COUNT)
+        if seed != SEED or number >= 6
     ),
 ]
 
 
-@pytest.mark.parametrize(("seed", "number"), SEVERAL)
-def test_what_moves_otherwise_is_listed(seed: int, number: int, tmp_path: Path) -> None:
-    outcome = _drawn(seed, number, tmp_path)
-    assert outcome.listed or not outcome.moves, str(outcome.edit)
+@pytest.fixture(scope="module", params=SEVERAL, ids=lambda drawn: "{}-{}".format(*drawn))
+def outcome(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> EditOutcome:
+    """Return what becomes of one drawn edit: both claims about it are of one run."""
+    seed, number = request.param
+    edit = _edits(seed)[number]
+    text = edit.applied(RICH)
+    return EditOutcome(edit, _effect(text), _listed_of_files(text, tmp_path_factory.mktemp("edit")))
 
 
-@pytest.mark.parametrize(("seed", "number"), SEVERAL)
-def test_what_compiles_to_the_same_is_not_listed(seed: int, number: int, tmp_path: Path) -> None:
-    outcome = _drawn(seed, number, tmp_path)
-    assert not (outcome.compiles_alike and outcome.listed), str(outcome.edit)
+def test_what_moves_otherwise_is_listed(outcome: EditOutcome) -> None:
+    assert outcome.listed or not outcome.effect.moves, str(outcome.edit)
+
+
+def test_what_compiles_to_the_same_is_not_listed(outcome: EditOutcome) -> None:
+    assert not (outcome.effect.compiles_alike and outcome.listed), str(outcome.edit)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [SEED, *FURTHER_SEEDS])
-def test_many_of_the_drawn_edits_move_the_robot(seed: int, tmp_path: Path) -> None:
+def test_many_of_the_drawn_edits_move_the_robot(seed: int) -> None:
     """Else that they are listed would say little."""
-    outcomes = [_drawn(seed, number, tmp_path) for number in range(COUNT)]
-    assert sum(outcome.moves for outcome in outcomes) >= 25
-    assert sum(outcome.compiles_alike for outcome in outcomes) >= 10
+    effects = [_effect(edit.applied(RICH)) for edit in _edits(seed)]
+    assert sum(effect.moves for effect in effects) >= 25
+    assert sum(effect.compiles_alike for effect in effects) >= 10
 
 
 def test_every_attribute_of_the_schema_has_a_rule_or_a_reason() -> None:
@@ -171,25 +186,27 @@ def test_every_attribute_of_the_schema_has_a_rule_or_a_reason() -> None:
 
 def test_what_is_without_an_element_is_of_a_sensor_a_default_or_a_plugin() -> None:
     parents = {attribute.parent for attribute in coverage(RICH).without_element}
-    assert parents <= {
-        *(
-            "sensor",
-            "default",
-            "compiler",
-            "actuator",
-            "(world)body",
-        ),  # lengthrange, plugin, attach
-        *("flex", "deformable", "asset", "skin", "material", "equality"),
-    }
+    lengthrange_plugin_attach = {"sensor", "default", "compiler", "actuator", "(world)body"}
+    deformable = {"flex", "deformable", "asset", "skin", "material", "equality"}
+    assert parents <= lengthrange_plugin_attach | deformable
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [SEED, *FURTHER_SEEDS])
-def test_what_says_what_a_file_says_already_is_not_listed(seed: int, tmp_path: Path) -> None:
-    outcomes = [_outcome(edit, tmp_path) for edit in restated_edits(RICH, seed)]
-    assert len(outcomes) >= 40
-    assert [str(outcome.edit) for outcome in outcomes if outcome.moves] == []
-    assert [str(outcome.edit) for outcome in outcomes if outcome.listed] == []
+@pytest.fixture(scope="module", params=(SEED, *FURTHER_SEEDS))
+def restated(request: pytest.FixtureRequest) -> list[str]:
+    """Return texts that say of many attributes what RICH says of them already."""
+    edits = list(restated_edits(RICH, request.param))
+    assert len(edits) >= 40
+    return merged(RICH, edits)
+
+
+def test_what_says_what_a_file_says_already_moves_nothing(restated: list[str]) -> None:
+    assert [_effect(text).moves for text in restated] == [False] * len(restated)
+
+
+def test_what_says_what_a_file_says_already_is_not_listed(
+    restated: list[str], tmp_path: Path
+) -> None:
+    assert [_listed_of_files(text, tmp_path) for text in restated] == [()] * len(restated)
 
 
 # A piece of RICH, and another way to say the same.
@@ -223,9 +240,7 @@ SAID_OTHERWISE = {
 
 
 def _models(folder: Path, right: str) -> tuple[sm.Model, sm.Model]:
-    for name, text in (("left", RICH), ("right", right)):
-        (folder / f"{name}.xml").write_text(text, encoding="utf-8")
-    return sm.load(folder / "left.xml"), sm.load(folder / "right.xml")
+    return model_of(folder, RICH, "left.xml"), model_of(folder, right, "right.xml")
 
 
 def _listed(left: sm.Model, right: sm.Model) -> list[ModelDifference]:
@@ -257,6 +272,18 @@ COMPILED_ANEW = {
 }
 
 
+def _driven(raw: mujoco.MjModel) -> np.ndarray:
+    """Return qpos and qvel (300, nq + nv) of a compiled model under commands of a seed."""
+    data, random = mujoco.MjData(raw), np.random.default_rng(0)
+    rows = []
+    for step in range(300):
+        if step % 25 == 0:
+            data.ctrl[:] = random.uniform(-2, 2, raw.nu)
+        mujoco.mj_step(raw, data)
+        rows.append(np.concatenate((data.qpos, data.qvel)))
+    return np.array(rows)
+
+
 @pytest.mark.parametrize("name", COMPILED_ANEW)
 def test_what_is_compiled_anew_moves_as_the_left_to_the_last_bit(name: str, tmp_path: Path) -> None:
     left, right = _models(tmp_path, COMPILED_ANEW[name].applied(RICH))
@@ -267,19 +294,13 @@ def test_what_is_compiled_anew_moves_as_the_left_to_the_last_bit(name: str, tmp_
     assert spec_edits
     alike = built(right, edits, spec_edits).compiled
     assert alike.na == left.compiled.na
-    runs = []
-    for raw in (left.compiled, alike):
-        data, random = mujoco.MjData(raw), np.random.default_rng(0)
-        rows = []
-        for step in range(300):
-            if step % 25 == 0:
-                data.ctrl[:] = random.uniform(-2, 2, raw.nu)
-            mujoco.mj_step(raw, data)
-            rows.append(np.concatenate((data.qpos, data.qvel)))
-        runs.append(np.array(rows))
-    assert np.array_equal(*runs)
-    states = raw_states((tmp_path / "right.xml").read_text(encoding="utf-8"))
-    assert not np.array_equal(states, _base_states())
+    assert np.array_equal(_driven(left.compiled), _driven(alike))
+
+
+@pytest.mark.parametrize("name", COMPILED_ANEW)
+def test_what_is_compiled_anew_moved_otherwise_before(name: str) -> None:
+    states, base = raw_states(COMPILED_ANEW[name].applied(RICH)), _base_states()
+    assert not np.array_equal(states, base)
 
 
 def _polycoef(first: str, second: str, coefficients: str) -> str:
@@ -293,22 +314,33 @@ PAIR = """<mujoco><compiler angle="radian"/><option gravity="3 0 -9.81"/><worldb
 </worldbody><equality><joint {}/></equality></mujoco>"""
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "listed"),
-    [
-        (_polycoef("a", "b", "0.2 -1"), _polycoef("b", "a", "0.2 -1"), []),
-        (_polycoef("a", "b", "0.1 2"), _polycoef("b", "a", "-0.05 0.5"), ["softness by"]),
-        (_polycoef("a", "b", "0.2 -1"), _polycoef("b", "a", "0.3 -1"), ["parameters"]),
-    ],
-    ids=["the same", "softened by another joint", "another offset"],
-)  # fmt: skip
-def test_a_coupling_said_the_other_way_round(left, right, listed, tmp_path):
-    """With a factor other than 1 MuJoCo softens it by the other joint, and it moves otherwise."""
-    models = []
-    for name, words in (("left", left), ("right", right)):
-        (tmp_path / f"{name}.xml").write_text(PAIR.format(words), encoding="utf-8")
-        models.append(sm.load(tmp_path / f"{name}.xml"))
+def _couplings(folder: Path, left: str, right: str) -> tuple[sm.Model, sm.Model]:
+    """Return PAIR with b coupled to a by these coefficients, and with a coupled to b."""
+    texts = _polycoef("a", "b", left), _polycoef("b", "a", right)
+    left_text, right_text = (PAIR.format(text) for text in texts)
+    return model_of(folder, left_text, "left.xml"), model_of(folder, right_text, "right.xml")
+
+
+# Coefficients of b by a, of a by b, and what is listed. With a factor other than 1 MuJoCo softens
+# a coupling by the other joint, and it moves otherwise.
+COUPLINGS = {
+    "the same": ("0.2 -1", "0.2 -1", []),
+    "softened by another joint": ("0.1 2", "-0.05 0.5", ["softness by"]),
+    "another offset": ("0.2 -1", "0.3 -1", ["parameters"]),
+}
+
+
+@pytest.mark.parametrize("case", COUPLINGS)
+def test_what_is_listed_of_a_coupling_said_the_other_way_round(case: str, tmp_path: Path) -> None:
+    left, right, listed = COUPLINGS[case]
+    models = _couplings(tmp_path, left, right)
     assert [row.subject for row in _listed(*models)] == listed
+
+
+@pytest.mark.parametrize("case", COUPLINGS)
+def test_a_coupling_that_is_listed_moves_otherwise(case: str, tmp_path: Path) -> None:
+    left, right, listed = COUPLINGS[case]
+    models = _couplings(tmp_path, left, right)
     ends = []
     for model in models:
         data = mujoco.MjData(model.compiled)

@@ -46,7 +46,7 @@ def rerun(model: sm.Model, seconds: float = 0.5) -> Rerun:
 
 
 def stepped(folder: Path, text: str, **how: Any) -> OneStep:
-    """The robot, and the same with another text."""
+    """Return the robot, and the same with another text."""
     one, two = model_of(folder, LINKS_AND_BALL, "one.xml"), model_of(folder, text, "two.xml")
     return one_step(rerun(one), two, **how)
 
@@ -69,7 +69,7 @@ def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> Non
     found = stepped(tmp_path, LINKS_AND_BALL)
     assert [gap.stage for gap in found.stages] == list(STAGES)
     for gap in found.stages:
-        assert_has(gap, worst=0.0, null=0.0, told=True)
+        assert_has(gap, worst=0.0, null=0.0, is_available=True)
     assert found.is_exact
     assert not found.spikes
     assert page_of(found).holds
@@ -126,7 +126,7 @@ def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> Non
     for stage in ("contact force", "other constraints"):
         text = text.replace(*CHANGES[stage][:2])
     found = stepped(tmp_path, text)
-    leads = {gap.stage: gap.leads for gap in found.stages if gap.leads}
+    leads = {gap.stage: gap.first_count for gap in found.stages if gap.first_count}
     apart = leads["other constraints"]
     assert first(found) == "contact force"
     assert leads["contact force"] == gap_of(found, "contact force").beyond
@@ -187,7 +187,7 @@ def test_the_engines_are_alike_until_something_touches(order: tuple[str, str]) -
     # Before, all is rounding, mass matrices that each engine computes itself included.
     began = found.first.first or 0.0
     assert all((gap.first or 1.0) >= began for gap in found.stages)
-    assert {gap.stage for gap in found.stages if gap.told} == set(STAGES)
+    assert {gap.stage for gap in found.stages if gap.is_available} == set(STAGES)
     assert any("by construction" in note for note in found.notes)
 
 
@@ -209,7 +209,7 @@ def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
     one, two = (rerun_of(fall, side, seconds=0.2) for side in (sm.load(fall.model), fresh))
     found = {gap.stage: gap for gap in one_step(one, two.model, moments=10).stages}
     assert found["passive"].reason
-    assert not found["passive"].told
+    assert not found["passive"].is_available
     # It has no rotors, which the model's motors have.
     assert (found["mass matrix"].beyond, found["kinematics"].beyond) == (10, 0)
 

@@ -63,12 +63,12 @@ def test_gains_are_of_servos_alone(tmp_path: Path, backend: str) -> None:
 @pytest.mark.parametrize(
     ("option", "value", "says"),
     [
-        ("kp", [1.0, 2.0], r"kp\[0\] is given for motor, which is not a position"),
+        ("kp", [1.0, 2.0], r"kp\[0\] is given for motor"),
         ("kp", [np.nan, np.nan], r"kp\[0\] = nan"),
         ("mass", [1.0, 2.0], r"mass\[0\] \(world\) = 1 must be 0"),
         ("mass", [0.0, 0.0], r"mass\[1\] \(cart\) = 0 must be above 0"),
         ("mass", 1.0, "takes 2 numbers"),
-        ("kv", 1, "the model has none"),
+        ("kv", 1, "has none"),
         *(("latency", value, "latency") for value in (-0.1, 11.0, [0.1], np.nan, "long")),
     ],
 )

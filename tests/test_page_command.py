@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,34 +32,63 @@ def parsed(command: str) -> argparse.Namespace:
 
 @pytest.fixture
 def run(tmp_path: Path) -> Request:
-    """Two files in a folder, compared with options."""
+    """Return two files in a folder, compared with options."""
     files = [str(written(tmp_path / f"{name}.xml", BALL)) for name in ("left", "right")]
     sides = Side(files[0]), Side(files[1], "pybullet", options={"timestep": 0.001})
     return Request(("fall",), sides=sides, seconds=0.3, names={"ball": "ball"}, menagerie="/a/b")
 
 
-@pytest.mark.parametrize("uncertainty", [EXACT, None, Uncertainty(length=1e-4, angle=0.002)])
-def test_what_is_typed_anew_asks_the_same(
-    run: Request, uncertainty: Uncertainty | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    tolerances = {"joint": 0.00872664625997165, "tip": 0.002, "base rotation": 0.1}
-    request = CompareRequest(run, tolerances, uncertainty)
-    causes = ExplainRequest(run, quantity="ball", uncertainty=uncertainty)
-    options = parsed(page_command(request, causes, tmp_path / "page.html"))
-    monkeypatch.chdir(tmp_path)
-    again = request_of(options)
-    assert isinstance(again, CompareRequest)
-    assert again.tolerances == pytest.approx(tolerances)
-    if uncertainty is None:
-        assert again.uncertainty is None
-    else:
-        assert again.uncertainty is not None
-        assert vars(again.uncertainty) == pytest.approx(vars(uncertainty))
-    assert [side.options for side in again.run.sides] == [side.options for side in run.sides]
-    assert [side.engine for side in again.run.sides] == ["mujoco", "pybullet"]
-    assert (again.run.names, again.run.seconds) == (run.names, run.seconds)
-    assert explain_request_of(options, again.run).quantity == "ball"
-    assert options.html == "page.html"
+UNCERTAINTIES = {
+    "exact": EXACT,
+    "none": None,
+    "of a user": Uncertainty(length=1e-4, angle=0.002),
+}
+TOLERANCES = {"joint": 0.00872664625997165, "tip": 0.002, "base rotation": 0.1}
+
+
+@pytest.fixture
+def typed_anew(
+    run: Request, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Callable[[Uncertainty | None], argparse.Namespace]:
+    """Return what parses the command of a page for an uncertainty, in the folder of the page."""
+
+    def type_anew(uncertainty: Uncertainty | None) -> argparse.Namespace:
+        request = CompareRequest(run, TOLERANCES, uncertainty)
+        causes = ExplainRequest(run, quantity="ball", uncertainty=uncertainty)
+        options = parsed(page_command(request, causes, tmp_path / "page.html"))
+        monkeypatch.chdir(tmp_path)
+        return options
+
+    return type_anew
+
+
+def test_what_is_typed_anew_has_the_same_tolerances(typed_anew) -> None:
+    assert request_of(typed_anew(EXACT)).tolerances == pytest.approx(TOLERANCES)
+
+
+@pytest.mark.parametrize("name", UNCERTAINTIES)
+def test_what_is_typed_anew_has_the_same_uncertainty(typed_anew, name: str) -> None:
+    uncertainty = UNCERTAINTIES[name]
+    again = request_of(typed_anew(uncertainty)).uncertainty
+    assert (again is None) is (uncertainty is None)
+    if uncertainty is not None:
+        assert vars(again) == pytest.approx(vars(uncertainty))
+
+
+def test_what_is_typed_anew_runs_the_same_sides(typed_anew, run: Request) -> None:
+    again = request_of(typed_anew(EXACT)).run
+    assert [side.options for side in again.sides] == [side.options for side in run.sides]
+    assert [side.engine for side in again.sides] == ["mujoco", "pybullet"]
+    assert (again.names, again.seconds) == (run.names, run.seconds)
+
+
+def test_what_is_typed_anew_asks_for_the_causes_of_the_same_quantity(typed_anew) -> None:
+    options = typed_anew(EXACT)
+    assert explain_request_of(options, request_of(options).run).quantity == "ball"
+
+
+def test_what_is_typed_anew_writes_the_same_page(typed_anew) -> None:
+    assert typed_anew(EXACT).html == "page.html"
 
 
 @pytest.mark.parametrize("what", ["fall", lambda model, data: None])

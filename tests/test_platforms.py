@@ -59,13 +59,13 @@ _MACHINES = {MAC: "arm64", WINDOWS: "AMD64", WINDOWS_ARM: "ARM64"}
 
 
 def _machine(platform: str) -> tuple[str, str]:
-    """What Python calls the system and the processor of a platform."""
+    """Return what Python calls the system and the processor of a platform."""
     processor, _, system = platform.split("-", 2)
     return _SYSTEMS[system], _MACHINES.get(platform, processor)
 
 
 def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Requirement]:
-    """The requirements whose markers hold there, by name; no name twice."""
+    """Return the requirements whose markers hold there, by name; no name twice."""
     system, machine = _machine(platform)
     environment = {
         "sys_platform": system,
@@ -80,7 +80,7 @@ def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Require
 
 
 def versions(platform: str, python: str) -> dict[str, str]:
-    """The engines that a platform has besides MuJoCo, and their versions, "" for any."""
+    """Return the engines that a platform has besides MuJoCo, and their versions, "" for any."""
     wanted = (name.partition("==") for name in PLATFORMS[platform, python])
     return {name: version for name, _, version in wanted}
 

@@ -90,7 +90,7 @@ def test_dense_algebra_is_not_numpys(file: Path) -> None:
 
 
 def _nodes(tree: ast.AST, place: str) -> list[tuple[str, ast.AST]]:
-    """Each node of a syntax tree, with the function or class that it stands in."""
+    """Return each node of a syntax tree, with the function or class that it stands in."""
     found = []
     for node in ast.iter_child_nodes(tree):
         named = isinstance(node, (ast.FunctionDef, ast.ClassDef))

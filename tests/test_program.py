@@ -23,7 +23,7 @@ Call = Callable[[Path], None]
 
 @pytest.fixture
 def called(monkeypatch: pytest.MonkeyPatch) -> Call:
-    """Lets a file be what the user has called, with nothing of ours on the path of the shell."""
+    """Let a file be what the user has called, with nothing of ours on the path of the shell."""
 
     def call(file: Path) -> None:
         monkeypatch.setattr(sys, "argv", [str(file), "lesson"])

@@ -26,7 +26,7 @@ PID = '<pid name="p" joint="a" kp="20" kv="2"/>'
 
 
 def warned(folder: Path, changes: dict[str, str], **options: Any) -> tuple[list[sm.Model], str]:
-    """The model on both engines, and what their loads warned of."""
+    """Return the model on both engines, and what their loads warned of."""
     parts = {**dict.fromkeys(("more", "geom", "joint", "actuator"), ""), **changes}
     parts = {"option": 'integrator="implicitfast"', **parts, "more": FLOOR + parts["more"]}
     file = written(folder / "model.xml", FEATURED.format(**parts))
@@ -34,7 +34,7 @@ def warned(folder: Path, changes: dict[str, str], **options: Any) -> tuple[list[
 
 
 def apart(models: list[sm.Model]) -> float:
-    """The largest gap of positions [rad] over 400 steps of random commands."""
+    """Return the largest gap of positions [rad] over 400 steps of random commands."""
     with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
         return largest_gap(models, (left, right), steps=400, every=40)
 
@@ -47,50 +47,50 @@ def apart(models: list[sm.Model]) -> float:
         (
             {"option": 'integrator="discrete"'},
             "warned",
-            "the integrator discrete acts as implicitfast",
+            "discrete acts as implicitfast",
         ),
         (
             {"joint": 'stiffness="5" springyield="9"'},
             "warned",
             "springyield has no effect (b 0.157)",
         ),
-        ({"joint": 'stiffness="5 .2"'}, "refused", "nonlinear spring: joint b has it"),
-        ({"joint": 'damping=".1 .2"'}, "refused", "nonlinear damping: joint b has it"),
+        ({"joint": 'stiffness="5 .2"'}, "refused", "nonlinear spring: joint b"),
+        ({"joint": 'damping=".1 .2"'}, "refused", "nonlinear damping: joint b"),
         ({"joint": 'actuatorfrcrange="-.1 .1"'}, "right", ""),
         ({"geom": 'surfacevel=".5 0 0"'}, "warned", "surfacevel has no effect (upper 0.5)"),
         ({"geom": 'margin=".001"'}, "warned", "(the largest: 1 mm, upper)"),
         (
             {"geom": 'solref=".02 .1" priority="1"'},
             "warned",
-            "(floor and upper would keep about 73 %",
+            "73 %",
         ),
-        ({"geom": 'solref="-1000 -1"'}, "warned", "(floor and upper would keep about 95 %"),
+        ({"geom": 'solref="-1000 -1"'}, "warned", "95 %"),
         ({"geom": 'solref=".1 1" solimp=".5 .6 .01"'}, "told", "solimp of their own have upper"),
-        ({"actuator": PID}, "refused", "actuator gain: actuator p has one that is not constant"),
+        ({"actuator": PID}, "refused", "actuator gain: actuator p"),
         (
             {"actuator": PID.replace("kv", 'ki="1" kv')},
             "refused",
-            "actuator p has a state of its own",
+            "actuator p has a state",
         ),
         (
             {"more": BALL, "actuator": '<orientation name="o" joint="ball" kp="20"/>'},
             "refused",
-            "actuator transmission: actuator o does not drive a joint",
+            "actuator transmission: actuator o",
         ),
         (
             {"actuator": '<motor name="m" joint="a" damping="1"/>'},
             "refused",
-            "actuator armature or damping: actuator m has it: give it to the joint",
+            "damping: actuator m",
         ),
         (
             {"actuator": '<motor name="m" joint="a" armature="1"/>'},
             "refused",
-            "actuator armature or damping: actuator m has it: give it to the joint",
+            "damping: actuator m",
         ),
         (
             {"actuator": '<damper name="d" joint="a" kv="2" ctrlrange="0 1"/>'},
             "refused",
-            "actuator gain: actuator d has one that is not constant",
+            "actuator gain: actuator d",
         ),
     ],
 )
@@ -139,7 +139,7 @@ def test_an_actuator_that_is_off_is_not_refused(tmp_path: Path, actuator: str) -
 
 @pytest.fixture
 def pb() -> Any:
-    """The engine, imported without its banner."""
+    """Return the engine, imported without its banner."""
     return pytest.importorskip("pybullet")
 
 

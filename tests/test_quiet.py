@@ -68,7 +68,7 @@ def raw(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def inertias_of(text: str) -> Array:
-    """The diagonal of the mass matrix, from MuJoCo itself."""
+    """Return the diagonal of the mass matrix, from MuJoCo itself."""
     model, data = raw(text)
     mujoco.mj_forward(model, data)
     full = np.zeros((model.nv, model.nv))
@@ -77,7 +77,7 @@ def inertias_of(text: str) -> Array:
 
 
 def pushed(text: str, push: Array, seconds: float = 2.0) -> tuple[Array, Array]:
-    """Where the joints and the tip of an arm are after a constant force (nv,), from MuJoCo."""
+    """Return where joints and tip of an arm are after a constant force (nv,), by MuJoCo."""
     model, data = raw(text)
     data.qfrc_applied[:] = push
     for _ in range(round(seconds / model.opt.timestep)):

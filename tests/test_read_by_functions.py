@@ -56,7 +56,7 @@ def _why(folder: Path, function: str, left: str, right: str) -> Explanation:
 
 
 def _plain_run(text: str, command: Callable[[Any, Any], list[float]]) -> np.ndarray:
-    """Positions (n, 2) of j1 and j2 [rad], by MuJoCo alone."""
+    """Return positions (n, 2) of j1 and j2 [rad], by MuJoCo alone."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     joints = [model.joint(name).qposadr[0] for name in ("j1", "j2")]
@@ -99,7 +99,7 @@ def test_an_actuator_that_is_put_back_goes_to_its_own_place_of_ctrl(left, right,
     assert found.gap == pytest.approx(wanted, rel=1e-9)
     (share,) = _shares(found).values()
     assert share == pytest.approx(1.0, abs=1e-9)
-    assert found.brought == pytest.approx(0.0, abs=1e-12)
+    assert found.equalized_gap == pytest.approx(0.0, abs=1e-12)
 
 
 BY_NUMBER = """
@@ -142,7 +142,7 @@ def test_a_function_that_finds_its_joints_by_name_is_not_led_astray(right, tmp_p
     )
     found = _why(tmp_path, BY_NAME, AFTER, damped)
     assert found.explained == pytest.approx(1.0, abs=1e-6)
-    assert found.brought == pytest.approx(0.0, abs=1e-9)
+    assert found.equalized_gap == pytest.approx(0.0, abs=1e-9)
     if right == BEFORE:
         assert _shares(found)["order of qpos"] == pytest.approx(0.0, abs=1e-6)
 
@@ -237,7 +237,7 @@ def f(model, data):
 """
     found = _why(tmp_path, function, left, right)
     assert set(_shares(found)) == {"text data of law", "tuple data of chosen"}
-    assert found.brought == pytest.approx(0.0, abs=1e-12)
+    assert found.equalized_gap == pytest.approx(0.0, abs=1e-12)
 
 
 def test_user_data_that_has_no_room_is_refused_with_its_reason(tmp_path):

@@ -32,7 +32,7 @@ README = PAGES["README.md"]
 
 
 def blocks(page: str, language: str) -> list[str]:
-    """The fenced blocks of a page in one language."""
+    """Return the fenced blocks of a page in one language."""
     return re.findall(rf"^```{language}\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
 
 
@@ -92,7 +92,9 @@ def test_readme_and_guides_are_short() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_command(
+    here: Cli, cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     words = shlex.split(command)[1:]
     for engine in {ENGINE_OF[word] for word in words if word in ENGINE_OF}:
         need_engine(engine)
@@ -108,30 +110,35 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
     if "view" in words:
         words += ["--seconds", "1", "--port", "0"]
     if {"waves.npz", "played.npz", "my_controller.py"} & set(words):
-        _make_traces(cli, tmp_path, words)
+        _make_traces(here, tmp_path, words)
     if words[:2] == ["sweep", "--report"]:  # of a sweep that the line before has made
         made = COMMANDS[COMMANDS.index(command) - 1]
         assert f"--out {words[2]}" in made
-        assert cli(*shlex.split(made)[1:]).returncode == 0
-    done = of_python(*words) if command.startswith("python") else cli(*words)
+        assert here(*shlex.split(made)[1:]).returncode == 0
+    if command.startswith("python"):
+        done = of_python(*words)
+    elif "view" in words:  # what serves a page has a process of its own
+        done = cli(*words)
+    else:
+        done = here(*words)
     no = command in SAYS_NO or DIFFERS.match(command)
     assert done.returncode == (1 if no else 0), done.stderr
     assert done.stdout or words[:2] == ["trace", "plot"]
 
 
-def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
-    """The files that a command takes as there."""
+def _make_traces(here: Cli, folder: Path, words: list[str]) -> None:
+    """Write the files that a command takes as there."""
     (folder / "my_controller.py").write_text(blocks(PAGES["docs/traces.md"], "python")[0])
     for name, line in (
         ("waves.npz", "trace record waves --seed 3 -o waves.npz"),
         ("played.npz", "trace play waves.npz --backend pybullet -o played.npz"),
     ):
         if name in words and words[-2:] != ["-o", name]:
-            assert cli(*line.split()).returncode == 0
+            assert here(*line.split()).returncode == 0
 
 
 def make(*words: str) -> subprocess.CompletedProcess[str]:
-    """What make does in this checkout, with this environment, which is taken as set up."""
+    """Return what make does in this checkout, with this environment, which is taken as set up."""
     environment = Path(sys.executable).parent.parent
     old = [f"-o{environment / stamp}" for stamp in ("run.stamp", "test.stamp")]
     return subprocess.run(

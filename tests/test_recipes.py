@@ -27,12 +27,12 @@ PLACES = {
 
 
 def recipe(title: str) -> str:
-    """One section of CONTRIBUTING."""
+    """Return one section of CONTRIBUTING."""
     return RECIPES.split(f"## {title}\n")[1].split("\n## ")[0]
 
 
 def code(text: str, kinds: str = "python|markdown") -> list[str]:
-    """Its blocks of Python and of pages, or of other kinds."""
+    """Return its blocks of Python and of pages, or of other kinds."""
     found = re.findall(rf"^ *```(?:{kinds})\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
     return [textwrap.dedent(block) for block in found]
 
@@ -68,14 +68,14 @@ class Copy:
                 file.write_text(f"{before}{start}{line}\n{textwrap.indent(body, ' ' * 4)}{rest}")
 
     def run(self, *words: str, code: int = 0) -> str:
-        """A command of the copy; what it prints."""
+        """Return a command of the copy; what it prints."""
         here = {"PYTHONPATH": str(self.folder), "PYTHONUTF8": "1"}
         return of_python("-m", "statemachine", *words, folder=self.folder, code=code, **here).stdout
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Copy:
-    """Of the package as it is."""
+    """Return a copy of the package as it is."""
     return Copy(tmp_path)
 
 

@@ -23,7 +23,6 @@ import pytest
 
 import statemachine as sm
 from statemachine import conformance, releases
-from statemachine.backends.served.engine_process import Server
 from statemachine.cli import main
 from statemachine.errors import (
     BadInputError,
@@ -53,7 +52,7 @@ MISSING, BAD_INPUT, SAYS_NO = 3, 2, 1
 
 @pytest.fixture
 def nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A user without any release."""
+    """Return a user without any release."""
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(tmp_path))
     return tmp_path
 
@@ -62,7 +61,7 @@ installs = pytest.mark.usefixtures("old_releases")
 
 
 def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
-    """Positions of `hold` after each call of so many steps, and its Data."""
+    """Return positions of `hold` after each call of so many steps, and its Data."""
     data, rows = sm.make_data(model), []
     data.ctrl[:] = HOLD
     for _ in range(nstep // call):
@@ -76,11 +75,11 @@ def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
     [
         (OLD, MissingEngineError, f"statemachine engines add {OLD}"),
         ("mujoco==new", BadInputError, "type mujoco==3.3.7"),
-        ("mujoco==３.3.7", BadInputError, "is not a release of mujoco"),
-        ("mujoco==3.3.7é", BadInputError, "is not a release of mujoco"),
-        ("mujoco==3.3", BadInputError, "three numbers: type mujoco==3.3.0"),
-        ("pybullet==3.2.5", UnknownNameError, "no engine with releases named 'pybullet'"),
-        ("pinocchio==3.0.0", UnknownNameError, "no engine with releases named 'pinocchio'"),
+        ("mujoco==３.3.7", BadInputError, "release of mujoco"),
+        ("mujoco==3.3.7é", BadInputError, "release of mujoco"),
+        ("mujoco==3.3", BadInputError, "type mujoco==3.3.0"),
+        ("pybullet==3.2.5", UnknownNameError, "named 'pybullet'"),
+        ("pinocchio==3.0.0", UnknownNameError, "named 'pinocchio'"),
     ],
 )
 @pytest.mark.usefixtures("nothing")
@@ -115,7 +114,7 @@ def test_what_is_half_made_is_never_found(nothing: Path, monkeypatch: pytest.Mon
         if "venv" not in command:
             raise EngineError(f"{name} cannot be installed: the disk is full")
 
-    monkeypatch.setattr(releases, "_run", fails)
+    monkeypatch.setattr(releases, "run_installer", fails)
     refused((EngineError, "the disk is full", lambda: releases.add(OLD, say=lambda _line: None)))
     assert not list(nothing.iterdir())
 
@@ -133,7 +132,7 @@ chmod +x "$place/bin/python"
 
 @pytest.fixture
 def adding(nothing: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
-    """Processes that add a release, where that meets some trouble."""
+    """Return processes that add a release, where that meets some trouble."""
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(nothing / "home"))
     monkeypatch.setenv("PATH", f"{nothing}{os.pathsep}{os.environ['PATH']}")
 
@@ -154,7 +153,7 @@ def test_a_disk_that_is_full_while_it_is_added(adding: Callable[[str], Any]) -> 
     with adding("echo 'error: No space left on device' >&2; exit 1") as process:
         _, said = process.communicate()
     assert (process.returncode, said.count("\n")) == (BAD_INPUT, 1)
-    assert said.startswith(f"statemachine: {OLD} cannot be installed: error: No space left")
+    assert_in(said, OLD, "No space left")
     assert not list(releases.folder().iterdir())
 
 
@@ -251,7 +250,7 @@ GROUND = mjcf(
 
 
 def pushed(model: Any, key: int | None = None) -> np.ndarray:
-    """Where three times the mass is, after velocities were written."""
+    """Return where three times the mass is, after velocities were written."""
     with opened(model.replace(mass=model.body_mass * 3), key) as (heavy, data):
         for _ in range(20):
             sm.step(heavy, data)
@@ -261,7 +260,7 @@ def pushed(model: Any, key: int | None = None) -> np.ndarray:
 
 
 def on_raised_ground(model: Any) -> np.ndarray:
-    """Where it lands, where heights are written into the compiled model."""
+    """Return where it lands, where heights are written into the compiled model."""
     raised = copy.copy(model.compiled)
     raised.hfield_data[:] = 1
     return after(model.with_compiled(raised), 400)
@@ -313,7 +312,7 @@ class TestReleases:
         refused(
             (
                 UnsupportedError,
-                "does not support 'mesh_vert': it has no",
+                "'mesh_vert'",
                 lambda: model.with_compiled(edited),
             ),
         )
@@ -389,9 +388,7 @@ class TestReleases:
         (whole, _), (rows, data), (_, other) = (run_of(model, nstep) for nstep in (20, 10, 10))
         os.kill(process_of(model), signal.SIGKILL)
         time.sleep(0.2)
-        refused(
-            (EngineError, "its process is gone: ended by SIGKILL", lambda: sm.step(model, data))
-        )
+        refused((EngineError, "ended by SIGKILL", lambda: sm.step(model, data)))
         assert np.array_equal(data.qpos, rows[-1])
         for _ in range(10):  # what it was is known here
             sm.step(model, other)
@@ -450,7 +447,7 @@ class TestReleases:
         for _ in range(15):
             sm.reset(model, data)
             data.ctrl[:] = HOLD
-            kill = Server.of(model._reading.engine)._process.kill
+            kill = partial(os.kill, process_of(model), signal.SIGKILL)
             killer = threading.Timer(generator.uniform(0, 0.01), kill)
             killer.start()
             try:
@@ -483,7 +480,7 @@ class TestReleases:
         model.path.write_text(LINKS_AND_BALL.replace('damping="0.1"', 'damping="0.2"'))
         sm.step(model, first)
         sm.step(model, sm.make_data(model))  # what was compiled is there, once for all Data
-        refused((EngineError, "another file than when it was loaded", lambda: sm.make_data(other)))
+        refused((EngineError, "another file", lambda: sm.make_data(other)))
 
     def test_what_is_closed_or_collected_is_forgotten_there(
         self, request: pytest.FixtureRequest

@@ -44,7 +44,7 @@ FOLLOWS = '<mimic joint="a_j" multiplier="-1"/>'
 
 @pytest.fixture
 def gripper(tmp_path: Path, old_releases: None) -> Path:
-    """A URDF with a mimic, and the releases are here."""
+    """Return a URDF with a mimic, and the releases are here."""
     fingers = FINGER.format(name="a", mass=0.1, place=0.1, mimic="") + FINGER.format(
         name="b", mass=0.3, place=-0.1, mimic=FOLLOWS
     )
@@ -164,7 +164,7 @@ def test_a_release_that_is_too_old_is_refused_before_anything_is_downloaded(
     words: str,
 ) -> None:
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(tmp_path / "home"))
-    monkeypatch.setattr(releases, "_run", lambda *_: pytest.fail("it downloads"))
+    monkeypatch.setattr(releases, "run_installer", lambda *_: pytest.fail("it downloads"))
     assert main(words.split()) == BAD_INPUT
     said = capsys.readouterr().err
     assert said.count("\n") == 1

@@ -57,12 +57,12 @@ def _alike(number: int, _draw: random.Random) -> list[float]:
 
 
 def _varying(number: int, draw: random.Random) -> list[float]:
-    """Lengths of which two thirds lie within a third of the mean."""
+    """Return lengths of which two thirds lie within a third of the mean."""
     return [5.0 * math.exp(draw.gauss(-0.045, 0.3)) for _ in range(number)]
 
 
 def _by_turns(number: int, _draw: random.Random) -> list[float]:
-    """Two sides in turn, of which one takes four times as long."""
+    """Return two sides in turn, of which one takes four times as long."""
     return [(2.0, 8.0)[k % 2] for k in range(number)]
 
 

@@ -63,6 +63,7 @@ from statemachine.show.html.geometry import mesh_as_data, mesh_of
 
 from .support.browser import Tab, browser
 from .support.claims import assert_has, assert_in, refused
+from .support.colours import contrast
 from .support.compared import result_of
 from .support.processes import soon
 from .support.requirements import ROOT
@@ -81,7 +82,7 @@ def of(one: Trace, two: Trace) -> Made:
 
 
 def page_of(made: Made, looks: Any = None, said: Sequence[str] = (), **more: Any) -> str:
-    run = SidesRun(*made[1:3], made[2], said=tuple(said))
+    run = SidesRun(*made[1:3], made[2], notes=tuple(said))
     page = report_page(result_of(made[0], run), ReportParts(**more))
     return report(page, looks or made[3:] * 2)
 
@@ -235,7 +236,7 @@ def test_names_that_are_markup_do_nothing(hold: Made, seen: Seen) -> None:
             header.provenance, model_file=hostile("m"), backend=hostile("b"),
             versions={hostile("v"): hostile("1")}, emulated=(hostile("e"),),
         )  # fmt: skip
-        texts = ("experiment", "says", "command", "keyframe", "ended")
+        texts = ("experiment", "description", "command", "keyframe", "ended")
         options = {hostile("o"): hostile("p")}
         names |= {name: hostile(name) for name in texts}
         return edited(trace, {"provenance": prov, "options": options, **names})
@@ -322,10 +323,11 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
         )  # fmt: skip
 
     fields: dict[str, Any] = {
-        "experiment": "hold", "says": "", "seconds": 2.0, "labels": ("mujoco", "pybullet:engine"),
+        "experiment": "hold", "description": "", "seconds": 2.0,
+        "labels": ("mujoco", "pybullet:engine"),
         "quantity": quantity, "unit": "rad", "measure": "worst", "first": {quantity: gap},
         "gap": gap.worst, "shares": (row("servo law", 0.6), row("armature", -0.1)),
-        "method": "all sets", "orders": 0, "brought": 0.5 * gap.worst,
+        "method": "all sets", "orders": 0, "equalized_gap": 0.5 * gap.worst,
         "found_in": (contact,),
         "explained": 0.5, "located": 0.5, "unexplained": 1e-8, "negligible": 1e-9, "floor": 0.0,
         "tolerance": 1e-3, "draws": 8, "one_engine": False,
@@ -366,7 +368,11 @@ def refused_cause(name: str, why: str) -> Share:
 
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     located = explanation_of(hold, shares=(), explained=0.0, located=1.0)
-    wider: dict[str, Any] = {"explained": -0.25, "located": 1.25, "brought": 1.25 * located.gap}
+    wider: dict[str, Any] = {
+        "explained": -0.25,
+        "located": 1.25,
+        "equalized_gap": 1.25 * located.gap,
+    }
     worse = explanation_of(hold, **wider)  # all brought over widens the gap
     (contact,), rows = located.found_in, worse.shares
     switch = replace(
@@ -798,18 +804,6 @@ def test_dark_and_light(page: Path) -> None:
         assert paper(tab) < 50
         assert tab.get_by_role("button", name="Light colours").inner_text() == "Light"
         assert changed(before, picture(tab)) > 10_000
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance (WCAG 2.2)."""
-    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    r, g, b = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b
-
-
-def contrast(one: str, two: str) -> float:
-    low, high = sorted((luminance(one) + 0.05, luminance(two) + 0.05))
-    return high / low
 
 
 def test_every_text_can_be_read(page: Path) -> None:

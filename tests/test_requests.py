@@ -75,52 +75,52 @@ def test_what_is_typed_is_a_request(
 ) -> None:
     monkeypatch.delenv("MENAGERIE", raising=False)
     words = typed.split()
-    options = cli._options(words)
+    options = cli.options_of_words(words)
     command = importlib.import_module(f"statemachine.cli.{words[0]}")
     requests = importlib.import_module(command.run.__module__)
     assert requests.request_of(options) == request_made
 
 
 REFUSED: list[tuple[Callable[[], object], str]] = [
-    (lambda: ConventionsRequest(("foo",)), "no question named 'foo'"),
-    (lambda: CallsRequest(()), "no engine is named"),
-    (lambda: RobotsRequest(("models",), seconds=0.0), "seconds must be above 0"),
-    (lambda: RobotsRequest(("models",), jobs=0), "jobs must be at least 1"),
-    (lambda: RobotsRequest(("models",), table=Path("t.foo")), "a table ends in"),
-    (lambda: FingertipRequest(poses=1), "poses must be from 2"),
+    (lambda: ConventionsRequest(("foo",)), "named 'foo'"),
+    (lambda: CallsRequest(()), "no engine"),
+    (lambda: RobotsRequest(("models",), seconds=0.0), "seconds must"),
+    (lambda: RobotsRequest(("models",), jobs=0), "jobs must"),
+    (lambda: RobotsRequest(("models",), table=Path("t.foo")), "table ends in"),
+    (lambda: FingertipRequest(poses=1), "poses must"),
     (lambda: FingertipRequest(backends=("foo",)), "no backend named 'foo'"),
-    (lambda: CheckRequest("a.py", "mujoco:engine"), "exercises are judged on mujoco"),
-    (lambda: CheckRequest("a.py", time_limit=0.0), "the time limit must be above 0 s"),
+    (lambda: CheckRequest("a.py", "mujoco:engine"), "judged on mujoco"),
+    (lambda: CheckRequest("a.py", time_limit=0.0), "time limit must"),
     (lambda: FaultsRequest("a.py", only=("foo",)), "no fault named 'foo'"),
     (lambda: LessonRequest("foo"), "no lesson named 'foo'"),
-    (lambda: LessonRequest("hold", options={"foo": 1}), "no option of the lesson hold"),
+    (lambda: LessonRequest("hold", options={"foo": 1}), "lesson hold"),
     (lambda: LessonRequest("hold", backends=("pybullet:engine",)), "keep the contract"),
     (lambda: RecordRequest("foo"), "no experiment named 'foo'"),
-    (lambda: RecordRequest("hold", backend="all"), "trace record takes one --backend"),
-    (lambda: Sweep("hold", seeds=0), "--seeds must be at least 1"),
+    (lambda: RecordRequest("hold", backend="all"), "takes one --backend"),
+    (lambda: Sweep("hold", seeds=0), "--seeds must"),
     (lambda: Sweep("hold", every=2), "--every is of a FUNCTION"),
-    (lambda: SweepRequest(Sweep("hold"), ""), "the folder of a sweep has no name"),
+    (lambda: SweepRequest(Sweep("hold"), ""), "has no name"),
     (lambda: SweepEffectsRequest(SweepRequest(Sweep("hold"), None), "x"), "no quantity named 'x'"),
-    (lambda: answer_sweep(SweepRequest(Sweep("hold"), None)), "say where with --out DIR"),
-    (lambda: SweepReportRequest("d", backends=("a", "b", "c")), "a report is of one engine"),
-    (lambda: SimulationRequest(backends=("mujoco",) * 3), "view shows one engine or two"),
-    (lambda: RecordingRequest(()), "view shows one trace or two"),
-    (lambda: ServerSettings(seconds=0.0), "seconds must be above 0"),
+    (lambda: answer_sweep(SweepRequest(Sweep("hold"), None)), "--out DIR"),
+    (lambda: SweepReportRequest("d", backends=("a", "b", "c")), "of one engine"),
+    (lambda: SimulationRequest(backends=("mujoco",) * 3), "one engine or two"),
+    (lambda: RecordingRequest(()), "one trace or two"),
+    (lambda: ServerSettings(seconds=0.0), "seconds must"),
     (lambda: ServerSettings(speed=0.0), "speed must be from"),
-    (lambda: ExplainRequest(HOLD, time_limit=0.0), "--time-limit wants a number of seconds"),
-    (lambda: OneStepRequest(Request(("a.npz",))), "--one-step runs both sides"),
+    (lambda: ExplainRequest(HOLD, time_limit=0.0), "--time-limit wants"),
+    (lambda: OneStepRequest(Request(("a.npz",))), "--one-step runs"),
     (lambda: VersionsRequest(Request(("hold",), sides=(Side("a"), Side("b"))), "3"), "one model"),
-    (lambda: ModelsRequest(("a", "b"), seed=-1), "--seed must not be negative"),
-    (lambda: ModelsRequest(("a", "a"), ("mujoco", "mujoco")), "name two engines, or two files"),
+    (lambda: ModelsRequest(("a", "b"), seed=-1), "--seed must"),
+    (lambda: ModelsRequest(("a", "a"), ("mujoco", "mujoco")), "two engines, or"),
     # What only Python can ask: argparse has no such value.
-    (lambda: Request(("hold",), backends=("mujoco",)), "two backends are compared"),  # pyright: ignore
-    (lambda: Request(("hold",), every=0), "every must be a whole number of at least 1"),
+    (lambda: Request(("hold",), backends=("mujoco",)), "two backends"),  # pyright: ignore
+    (lambda: Request(("hold",), every=0), "every must"),
     (lambda: CompareRequest(HOLD, {"tipp": 0.1}), "no kind of quantity named 'tipp'"),
-    (lambda: CompareRequest(HOLD, {"tip": float("nan")}), "the tolerance of tip must not be nan"),
-    (lambda: ModelsRequest(("so101",)), "two files are compared"),  # pyright: ignore
+    (lambda: CompareRequest(HOLD, {"tip": float("nan")}), "tolerance of tip"),
+    (lambda: ModelsRequest(("so101",)), "two files"),  # pyright: ignore
     (lambda: Sweep("hold", backends=()), "at least one backend"),
-    (lambda: Sweep("hold", seeds=1.5), "--seeds must be a whole number"),  # pyright: ignore
-    (lambda: ServerSettings(port=-1), "port must be from 0 to 65535"),
+    (lambda: Sweep("hold", seeds=1.5), "--seeds must"),  # pyright: ignore
+    (lambda: ServerSettings(port=-1), "port must"),
     (lambda: RobotsRequest(("models",), Path("a" * 2000 + ".csv")), "cannot be written"),
 ]
 

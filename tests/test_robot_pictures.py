@@ -45,7 +45,7 @@ def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> N
     for command in picture.view.split(" && "):
         program, *words = shlex.split(command)
         assert program == "statemachine"
-        assert cli._options(words).run
+        assert cli.options_of_words(words).run
 
 
 def test_they_show_what_they_say() -> None:
@@ -94,7 +94,7 @@ def test_a_picture_above_the_text_repeats_no_text_in_a_notebook() -> None:
     shown = md.Shown(page)._repr_markdown_()
     assert_in(shown, "the words", "z")
     assert "above" not in shown  # a cell above has it
-    assert "above" in md._opening(page)
+    assert "above" in md.opening_text(page)
 
 
 def test_without_a_renderer_a_page_has_the_words(

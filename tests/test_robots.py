@@ -20,7 +20,7 @@ import pytest
 
 from statemachine.backends import load
 from statemachine.errors import BadInputError
-from statemachine.lab import robots
+from statemachine.installed import engine_version
 from statemachine.lab.recordings import record_scenario
 from statemachine.lab.robots import (
     BackendRow,
@@ -106,7 +106,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def sabotage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Models of some names go wrong; the file in which the others are noted."""
+    """Let models of some names go wrong; return the file in which the others are noted."""
     monkeypatch.syspath_prepend(written_all(tmp_path / "site", {"sitecustomize.py": SABOTAGE}))
     log = written(tmp_path / "examined.txt", "")
     monkeypatch.setenv("EXAMINED", str(log))
@@ -207,7 +207,7 @@ def test_files_are_named_too(folder: Path) -> None:
     (folder / "empty").mkdir()
     assert [each.path for each in find([good, binary, good])] == [good, binary]
     refused(
-        (BadInputError, "no file or folder", lambda: find([folder / "none"])),
+        (BadInputError, "no file", lambda: find([folder / "none"])),
         (BadInputError, "is not a model", lambda: find([folder / "notes.txt"])),
         (BadInputError, "no models", lambda: find([folder / "empty"])),
     )
@@ -297,7 +297,7 @@ ROW = ExaminedModel(
             equals_engine=True, restores=True, scenarios={"hold": "runs", "droop": "-"}, cost=1.01
         ),
         "pybullet": BackendRow(
-            "it has a tendon", "", ("tendon",), ("RK4",), ("RK4",), None, False,
+            "has a tendon", "", ("tendon",), ("RK4",), ("RK4",), None, False,
             RunGap(400, 4e-4, None, 2.5e-17, 0.0, 1.0, 3.0, "", 2.0), None,
         ),
     },
@@ -318,7 +318,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path, suffix: str) -> None:
     else:
         assert [row["file"] for row in json.loads(target.read_text())] == [ROW.file, "=c.xml"]
     target.write_text("a,b\n1,2\n" if suffix == ".csv" else '{"a": 1}')
-    refused((BadInputError, "is not a table of models", lambda: read_table(target)))
+    refused((BadInputError, "is not a table", lambda: read_table(target)))
 
 
 def test_what_is_wrong() -> None:
@@ -366,8 +366,8 @@ def test_the_outcome_of_a_gap_is_the_gravest(changes: dict[str, Any], outcome: s
     ("changes", "loading"),
     [
         ({}, "with contacts"),
-        ({"refusal": "it has a tendon"}, "without contacts"),
-        ({"refusal": "it has a tendon", "refusal_without": "it has a tendon"}, "never"),
+        ({"refusal": "has a tendon"}, "without contacts"),
+        ({"refusal": "has a tendon", "refusal_without": "has a tendon"}, "never"),
     ],
 )
 def test_with_what_a_model_loads(changes: dict[str, Any], loading: str) -> None:
@@ -419,7 +419,7 @@ def test_a_page_of_80_columns() -> None:
     assert_in(many, "…", "4e-4 → 0", "refused", "own 1e-16")
     (row,) = [line for line in many.splitlines() if line.startswith("tendon")]
     assert row.split() == ["tendon", "3", "3", "3"]
-    assert_in(one, "pybullet refuses it: it has a tendon", "pybullet warns: RK4")
+    assert_in(one, "has a tendon", "pybullet warns: RK4")
 
 
 @pytest.mark.slow
@@ -452,9 +452,11 @@ def test_an_interrupt_leaves_a_table_and_no_process(
             assert str(sabotage).encode() not in Path(f"/proc/{pid}/environ").read_bytes()
 
 
-def test_versions_and_settings_are_part_of_the_table() -> None:
-    assert robots._made_with(True, 0).endswith(", quick")
-    assert_in(robots._made_with(False, 1), "seed 1", "mujoco")
+@pytest.mark.parametrize(("quick", "seed"), [(True, 0), (False, 1)])
+def test_versions_and_settings_are_part_of_the_table(quick: bool, seed: int) -> None:
+    told = examine_all([], quick=quick, seed=seed).made_with
+    assert_in(told, f"seed {seed}", f"mujoco {engine_version('mujoco')}")
+    assert told.endswith(", quick") is quick
 
 
 def test_a_file_that_the_engine_alone_cannot_open_is_no_contradiction(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def test_a_flood_is_read_and_dropped() -> None:
 
 
 def test_a_flood_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sandbox, "_FLOOD", 5_000_000)
+    monkeypatch.setattr(sandbox, "FLOOD_BYTES", 5_000_000)
     assert _python("import os\nwhile True: os.write(1, b'x' * 65536)").end == "flood"
 
 
@@ -141,7 +141,7 @@ def _shut_in(
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder for a command that can be shut in; without such, there is nothing to test."""
+    """Return a folder for a command that can be shut in; without such, there is nothing to test."""
     if sys.platform != "linux":
         pytest.skip("namespaces are Linux")
     place = tmp_path / "inside"
@@ -227,13 +227,13 @@ def test_where_it_cannot_be_shut_in_it_runs_all_the_same(
 def test_where_it_was_to_be_shut_in_and_is_not_it_does_not_run(folder: Path) -> None:
     done = _python("print('it runs')", writable=folder / "nowhere", cwd=folder)
     assert_has(done, code=1, stdout="")
-    assert "it cannot be shut in" in done.stderr
+    assert "cannot be shut in" in done.stderr
 
 
 def test_what_is_asked_of_the_system_once(monkeypatch: pytest.MonkeyPatch) -> None:
     tries: list[int] = []
-    monkeypatch.setattr(sandbox, "_answers", {})
-    monkeypatch.setattr(sandbox, "_tried", lambda: not tries.append(1))
+    monkeypatch.setattr(sandbox, "shut_in_answers", {})
+    monkeypatch.setattr(sandbox, "runs_shut_in", lambda: not tries.append(1))
     if sys.platform == "linux":
         assert [sandbox.shut_in() for _ in range(3)] == [True] * 3
     monkeypatch.setattr(sys, "platform", "darwin")

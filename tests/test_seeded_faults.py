@@ -33,7 +33,7 @@ from .support.requirements import need_engine
 
 
 def derived(part: str, change: Callable[[MujocoData, np.ndarray], np.ndarray]) -> Patch:
-    """A fault in one derived array."""
+    """Return a fault in one derived array."""
     return around(MujocoData, "_derive")(
         lambda right, self, name: (
             change(self, right(self, name)) if name == part else right(self, name)
@@ -63,7 +63,7 @@ free_body_damped = patches.compiled(partial(_damp_bodies, by=0.4), partial(_damp
 
 
 def changes_with(*names: str) -> Patch:
-    """A fault: what options change in these arrays of the compiled model is lost."""
+    """Return a fault: what options change in these arrays of the compiled model is lost."""
 
     @around(_edits, "changes")
     def faulty(right: Any, raw: Any, options: Any) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def changes_with(*names: str) -> Patch:
 
 
 def contacts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    """A fault in one array of the contacts."""
+    """Return a fault in one array of the contacts."""
 
     @around(MujocoData, "_derive")
     def faulty(right: Any, self: MujocoData, name: str) -> Any:
@@ -88,7 +88,7 @@ def contacts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patc
 
 
 def facts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    """A fault in one array of the Model."""
+    """Return a fault in one array of the Model."""
 
     @around(Model, "__init__")
     def faulty(right: Any, self: Model, **facts: Any) -> None:

@@ -83,7 +83,7 @@ class Compared:
     listed: tuple[ListedDifference, ...]
 
     def equalized(self, *subjects: str) -> mujoco.MjModel:
-        """The right with the left's values, of some subjects or of all."""
+        """Return the right with the left's values, of some subjects or of all."""
         rows = [row for row in self.rows if not subjects or row.subject in subjects]
         edits = tuple(edit for cause in causes(rows) for edit in cause.edits(1))
         return built(self.right, edits).compiled
@@ -101,7 +101,7 @@ def _compared(folder: Path, left: str, right: str, *, inertia: tuple[str, str] =
 
 
 def _corners(raw: mujoco.MjModel) -> Array:
-    """The corners (8, 3) of the solid in the world [m], in an order of their own."""
+    """Return the corners (8, 3) of the solid in the world [m], in an order of their own."""
     data = mujoco.MjData(raw)
     mujoco.mj_kinematics(raw, data)
     geom = raw.geom("solid").id

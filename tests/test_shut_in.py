@@ -13,6 +13,7 @@ import struct
 import sys
 import textwrap
 import tomllib
+from inspect import ismodule
 from pathlib import Path
 
 import pytest
@@ -268,7 +269,7 @@ SHUT_IN_ONLY: Attacks = {
 
 @pytest.fixture
 def secret(tmp_path: Path) -> Path:
-    """A file of the teacher's, beside the folder of a class."""
+    """Return a file of the teacher's, beside the folder of a class."""
     return written(tmp_path / "answers.txt", SECRET)
 
 
@@ -284,7 +285,7 @@ def _tried(folder: Path, secret: Path, attacks: list[str]) -> list[Judgement]:
 
 
 def _groups(attacks: Attacks) -> list[pytest.param]:  # pyright: ignore
-    """Four attacks at a time: a file has four functions."""
+    """Return the attacks by four: a file has four functions."""
     names = list(attacks)
     fours = [names[k : k + len(JUDGES)] for k in range(0, len(names), len(JUDGES))]
     return [pytest.param(four, id="; ".join(four)) for four in fours]
@@ -313,7 +314,7 @@ def shut_in() -> None:
 
 @pytest.fixture
 def watched(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where no namespace can be had."""
+    """Let no namespace be available."""
     monkeypatch.setattr(sandbox, "shut_in", lambda: False)
 
 
@@ -401,7 +402,8 @@ def test_what_a_submission_needs_is_there(
 
 
 def test_the_public_interface_is_what_the_package_tells() -> None:
-    rooms = {module.partition(".")[0] for module in sm._MODULES.values()}
+    modules = [getattr(sm, name) for name in dir(sm)]
+    rooms = {module.__name__.split(".")[1] for module in modules if ismodule(module)}
     assert {*rooms, "interface", "worlds"} == set(PUBLIC)
 
 
@@ -473,7 +475,7 @@ def demo_replay(model, ctrl, nstep=600):
                 end[0] += 1
             ends.append(row(end))
             start, stop = (inputs(q, data.qvel, ctrl, t) for q, t in ((data.qpos, 0.0), (end, 1.0)))
-            runs.append({"EngineRun": dict(own=True, nstep=nstep, ctrl_changed=None,
+            runs.append({"EngineRun": dict(on_given_model=True, nstep=nstep, ctrl_changed=None,
                 start=start, end=stop)})
         result = {"tuple": [world.nudge is None, *ends]}
         say("answer", answer={"Answer": dict(result=result, memory={"tuple": [0, 1, 2]},
@@ -558,7 +560,7 @@ LEAD_OUT = {
 
 
 def _class(folder: Path, links: dict[str, str]) -> Path:
-    """A class of two, where ann's folder has these links, and no other file of that name."""
+    """Return a class of two, where ann's folder has these links, and no other file of that name."""
     written_all(
         folder,
         {
@@ -577,7 +579,7 @@ def _class(folder: Path, links: dict[str, str]) -> Path:
 
 @pytest.fixture
 def unread(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
-    """The files that are read of what was handed in, past all links."""
+    """Return the files that are read of what was handed in, past all links."""
     seen: list[Path] = []
     right = recording.content
 

@@ -97,7 +97,7 @@ def test_a_strange_number_is_refused_by_name(named: str, backend: str, tmp_path:
         ("jnt_range", np.nan, "jnt_range of joint lift is NaN"),
         ("key_qpos", np.nan, "key_qpos of key up is NaN"),
         ("key_time", np.inf, "key_time of key up is infinite"),
-        ("key_time", -1e300, "time of key up is -1e.300: no timestep is added to it"),
+        ("key_time", -1e300, "time of key up is -1e.300"),
     ],
 )
 def test_a_strange_number_of_a_compiled_model_is_refused_by_name(
@@ -121,7 +121,7 @@ def test_a_name_that_is_not_utf_8_is_refused(name: str, backend: str, tmp_path: 
     refused(
         (
             ModelError,
-            r"m\.xml has a name that is not UTF-8: b'\\xe4",
+            r"not UTF-8: b'\\xe4",
             lambda: sm.load(file, backend=backend),
         )
     )
@@ -207,7 +207,7 @@ def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("load", "error", "says"),
     [
-        *((partial(sm.load, model), TypeError, "its name or a path")  # pyright: ignore
+        *((partial(sm.load, model), TypeError, "a path")  # pyright: ignore
           for model in (5, None, b"so101", ["so101"], 1.5, object())),
         *((partial(sm.load, "so101", **{argument: word}), StateMachineError, f"no {argument} named")
           for argument in ("backend", "defaults")

@@ -148,7 +148,7 @@ def test_time_goes_on() -> None:
     def back(_model: sm.Model, data: sm.Data) -> None:
         data.time = 0.0
 
-    refused((TraceError, "time does not go on", lambda: record(sm.load("so101"), back, 0.1)))
+    refused((TraceError, "time does not", lambda: record(sm.load("so101"), back, 0.1)))
 
 
 def test_what_a_reader_says_at_length_is_cut(box: Trace, tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     written_all(tmp_path, {"robots/one.xml": text, "elsewhere/empty.txt": ""})
     trace = record(sm.load(one), seconds=0.2, metadata=RunMetadata(experiment="swing"))
     monkeypatch.chdir(other.parent)
-    refused((ModelFileError, "name it behind the trace", lambda: model_file(trace.header)))
+    refused((ModelFileError, "behind the trace", lambda: model_file(trace.header)))
     assert model_file(trace.header, beside=one.with_name("t.npz")) == (one, True)
     # Another file of that name here does not take the place of the one that it was.
     for _ in range(2):
@@ -196,7 +196,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     one.unlink()
     write(trace, other.with_name("swing.npz"))
     ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
-    assert "is not the file that the trace was recorded with" in ran.stderr
+    assert "trace was recorded" in ran.stderr
     again = read(tmp_path / "played.npz").header
     assert again.provenance.model_sha256 != trace.header.provenance.model_sha256
 

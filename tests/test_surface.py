@@ -34,7 +34,7 @@ def test_the_commands_are_those_of_the_surface() -> None:
 
 @pytest.mark.parametrize("command", SURFACE["options"])
 def test_a_command_has_as_many_options_as_the_surface_says(command: str) -> None:
-    parser = cli._parser([command])
+    parser = cli.parser_of([command])
     (commands,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
     names = {*options_of(commands.choices[command])} - {"--help", "--help-all"}
     assert len(names) == SURFACE["options"][command], sorted(names)

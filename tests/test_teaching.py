@@ -105,11 +105,11 @@ def test_a_kit_is_not_made_of_files_that_were_worked_in(
         (ROOT / "exercises/step_loop.py").read_text(),
     )
     monkeypatch.setattr(make_kits, "ROOT", tmp_path)
-    monkeypatch.setattr(make_kits, "_changed", lambda _: False)
+    monkeypatch.setattr(make_kits, "is_changed", lambda _: False)
     file.write_text(text)
-    assert make_kits._template("step_loop.py") == text.encode()
+    assert make_kits.template_of("step_loop.py") == text.encode()
     file.write_text(text.replace("raise NotImplementedError(", "return (", 1))
-    refused((SystemExit, "restore it first", lambda: make_kits._template("step_loop.py")))
+    refused((SystemExit, "restore it first", lambda: make_kits.template_of("step_loop.py")))
 
 
 def _zip(folder: Path, built: Path) -> Path:

@@ -49,7 +49,7 @@ def box() -> Trace:
 
 
 def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:
-    """A trace's file with another header and other entries.
+    """Return a trace's file with another header and other entries.
 
     These are bytes as they are, arrays, what makes another array of one, or None for none; behind
     a slash stands a name as it is.
@@ -67,7 +67,7 @@ def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:
 
 
 def put(value: Any, place: int = -1) -> Any:
-    """What puts a number into an array."""
+    """Return what puts a number into an array."""
 
     def change(array: np.ndarray) -> np.ndarray:
         array.flat[place] = value
@@ -77,7 +77,7 @@ def put(value: Any, place: int = -1) -> Any:
 
 
 def claim(*shape: int) -> bytes:
-    """The first bytes of an array of this shape, and no more."""
+    """Return the first bytes of an array of this shape, and no more."""
     out = io.BytesIO()
     npy.write_array_header_1_0(out, {"descr": "<f8", "fortran_order": False, "shape": shape})
     return out.getvalue()
@@ -141,13 +141,13 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
         *(
             (header, {}, says)
             for header, says in [
-                ({"schema": 99}, "this version reads 1"),
+                ({"schema": 99}, "this version reads 2"),
                 ({"joints": ["a"]}, "entries"),
                 ({"provenance": {}}, "not a header"),
-                ({"joints": ["gripper"] * 7}, "two joints of the trace are called 'gripper'"),
-                ({"jnt_qposadr": [12] * 7}, "no place in qpos"),
-                ({"jnt_type": [9] * 7}, "jnt_type of the trace names"),
-                ({"body_parentid": [99] * 10}, "names one that is not there"),
+                ({"joints": ["gripper"] * 7}, "called 'gripper'"),
+                ({"jnt_qposadr": [12] * 7}, "place in qpos"),
+                ({"jnt_type": [9] * 7}, "jnt_type of the trace"),
+                ({"body_parentid": [99] * 10}, "not there"),
                 # What no run writes.
                 *(
                     (change, "of the trace is")
@@ -174,31 +174,31 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
             for entries, says in [
                 ({"header": None}, "no header"),
                 ({"header": np.frombuffer(b"{}", dtype=np.uint8)}, "schema None"),
-                ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is not a trace"),
+                ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "not a trace"),
                 ({"qpos": np.zeros((3, 3))}, "shape"),
                 ({"qpos": np.array(["a"])}, "not numbers"),
                 ({"qpos": np.array([{}], dtype=object)}, "not numbers"),
-                ({"qpos": None}, "needs the column 'qpos'"),
+                ({"qpos": None}, "column 'qpos'"),
                 ({"time": None}, "a column 'time'"),
-                ({"qvel": put(np.nan)}, "not a finite number"),
+                ({"qvel": put(np.nan)}, "finite number"),
                 ({"contact_row": put(0)}, "ascending"),
-                ({"contact_geom": put(999)}, "geom that is not there"),
+                ({"contact_geom": put(999)}, "not there"),
                 ({"contact_dist": None}, "contacts only"),
                 ({"speed": np.zeros(3)}, "no column 'speed'"),
-                ({"qpos": b"hello"}, "is not a trace"),  # what is not an array
+                ({"qpos": b"hello"}, "not a trace"),  # what is not an array
                 ({"/notes.txt": b"hello"}, ""),
                 ({"/header": b"{}"}, ""),  # beside header.npy
                 ({"header": np.frombuffer(b"[" * 100_000, dtype=np.uint8)}, "not a header"),
                 ({"time": claim(10**14)}, "shape"),
                 ({"qpos": claim(10**12)}, "shape"),
                 ({"qpos": claim(0, 10**18)}, "shape"),
-                ({"qpos": claim(21, 13)}, "is not a trace"),  # and nothing after it
-                ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "is not a trace"),
+                ({"qpos": claim(21, 13)}, "not a trace"),  # and nothing after it
+                ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "not a trace"),
                 ({"qpos": b"\x93NUMPY\x09\x00\x10\x00"}, "npy version"),
-                ({"time": put(0.005, 2)}, "time does not go on after row 1"),
+                ({"time": put(0.005, 2)}, "after row 1"),
                 # Numbers that no run gives.
                 *(
-                    ({name: put(value, 3)}, f"column '{name}' has an entry beyond")
+                    ({name: put(value, 3)}, f"column '{name}' has an entry")
                     for name, value in (
                         ("qpos", 1e308),
                         ("ctrl", 1e300),
@@ -227,8 +227,8 @@ def test_a_run_that_would_take_days_is_not_begun(box: Trace, tmp_path: Path, cli
 
 
 def test_what_cannot_be_read_again_is_not_written(box: Trace, tmp_path: Path) -> None:
-    odd = Trace(dataclasses.replace(box.header, says="\udcff"), box.columns)
-    refused((TraceError, "says", lambda: write(odd, tmp_path / "odd.npz")))
+    odd = Trace(dataclasses.replace(box.header, description="\udcff"), box.columns)
+    refused((TraceError, "description", lambda: write(odd, tmp_path / "odd.npz")))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -266,7 +266,7 @@ def test_a_csv_and_its_contacts_are_replaced_together(
 
     before = table.read_bytes()
     monkeypatch.setattr(
-        "statemachine.lab.recordings.files._write_contacts",
+        "statemachine.lab.recordings.files.write_contacts",
         Mock(side_effect=OSError(28, "No space left on device")),
     )
     refused((OSError, "No space", lambda: export_csv(box, table)))

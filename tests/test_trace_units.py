@@ -29,7 +29,7 @@ def waved(file: Path) -> Trace:
 
 @pytest.fixture
 def trace(tmp_path: Path) -> Trace:
-    """A run of a robot that slides and turns, beside a ball that floats."""
+    """Return a run of a robot that slides and turns, beside a ball that floats."""
     return waved(written(tmp_path / "cart.xml", CART))
 
 

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.course.lessons._older_release import OLDER
 from statemachine.errors import (
     BadInputError,
     EngineError,
@@ -39,7 +38,6 @@ from statemachine.lab.recordings import (
     write,
 )
 from statemachine.lab.runs.scenarios import SCENARIOS
-from statemachine.release_names import is_release
 
 from .support.claims import assert_has, refused
 from .support.motions import opened
@@ -53,7 +51,7 @@ INPUTS = ("time", "qpos", "qvel", "ctrl")
 
 
 def as_it_comes(name: str, **options: Any) -> Trace:
-    """A short run of PyBullet with the defaults of the engine."""
+    """Return a short run of PyBullet with the defaults of the engine."""
     raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
     return record_scenario(SCENARIOS[name], raw, seconds=0.1, defaults="engine", **options)
 
@@ -405,24 +403,30 @@ def test_what_a_trace_cannot_do_is_refused(box: Trace, tmp_path: Path) -> None:
 
 def test_each_scenario_was_recorded_with_both_defaults() -> None:
     expected = {f"{name}.pybullet{end}" for name in SCENARIOS for end in ("", ".engine")}
-    assert set(shipped_trace_names()) == {*expected, f"hold.{OLDER}"}
+    assert set(shipped_trace_names()) == {*expected, _of_a_release()}
+
+
+def test_a_shipped_trace_is_read_by_scenario_backend_and_defaults() -> None:
     assert_has(
         read_shipped_trace("hold", "pybullet", "engine").header, recorded=True, defaults="engine"
     )
     refused((UnknownNameError, "recorded trace", lambda: read_shipped_trace("hold", "mujoco")))
 
 
+def _of_a_release() -> str:
+    """Return the name of the one shipped trace that an older release recorded."""
+    (name,) = (name for name in shipped_trace_names() if "==" in name)
+    return name
+
+
+@pytest.mark.parametrize("end", ["", ".engine"])
 @pytest.mark.parametrize(
-    "name",
-    [
-        name if name.startswith("droop") else pytest.param(name, marks=pytest.mark.slow)
-        for name in shipped_trace_names()
-        if not is_release(name)
-    ],
+    "scenario",
+    [name if name == "droop" else pytest.param(name, marks=pytest.mark.slow) for name in SCENARIOS],
 )
 @pytest.mark.usefixtures("bullet")
 def test_a_recorded_trace_is_what_the_engine_does_here(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    scenario: str, end: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On any processor, Python and distribution of PyBullet, to nine digits.
 
@@ -430,7 +434,7 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
     """
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
         pytest.skip("recorded on Linux x86-64: what another compiler gives was not measured")
-    _is_as_recorded(name, monkeypatch)
+    _is_as_recorded(f"{scenario}.pybullet{end}", monkeypatch)
 
 
 @pytest.mark.slow
@@ -439,12 +443,10 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
 def test_the_recorded_run_of_an_older_release_is_what_it_does(
     monkeypatch: pytest.MonkeyPatch, mujoco_scene: sm.Model
 ) -> None:
-    _is_as_recorded(f"hold.{OLDER}", monkeypatch)
+    _is_as_recorded(_of_a_release(), monkeypatch)
     here = lesson_result("hold", mujoco_scene, further=True).older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
-    recorded = dataclasses.asdict(
-        lesson_result("hold", mujoco_scene, further=True).older
-    )
+    recorded = dataclasses.asdict(lesson_result("hold", mujoco_scene, further=True).older)
     assert recorded["recorded"]
     for name, value in dataclasses.asdict(here).items():
         if isinstance(value, float):

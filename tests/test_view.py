@@ -67,7 +67,7 @@ def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -
             session.advance()
             frame = session.frame()
         for name in ("qpos", "qvel", "ctrl"):
-            np.testing.assert_array_equal(getattr(plain, name), getattr(session._arms[0][1], name))
+            np.testing.assert_array_equal(getattr(plain, name), getattr(session.arms[0][1], name))
         sm.forward(model, plain)
         tip = plain.site_xpos[model.site_id("gripperframe")]
         for name, wanted in {"xpos": plain.xpos, "xquat": plain.xquat, "tip": tip}.items():
@@ -140,7 +140,7 @@ def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
         session.advance(300)
         frame = session.frame()
         assert [pose.name for pose in frame.poses] == ["mujoco", "pybullet"] == list(session.names)
-        one, two = (data for _, data in session._arms)
+        one, two = (data for _, data in session.arms)
         np.testing.assert_array_equal(one.ctrl, two.ctrl)
         assert one.time == pytest.approx(two.time)
         assert one.qpos[2] > 1.0  # it went there, on both
@@ -177,7 +177,7 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
     with LiveSession(on_both("so101/scene")) as session:
-        session._arms[1][1].qvel[0] = math.nan
+        session.arms[1][1].qvel[0] = math.nan
         session.play()
         session.advance()
         assert not session.running
@@ -276,7 +276,7 @@ class Slow(LiveSession):
 
 
 def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Frame, Tempo, str]:
-    """What is shown after some turns, of which the first obeys these commands."""
+    """Return what is shown after some turns, of which the first obeys these commands."""
     hand.asked += asked
     for _ in range(turns):
         loop.turn()
@@ -426,7 +426,7 @@ def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) 
 
 
 def _listening(pid: int) -> set[str]:
-    """Addresses on which a process listens, as the kernel's tables have them."""
+    """Return addresses on which a process listens, as the kernel's tables have them."""
     sockets = set()
     for link in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(OSError):

@@ -38,7 +38,7 @@ class Served:
         return response
 
     def connects(self, path: str = "/", host: str | None = None, **headers: str) -> bool:
-        """Whether a websocket opens, as viser's page would open it."""
+        """Tell whether a websocket opens, as viser's page would open it."""
         import viser
         import websockets
 

@@ -20,7 +20,7 @@ from statemachine.view.live import Live, Tempo
 from statemachine.view.live_session import LiveSession
 from statemachine.view.server import Door
 from statemachine.view.trace_session import TraceSession
-from statemachine.view.viser_front import ViserFront, _page, thinner
+from statemachine.view.viser_front import ViserFront, page_of_rows, thinner
 
 from .support.browser import Tab, browser
 from .support.claims import assert_not_in
@@ -58,23 +58,23 @@ class Stage:
         self.until(lambda: self.tab.get_by_text(text).count() > 0)
 
     def reset(self) -> None:
-        """Everything to the start, and the time standing."""
+        """Put everything to the start, and let the time stand."""
         self.press("Reset")
         self.until(lambda: self.session.frame().time == 0)
         self.session.pause()
 
     def press(self, name: str) -> None:
-        """A button, by what stands on it."""
+        """Press a button, by what stands on it."""
         self.tab.get_by_role("button", name=name, exact=True).click()
 
     def slider(self, index: int) -> float:
-        """What a slider shows."""
+        """Return what a slider shows."""
         return float(self.tab.get_by_role("slider").nth(index).get_attribute("aria-valuenow"))
 
 
 @pytest.fixture(scope="module")
 def stage() -> Iterator[Stage]:
-    """The arm, and as its ghost the arm without its servos, which falls."""
+    """Provide the arm, and as its ghost the arm without its servos, which falls."""
     model, door = sm.load("so101/scene"), Door("127.0.0.1")
     with (
         browser(width=1000, height=640) as tab,
@@ -86,7 +86,7 @@ def stage() -> Iterator[Stage]:
 
 
 def _colours(tab: Tab) -> tuple[int, int]:
-    """Pixels of the arm's yellow, and of the ghost's blue, left of the panel."""
+    """Count pixels of the arm's yellow, and of the ghost's blue, left of the panel."""
     from PIL import Image
 
     picture = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
@@ -163,7 +163,7 @@ def test_run_pause_step_and_reset(stage: Stage) -> None:
         stage.until(lambda wanted=float(factor): stage.session.speed == wanted)
     stage.press("Run")
     stage.until(lambda: session.running)
-    session._arms[0][1].qvel[:] = 1e200
+    session.arms[0][1].qvel[:] = 1e200
     line = stage.tab.get_by_text("Reset to go on.")
     stage.until(lambda: line.count() == 1)
     assert line.inner_text().startswith("mujoco: ")
@@ -219,7 +219,7 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
         front = ViserFront(server, session, drawing, 0)
         front.show(session.frame(), Tempo(1.0, None, False), "")
         handle_of = server.scene.get_handle_by_name
-        for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
+        for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session.arms, strict=True):
             handles = [handle_of(f"{root}/{body}") for body in range(1, models[0].nbody)]
             assert len(handles) == 9
             # viser sends nothing for what moved by micrometres.
@@ -240,19 +240,19 @@ def test_the_slider_of_a_recording_follows_it(mujoco_scene: sm.Model) -> None:
     recording = TraceSession([record(mujoco_scene, seconds=0.5)])
     with served() as server:
         front = ViserFront(server, recording, drawing_of(mujoco_scene))
-        assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
+        assert (front.seek.min, front.seek.max) == (0, pytest.approx(0.5))
         recording.play()
         for count, at in ((40, 40 * mujoco_scene.timestep), (0, 0)):
             recording.reset()
             recording.advance(count)
             front.show(recording.frame(), Tempo(1.0, None, False), "")
-            assert front._seek.value == pytest.approx(at)
+            assert front.seek.value == pytest.approx(at)
         time.sleep(0.2)
         assert front.commands() == []
 
 
 def test_what_a_model_is_called_is_no_code_on_the_page() -> None:
-    text = _page([("<b>tip</b>", "<script>x</script>")], "<i>")
+    text = page_of_rows([("<b>tip</b>", "<script>x</script>")], "<i>")
     assert_not_in(text, "<script>", "<b>")
     assert "&lt;i&gt;" in text
 

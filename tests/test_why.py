@@ -45,7 +45,7 @@ def arm() -> Model:
 
 
 def shares(result: Explanation) -> dict[str, float]:
-    """The part of each cause that has one."""
+    """Return the part of each cause that has one."""
     return {row.name: row.share for row in result.shares if row.share}
 
 
@@ -85,7 +85,7 @@ def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize(
     ("timestep", "facts"),
     [
-        (0.0047, {"between": True, "brought": 0.0}),
+        (0.0047, {"between": True, "equalized_gap": 0.0}),
         (1 / 240, {"between": False, "moments": 25}),  # every 25 ms
     ],
 )
@@ -105,7 +105,7 @@ def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
         DifferingQuantity("timestep", 0.005, 0.01, "s"),
         DifferingQuantity("substeps", 1, 4),
     )
-    assert result.brought == result.unexplained == 0.0
+    assert result.equalized_gap == result.unexplained == 0.0
 
 
 def test_another_quantity(arm: Model) -> None:
@@ -152,7 +152,7 @@ def test_a_run_that_diverges_is_said_with_what_would_let_it_stand(arm: Model) ->
     coarse = arm.replace(timestep=0.02, integrator="euler")
     two = coarse.replace(armature=0, damping=0)
     refused(
-        (BadInputError, "does not reach the end", lambda: explain(WhyRequest(coarse, two, HOLD))),
+        (BadInputError, "reach the end", lambda: explain(WhyRequest(coarse, two, HOLD))),
         (
             BadInputError,
             r"brought to the same: armature of 6 joints, damping",
@@ -240,7 +240,7 @@ def quietly(name: str, **options: Any) -> Model:
 
 
 def path_of(model: Model, experiment: Scenario, used: int = 0) -> np.ndarray:
-    """(n, nq) of an experiment, its options left to the caller; after steps and a reset."""
+    """Return qpos (n, nq) of an experiment without its options, after steps and a reset."""
     controller, rows = experiment.controller(model, 0), []
     with opened(model, nstep=used) as (_, data):
         if used or experiment.keyframe:
@@ -255,7 +255,7 @@ def path_of(model: Model, experiment: Scenario, used: int = 0) -> np.ndarray:
 
 
 def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
-    """PyBullet as it comes, and its dials."""
+    """Return PyBullet as it comes, and its dials."""
     from statemachine.engines import raw_engine_of
 
     fresh = quietly(name, defaults="engine")
@@ -263,7 +263,7 @@ def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
 
 
 def motors_off(world: Any) -> None:
-    """PyBullet's own motors do nothing any more."""
+    """Switch PyBullet's own motors off."""
     import pybullet as pb
 
     for tree in world.trees:
@@ -353,7 +353,7 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
     def apart(names: dict[str, Any]) -> float:
         model = found.build(names, values_of(one)).replace(timestep=one.timestep)
         try:
-            rows = path_of(module._with_settings(model, [motors_off]), experiment)
+            rows = path_of(module.with_settings(model, [motors_off]), experiment)
             return float(np.abs(rows - wanted).max())
         except DivergedError:
             return np.inf
@@ -381,18 +381,18 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     # What is called its own; and another kind of it: so it would have been seen.
     own, other = {
         "damping": (
-            lambda w: module._set_damping(w, module.BODY_DAMPING, joints),
-            lambda w: module._set_damping(w, 0.05, joints),
+            lambda w: module.set_damping(w, module.BODY_DAMPING, joints),
+            lambda w: module.set_damping(w, 0.05, joints),
         ),
         "limits": (
-            lambda w: module._set_limits(w, module._ranges(fresh)),
-            lambda w: module._set_limits(w, dict.fromkeys(range(fresh.nv), (-0.1, 0.3))),
+            lambda w: module.set_limits(w, module.joint_ranges(fresh)),
+            lambda w: module.set_limits(w, dict.fromkeys(range(fresh.nv), (-0.1, 0.3))),
         ),
-        "surfaces": (module._harden, lambda w: w.soften()),
+        "surfaces": (module.harden, lambda w: w.soften()),
     }[dial]
     experiment = replace(scenario("gravity"), seconds=1.0)
     plain, same, changed = (
-        path_of(module._with_settings(fresh, [limp, *acts]), experiment)
+        path_of(module.with_settings(fresh, [limp, *acts]), experiment)
         for acts in ([], [own], [other])
     )
     assert np.abs(plain).max() > 0.35
@@ -402,7 +402,7 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     speeds = []
     for acts in ([], [own]):
         start = [0, 0, 0, 0, 0, 150.0]
-        with opened(module._with_settings(fresh, [limp, *acts]), qvel=start, nstep=1) as (_, data):
+        with opened(module.with_settings(fresh, [limp, *acts]), qvel=start, nstep=1) as (_, data):
             speeds.append(data.qvel.copy())
     assert np.abs(speeds[0]).max() == pytest.approx(100.0)
     np.testing.assert_array_equal(*speeds)
@@ -479,7 +479,7 @@ def test_dials_outlive_a_reset() -> None:
 
 @pytest.fixture(scope="module")
 def explanations() -> dict[tuple[str, str], Explanation]:
-    """Of the three experiments, in both regimes."""
+    """Return the explanations of three experiments, in both regimes."""
     need_engine("pybullet")
     results = {}
     for name, defaults in product(("hold", "gravity", "box"), ("model", "engine")):
@@ -516,7 +516,7 @@ def test_the_engine_as_it_comes_is_far_away_and_explained(explanations: Any) -> 
         assert abs(result.unexplained) < 1e-5
         # Where all settings are the same, what is left is the gap of the emulated engine.
         emulated = explanations[name, "model"].first[result.quantity].worst
-        assert 0.9 * emulated < result.brought <= emulated + 1e-12  # at fewer moments
+        assert 0.9 * emulated < result.equalized_gap <= emulated + 1e-12  # at fewer moments
     hold = explanations["hold", "engine"]
     assert np.degrees(hold.gap) > 30
     assert (hold.method, hold.shares[0].name) == ("drawn orders", "servo law")
@@ -531,7 +531,7 @@ def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(
     # The timestep put back, by hand: it acts on the engine's motors, not on the model's law.
     two = sm.load("so101/scene", backend="pybullet").replace(timestep=1 / 240)
     runs = [path_of(m, scenario("hold"))[::every] for m, every in ((arm, 5), (two, 6))]
-    expected = (np.abs(runs[0] - runs[1]).max() - result.brought) / result.gap
+    expected = (np.abs(runs[0] - runs[1]).max() - result.equalized_gap) / result.gap
     assert rows["timestep"].last == pytest.approx(expected, abs=1e-9)
     assert rows["timestep"].alone > 0.05
     # The engine has the rotor and the friction of the model only in the model's servo law.
@@ -557,7 +557,7 @@ def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     for sides in ((one, two), (two, one)):
         result = explain(WhyRequest(*sides, HOLD, uncertain=None))
         assert result.gap > 0.1
-        assert result.brought == 0.0
+        assert result.equalized_gap == 0.0
 
 
 @pytest.mark.usefixtures("bullet")
@@ -584,7 +584,7 @@ def test_an_integrator_is_found_behind_contact_too() -> None:
 def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
     fresh = quietly("so101/scene", defaults="engine")
     result = explain(WhyRequest(fresh, fresh.replace(gravity=[0, 0, -9.81]), HOLD, uncertain=None))
-    assert (list(shares(result)), result.brought) == (["gravity"], 0.0)
+    assert (list(shares(result)), result.equalized_gap) == (["gravity"], 0.0)
 
 
 @pytest.mark.usefixtures("bullet")

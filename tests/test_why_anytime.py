@@ -101,7 +101,7 @@ def _arm(folder: Path, name: str, values: dict[str, float]) -> sm.Model:
 
 
 def _right(causes: Iterable[str]) -> dict[str, float]:
-    """The values of the left with those of the right for some causes."""
+    """Return the values of the left with those of the right for some causes."""
     values = dict(LEFT)
     for cause in causes:
         values |= CHANGES[cause]
@@ -119,7 +119,7 @@ def _asked(sides: tuple[sm.Model, sm.Model], **how: Any) -> WhyRequest:
 
 
 def _raw_run(text: str, seconds: float) -> np.ndarray:
-    """The joint angles (n, nq) of a run from the default state, with plain MuJoCo."""
+    """Return the joint angles (n, nq) of a run from the default state, with plain MuJoCo."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     rows = [data.qpos.copy()]
@@ -130,7 +130,7 @@ def _raw_run(text: str, seconds: float) -> np.ndarray:
 
 
 def _raw_parts() -> dict[frozenset[str], float]:
-    """The part of the gap that is left with each set of causes equalized, with plain MuJoCo."""
+    """Return the part of the gap left with each set of causes equalized, by plain MuJoCo."""
     left = _raw_run(ARM.format(**LEFT), SECONDS)
     gaps: dict[frozenset[str], float] = {}
     for number in range(len(CHANGES) + 1):
@@ -177,7 +177,7 @@ def test_the_shares_are_the_shapley_values_of_plain_mujoco(
 def test_the_ranking_is_told_before_the_shares_where_these_take_long(
     sides: tuple[sm.Model, sm.Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(search, "_LONG", 0.0)
+    monkeypatch.setattr(search, "LONG_SEARCH", 0.0)
     told: list[Explanation] = []
     found = explain(_asked(sides), so_far=told.append)
     (ranked,) = told
@@ -205,7 +205,7 @@ def test_nothing_is_told_before_where_the_shares_come_soon(
 def _after(runs: int, error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the run behind so many of those with causes equalized be broken off."""
     made: list[object] = []
-    whole = Trials._trial
+    whole = Trials.trial_of
 
     def trial(trials: Trials, run: Any) -> Any:
         if len(made) == runs:
@@ -213,7 +213,7 @@ def _after(runs: int, error: BaseException, monkeypatch: pytest.MonkeyPatch) -> 
         made.append(run)
         return whole(trials, run)
 
-    monkeypatch.setattr(Trials, "_trial", trial)
+    monkeypatch.setattr(Trials, "trial_of", trial)
 
 
 @pytest.mark.parametrize("runs", [0, 1, 2, 5, 8, 9, 10, 12])
@@ -281,7 +281,7 @@ def test_a_floor_that_was_broken_off_is_of_the_runs_that_were_made(
     sides: tuple[sm.Model, sm.Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[int] = []
-    whole = Trials._run_perturbed
+    whole = Trials.perturbed_curves
 
     def run_perturbed(trials: Trials, side: int, *how: Any) -> Any:
         if len(made) == 7:
@@ -290,7 +290,7 @@ def test_a_floor_that_was_broken_off_is_of_the_runs_that_were_made(
         return whole(trials, side, *how)
 
     monkeypatch.setattr(perturbed, "RUNS", 8)
-    monkeypatch.setattr(Trials, "_run_perturbed", run_perturbed)
+    monkeypatch.setattr(Trials, "perturbed_curves", run_perturbed)
     found = explain(_asked(sides, uncertain=WhyRequest.uncertain, time_limit=1e6))
     assert (found.draws, found.verdict.answer) == (3, "stopped")
 
@@ -365,7 +365,7 @@ def test_a_run_that_is_longer_than_the_limit_is_broken_off(
 
         return controller
 
-    scenario = replace(DROOP, name="slow", controller=slow, own=True)
+    scenario = replace(DROOP, name="slow", controller=slow, is_user_function=True)
     request = replace(_asked(sides), scenario=scenario, seconds=10.0, time_limit=4.0)
     found = explain(request)
     assert (found.ended_by, found.verdict.answer) == ("time limit", "stopped")
@@ -409,7 +409,7 @@ def _slides(folder: Path, left: dict[str, Any], right: dict[str, Any]) -> Explan
 
 
 def _raw_divergence(**values: Any) -> float:
-    """The time [s] of the step in which plain MuJoCo finds that a slide diverges."""
+    """Return the time [s] of the step in which plain MuJoCo finds that a slide diverges."""
     text = SLIDE.format(**{"load": "", **values})
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
@@ -484,7 +484,7 @@ def test_a_cause_with_which_no_set_can_be_run_has_no_share_and_the_others_have(
     assert gains.failure.failure.time == pytest.approx(
         _raw_divergence(timestep=0.02, kp=20000.0, mass=1.5), abs=0.021
     )
-    assert mass.share == pytest.approx(1.0 - (found.brought or 0.0) / found.gap)
+    assert mass.share == pytest.approx(1.0 - (found.equalized_gap or 0.0) / found.gap)
 
 
 def _game(fails: Callable[[frozenset[str]], bool]) -> Callable[[frozenset[str]], float | None]:

@@ -31,7 +31,7 @@ COMMAND = TypedCommand(("statemachine", "compare", "waves", "left.xml", "right.x
 
 
 def chain(joints: int, damping: float) -> str:
-    """A chain of links that hang, each joint with another damping and a long name."""
+    """Return a chain of links that hang, each joint with another damping and a long name."""
     text, end = "", ""
     for number in range(joints):
         text += (
@@ -48,14 +48,14 @@ def chain(joints: int, damping: float) -> str:
 
 @pytest.fixture(scope="module")
 def gains(tmp_path_factory: pytest.TempPathFactory) -> Explanation:
-    """One cause that explains the gap."""
+    """Return one cause that explains the gap."""
     folder = tmp_path_factory.mktemp("gains")
     return explained(folder, ARM, changed(ARM, ALONE["gains"]), uncertain=None, jobs=1)
 
 
 @pytest.fixture(scope="module")
 def many(tmp_path_factory: pytest.TempPathFactory) -> Explanation:
-    """Twelve causes with long names."""
+    """Return an explanation with twelve causes of long names."""
     folder = tmp_path_factory.mktemp("many")
     fall = replace(scenario("fall"), seconds=0.4)
     left, right = chain(12, 0.01), chain(12, 0.012)

@@ -37,7 +37,7 @@ N = 5
 
 @pytest.fixture
 def model() -> Iterator[sm.Model]:
-    """On the backend that fails when it is told to."""
+    """Load the backend that fails when it is told to."""
     with registered("faulty", "tests.support.faulty_world:load") as name:
         yield sm.load("so101", backend=name)
 
@@ -114,7 +114,7 @@ def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:
 
 
 def interrupted_after(seconds: float, call: Callable[[], Any]) -> None:
-    """Ctrl-C while something is called."""
+    """Interrupt while something is called."""
     threading.Timer(seconds, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     refused((KeyboardInterrupt, "", call))
 

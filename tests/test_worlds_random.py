@@ -33,7 +33,7 @@ def box() -> Any:
 
 
 def varied(model: Any) -> dict[str, Any]:
-    """Every option of MuJoCo's that can differ between worlds, for N of them."""
+    """Return every option of MuJoCo's that can differ between worlds, for N of them."""
     return draw(
         model,
         N,
@@ -152,7 +152,7 @@ def test_a_latency_that_memory_cannot_hold_is_refused(arm: sm.Model) -> None:
         ),
         (
             BadInputError,
-            "latency of 1 s is too long for engine steps of 1e-09",
+            "engine steps of 1e-09",
             lambda: make_worlds(arm, 2, latency=[0, 1], timestep=[1e-9] * 2).close(),
         ),
     )
@@ -164,12 +164,12 @@ def test_worlds_that_do_not_fit_are_refused(box: Any, monkeypatch: Any) -> None:
     refused(
         (
             EngineError,
-            r"1000 worlds do not fit into memory: one takes .* kB",
+            r"1000 worlds .* kB",
             lambda: make_worlds(box, 1000),
         ),
         (
             EngineError,
-            "20000 commands that its latency keeps",
+            "20000 commands",
             lambda: make_worlds(box, 2, latency=[0, 2], timestep=[1e-4] * 2),
         ),
     )
@@ -239,15 +239,15 @@ def test_what_cannot_differ_is_refused(box: Any) -> None:
     of: Any = partial(draw, box, 2)
     make = partial(make_worlds, box, 2)
     refused(
-        (BadInputError, "substeps must be the same in all worlds", lambda: make(substeps=[1, 2])),
+        (BadInputError, "substeps must be the same", lambda: make(substeps=[1, 2])),
         (BadInputError, "mass", lambda: make(mass=[box.body_mass, 0 * box.body_mass])),
         (BadInputError, "mass", lambda: make(mass=[box.body_mass])),
         (BadInputError, "low > 0", lambda: LogUniform(0.0, 1.0)),
         (BadInputError, "0 ≤ low ≤ high", lambda: of(seed=0, mass=(1.2, 0.8))),
         (BadInputError, "0 ≤ low ≤ high", lambda: of(seed=0, mass=(-1, 1))),
         (BadInputError, "finite", lambda: of(seed=0, mass=(0, np.nan))),
-        (BadInputError, "mass takes a range", lambda: of(seed=0, mass=1.2)),
-        (BadInputError, "mass takes a range", lambda: of(seed=0, mass=(1, 2, 3))),
+        (BadInputError, "mass takes", lambda: of(seed=0, mass=1.2)),
+        (BadInputError, "mass takes", lambda: of(seed=0, mass=(1, 2, 3))),
         (BadInputError, "seed", lambda: of(seed=-1)),
         (UnknownNameError, "friction", lambda: of(seed=0, frictoin=(0.8, 1.2))),
     )

@@ -92,7 +92,7 @@ ROBOT = """<robot name="two">
 
 
 def edited(text: str, *changes: tuple[str, str]) -> str:
-    """A text with some pieces replaced, each of which it has once."""
+    """Return a text with some pieces replaced, each of which it has once."""
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -101,7 +101,7 @@ def edited(text: str, *changes: tuple[str, str]) -> str:
 
 @pytest.fixture
 def rewritten(tmp_path: Path) -> Callable[..., tuple[RewrittenFile, Path]]:
-    """Writes a right text so that it becomes like a left one."""
+    """Return a right text, written so that it becomes like a left one."""
 
     def run(left: str, right: str, suffix: str = ".xml") -> tuple[RewrittenFile, Path]:
         models = [
@@ -116,7 +116,7 @@ def rewritten(tmp_path: Path) -> Callable[..., tuple[RewrittenFile, Path]]:
 
 
 def arrays(path: Path) -> dict[str, Any]:
-    """The arrays of a compiled model on which a motion depends, by plain MuJoCo."""
+    """Return the arrays of a compiled model on which a motion depends, by plain MuJoCo."""
     model = mujoco.MjModel.from_xml_path(str(path))
     names = (
         *("body_mass", "body_ipos", "body_inertia", "body_pos", "body_quat", "jnt_axis"),
@@ -140,7 +140,7 @@ def assert_compiles_alike(left: Path, right: Path) -> None:
 
 
 def motion(path: Path, steps: int = 400) -> np.ndarray:
-    """A motion by plain MuJoCo under commands that change: (steps, nq)."""
+    """Return a motion by plain MuJoCo under commands that change: (steps, nq)."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     rows = []
@@ -424,7 +424,7 @@ def test_what_a_urdf_cannot_say_is_refused_by_name(tmp_path) -> None:
     left = sm.load(written(tmp_path / "left.xml", other))
     result, _ = rewrite(RewriteRequest(left, right, tmp_path / "fixed.urdf", sm.load, {}))
     reasons = {row.cause: row.reason for row in result.not_written}
-    assert reasons["armature of wrist"] == "a URDF has no armature of a joint"
+    assert reasons["armature of wrist"] == "no armature"
 
 
 @pytest.mark.parametrize("number", [0.1, 1e-17, 45.0, -2.5e300, 1 / 3])
@@ -452,7 +452,7 @@ def test_a_file_that_is_read_is_not_overwritten(tmp_path: Path) -> None:
     left = written(tmp_path / "left.xml", ARM)
     right = written(tmp_path / "right.xml", '<mujoco><include file="part.xml"/></mujoco>')
     for target in (left, right, part):
-        with pytest.raises(BadInputError, match="would overwrite a file that is read"):
+        with pytest.raises(BadInputError, match="would overwrite"):
             check_target(target, left, right)
     check_target(tmp_path / "other.xml", left, right)
 

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 
 from statemachine.course.grading import course_code
-from statemachine.course.grading.likeness import own_code, shingles_of_file
+from statemachine.course.grading.likeness import shingles_of_file, student_code
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -17,8 +17,8 @@ ROOT = Path(__file__).resolve().parents[1]
 def digests() -> course_code.CourseCode:
     """Return the digests of the files as they are now."""
     handed_out = shingles_of_file(ROOT / "exercises" / "step_loop.py")
-    solution = own_code([ROOT / "teaching" / "solutions" / "step_loop.py"])
-    return course_code.CourseCode(handed_out, solution.without(handed_out).whole)
+    solution = student_code([ROOT / "teaching" / "solutions" / "step_loop.py"])
+    return course_code.CourseCode(handed_out, solution.without(handed_out).all_shingles)
 
 
 def main() -> None:

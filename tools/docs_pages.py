@@ -85,18 +85,21 @@ def make_reference(folder: Path) -> list[Path]:
     return [_save(folder / f"{name}.md", text.encode()) for name, text in pages.items()]
 
 
-def make_comparisons(folder: Path) -> list[Path]:
+def make_comparisons(
+    folder: Path, experiments: Sequence[str] = ("hold", "gravity", "box")
+) -> list[Path]:
     """Write what `statemachine compare` says of the arm's experiments, and why.
 
     Args:
         folder: Where to; made if it is not there.
+        experiments: Those that are run.
 
     Returns:
         The pages that were written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name in ("hold", "gravity", "box"):
+    for name in experiments:
         print(f"comparing: {name} ...")
         result = answer(CompareRequest(Request((name,))))
         (left, right), compared = result.run.traces, result.comparison

@@ -37,7 +37,7 @@ def recorded(run: str) -> Trace:
     model = sm.load(scenario.model, backend=backend, defaults=defaults)
     typed = f"statemachine trace record {name} --backend {BackendChoice(backend, defaults)}"
     trace = record_scenario(scenario, model, defaults=defaults, command=typed)
-    header = dataclasses.replace(trace.header, single=True)
+    header = dataclasses.replace(trace.header, single_precision=True)
     return Trace(header, trace.columns)
 
 

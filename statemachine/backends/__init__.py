@@ -81,8 +81,8 @@ class Loader(Protocol):
     def __call__(self, path: Path, defaults: Defaults) -> Model: ...
 
 
-# Where each is, as "package.module:function"; ours go by the names of their engines.
-_BACKENDS: dict[str, str] = {
+# Where each backend is, as "package.module:function"; ours go by the names of their engines.
+BACKENDS: dict[str, str] = {
     name: f"{__name__}.{name}_backend:load" for name, engine in ENGINES.items() if engine.runs
 }
 
@@ -92,7 +92,7 @@ def backend_names() -> list[str]:
     installed.
     """
     _discover()
-    return list(_BACKENDS)
+    return list(BACKENDS)
 
 
 def check_backend(kind: str, name: str) -> None:
@@ -186,7 +186,7 @@ def register(name: str, loader: str) -> None:
     module, _, function = loader.partition(":")
     if not (module and function):
         raise BadInputError(f"loader must read 'package.module:function'; got {loader!r}")
-    if _BACKENDS.setdefault(name, loader) != loader:
+    if BACKENDS.setdefault(name, loader) != loader:
         raise BadInputError(f"there is a backend named {name!r} already; choose another name")
 
 
@@ -358,14 +358,14 @@ def on_default(model: Model) -> Model:
 def _find(name: str) -> str:
     if isinstance(name, str) and is_release(name):
         return f"{__name__}.served.release_backend:load"
-    known = isinstance(name, str) and name in _BACKENDS
+    known = isinstance(name, str) and name in BACKENDS
     if not known:
         _discover()
-    check_name("backend", name, _BACKENDS)
-    return _BACKENDS[name]
+    check_name("backend", name, BACKENDS)
+    return BACKENDS[name]
 
 
 def _discover() -> None:
     """Add the backends that installed packages declare; our own names stay ours."""
     for entry in importlib.metadata.entry_points(group="statemachine.backends"):
-        _BACKENDS.setdefault(entry.name, entry.value)
+        BACKENDS.setdefault(entry.name, entry.value)

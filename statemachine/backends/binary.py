@@ -17,7 +17,7 @@ from ..models import AnyPath
 SUFFIX = ".mjb"
 TRUST = "STATEMACHINE_TRUST_BINARY"  # "1" for a command and its children, by --trust-binary
 # SHA-256 in hexadecimal digits: what works on a model that was loaded reads its file again.
-_trusted: set[str] = set()
+trusted_digests: set[str] = set()
 
 
 def is_binary(path: AnyPath) -> bool:
@@ -41,7 +41,7 @@ def read_binary(path: AnyPath, trust: bool = False) -> bytes:
     except OSError as error:
         raise ModelError(f"{path} cannot be read: {error.strerror}") from None
     digest = hashlib.sha256(content).hexdigest()
-    if digest in _trusted:
+    if digest in trusted_digests:
         return content
     if not (trust or os.environ.get(TRUST) == "1"):
         raise ModelError(
@@ -54,5 +54,5 @@ def read_binary(path: AnyPath, trust: bool = False) -> bytes:
         EngineWarning,
         stacklevel=4,
     )
-    _trusted.add(digest)
+    trusted_digests.add(digest)
     return content

@@ -99,7 +99,7 @@ def _is_component(bits: int) -> bool:
 
 
 # Every single component of the integration state, in the engine's own order.
-_COMPONENTS = {
+STATE_COMPONENTS = {
     name.removeprefix("mjSTATE_").lower(): bit
     for name, bit in mujoco.mjtState.__members__.items()
     if name != "mjNSTATE" and _is_component(int(bit))
@@ -377,7 +377,8 @@ def _layout(model: MujocoModel, nhistory: int) -> StateLayout:
         nhistory: Size of the buffers of a Data.
     """
     sizes = {
-        name: int(mujoco.mj_stateSize(model.raw, int(bit))) for name, bit in _COMPONENTS.items()
+        name: int(mujoco.mj_stateSize(model.raw, int(bit)))
+        for name, bit in STATE_COMPONENTS.items()
     }
     sizes["history"] = nhistory
     always = ("time", *INPUTS)  # even where they are empty

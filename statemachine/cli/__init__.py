@@ -26,7 +26,7 @@ from .common import (
     MISSING,
     NO_OUTPUT,
     PROGRAM,
-    complain,
+    print_error,
 )
 
 _MORE = f"""\
@@ -35,7 +35,7 @@ more commands:
 
 `{PROGRAM} lesson --help` lists the lessons.
 `{PROGRAM} COMMAND --help` shows the options of a command."""
-_SAID: set[str] = set()
+SHOWN_WARNINGS: set[str] = set()
 
 
 class _Parser(argparse.ArgumentParser):
@@ -49,26 +49,26 @@ class _Parser(argparse.ArgumentParser):
         What argparse leaves over goes to the positionals that take several words, or have none yet.
         What still is over is refused here, by the parser that knows its options.
         """
-        found, rest = super().parse_known_args(args, namespace)
+        options, rest = super().parse_known_args(args, namespace)
         if not any(word.startswith("-") for word in rest):
             for action in self._get_positional_actions():
-                given: Any = getattr(found, action.dest, None)
+                value: Any = getattr(options, action.dest, None)
                 if action.nargs == "*":
-                    setattr(found, action.dest, [*given, *rest])
+                    setattr(options, action.dest, [*value, *rest])
                     rest = []
-                elif rest and action.nargs == "?" and given is action.default:
-                    setattr(found, action.dest, rest.pop(0))
+                elif rest and action.nargs == "?" and value is action.default:
+                    setattr(options, action.dest, rest.pop(0))
         if rest:
             self.error(f"unrecognized arguments: {' '.join(rest)}")
-        return found, rest
+        return options, rest
 
     def error(self, message: str) -> NoReturn:
         message = " ".join(message.replace("'", "").splitlines())  # as typed words may have
         wrong, _, rest = message.partition("invalid choice: ")
         if rest:
-            given, _, choices = rest.partition(" (choose from ")
+            word, _, choices = rest.partition(" (choose from ")
             known = [choice.strip() for choice in choices.rstrip(")").split(",")]
-            message = f"{wrong}no {given!r}{self._hint(given, known)}"
+            message = f"{wrong}no {word!r}{self._hint(word, known)}"
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
             named = {name: each for each in self._actions for name in each.option_strings}
@@ -78,34 +78,34 @@ class _Parser(argparse.ArgumentParser):
             elif flag in named and isinstance(metavar := named[flag].metavar, str):
                 message += f": {flag} {metavar}"
         if message.startswith("unrecognized arguments: -"):
-            given = message.split()[2].partition("=")[0]
+            word = message.split()[2].partition("=")[0]
             known = self._option_string_actions
             from ..course.lessons import LESSONS
             from ..measures.text import listed
 
-            others = [x.name for x in LESSONS.values() if given.removeprefix("--") in x.defaults]
+            others = [x.name for x in LESSONS.values() if word.removeprefix("--") in x.defaults]
             if "lesson" in sys.argv and others:
                 message += f"; it is an option of {PROGRAM} lesson {listed(others)}"
             else:
-                plain = given == "--model" and "; type the model without it"
-                message += plain or did_you_mean(given, known, 0.6)
+                plain = word == "--model" and "; type the model without it"
+                message += plain or did_you_mean(word, known, 0.6)
         elif message.startswith("unrecognized arguments: "):
             option = "--model" in self._option_string_actions
             message += "; a model is --model FILE" if option else "; this takes no more words"
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
 
-    def _hint(self, given: str, known: list[str]) -> str:
+    def _hint(self, word: str, known: list[str]) -> str:
         """Return what is typed instead of a word that is no choice."""
         from ..course.lessons import LESSONS, moved
 
-        if given in LESSONS:
-            return f". Did you mean {PROGRAM} lesson {given}?"
-        if moved(given) and "lesson" in self.prog:
-            return f" any more; {moved(given)}"
-        if given in COMMANDS:
-            return f". Did you mean {PROGRAM} {given}?"
-        return did_you_mean(given, known) or f"; known: {', '.join(known)}"
+        if word in LESSONS:
+            return f". Did you mean {PROGRAM} lesson {word}?"
+        if moved(word) and "lesson" in self.prog:
+            return f" any more; {moved(word)}"
+        if word in COMMANDS:
+            return f". Did you mean {PROGRAM} {word}?"
+        return did_you_mean(word, known) or f"; known: {', '.join(known)}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -118,14 +118,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _prepare_streams()
     warnings.showwarning = _show_warning
     try:
-        options = _options(list(sys.argv[1:] if arguments is None else arguments))
+        options = options_of_words(list(sys.argv[1:] if arguments is None else arguments))
         code = options.run(options)
         sys.stdout.flush()
         return code
     except MissingEngineError as error:
-        return complain(error, MISSING)
+        return print_error(error, MISSING)
     except StateMachineError as error:
-        return complain(error, BAD_INPUT)
+        return print_error(error, BAD_INPUT)
     except KeyboardInterrupt:
         with suppress(KeyboardInterrupt):  # a second one
             print(file=sys.stderr)
@@ -136,9 +136,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _report_file(error)
     except MemoryError:
-        return complain("this takes more memory than there is", BAD_INPUT)
+        return print_error("this takes more memory than there is", BAD_INPUT)
     except UnicodeError as error:  # a name in a file, or of one
-        return complain(f"this holds text that is not UTF-8: {error}", BAD_INPUT)
+        return print_error(f"this holds text that is not UTF-8: {error}", BAD_INPUT)
     except Exception as error:
         try:
             raise_if_interrupted(error)
@@ -163,9 +163,9 @@ def _prepare_streams() -> None:
 def _report_file(error: OSError) -> int:
     """Say which file cannot be read or written, or that the output cannot be."""
     if error.filename is not None:
-        return complain(f"{error.filename}: {error.strerror or error}", BAD_INPUT)
+        return print_error(f"{error.filename}: {error.strerror or error}", BAD_INPUT)
     _let_go_of_output()
-    return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+    return print_error(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
 
 
 def _report_fault(error: Exception) -> int:
@@ -178,13 +178,13 @@ def _report_fault(error: Exception) -> int:
         f"this is a fault of {PROGRAM}, and no answer; please report it, with the lines above and "
         "the files that you gave"
     )
-    return complain(text, FAULT)
+    return print_error(text, FAULT)
 
 
-def _options(words: list[str]) -> argparse.Namespace:
+def options_of_words(words: list[str]) -> argparse.Namespace:
     """Parse the words of a command line."""
     named = next((word for word in words if word in COMMANDS), "")
-    parser = _parser([named])
+    parser = parser_of([named])
     if not named:
         from .overview import overview
 
@@ -200,9 +200,9 @@ def _options(words: list[str]) -> argparse.Namespace:
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
     """Print what an engine warns of in one line; where in our code it came up is no help."""
     if issubclass(category, EngineWarning):
-        if str(message) not in _SAID:  # a lesson may load a model more than once
-            _SAID.add(str(message))
-            complain(message, 0)
+        if str(message) not in SHOWN_WARNINGS:  # a lesson may load a model more than once
+            SHOWN_WARNINGS.add(str(message))
+            print_error(message, 0)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
 
@@ -212,7 +212,7 @@ def _let_go_of_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
+def parser_of(wanted: Collection[str]) -> argparse.ArgumentParser:
     """Return a parser that knows all commands, and the options of some."""
     more = [name for name in COMMANDS if name not in FIRST]
     parser = _Parser(
@@ -223,8 +223,8 @@ def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
     commands = parser.add_subparsers(metavar="command", title="commands")
-    for name, says in COMMANDS.items():
-        shown: dict[str, Any] = {"help": says} if name in FIRST else {}
+    for name, help_text in COMMANDS.items():
+        shown: dict[str, Any] = {"help": help_text} if name in FIRST else {}
         command = commands.add_parser(name, **shown)
         if name in wanted:
             module = importlib.import_module(f".{name}", __package__)

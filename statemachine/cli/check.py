@@ -238,8 +238,8 @@ def _run_class(options: argparse.Namespace) -> int:
     request = class_request_of(options)
     if options.html is not None:
         check_target(options.html)
-    kept_in = judged_before.folder() if request.table is None else request.table
-    with resumable(kept_in, "judged"):
+    store_folder = judged_before.folder() if request.table is None else request.table
+    with resumable(store_folder, "judged"):
         result = answer_class(request, TerminalReporter())
     if options.html is not None:
         target = write_report(options.html, report(class_page(result)))

@@ -24,7 +24,7 @@ PROGRAM = "statemachine"
 SAYS_NO, BAD_INPUT, MISSING, FAULT, NO_OUTPUT, INTERRUPTED = 1, 2, 3, 70, 74, 130
 
 
-def complain(error: Exception | str, code: int) -> int:
+def print_error(error: Exception | str, code: int) -> int:
     """Print it in one line on standard error, and return `code`."""
     print(f"{PROGRAM}: {printable(error)}", file=sys.stderr)
     return code
@@ -69,7 +69,7 @@ class TerminalReporter:
 
     def note(self, text: str) -> None:
         """Print a note in one line."""
-        complain(text, 0)
+        print_error(text, 0)
 
     def so_far(self, page: Page) -> None:
         """Print a page on standard error: the result alone is for standard output."""
@@ -88,9 +88,9 @@ CONTRACT_BACKENDS = f"{_RUNS}; {_EACH}"  # each with the contract of this librar
 SIDES = ("left", "right")
 
 
-def add_backend(parser: argparse._ActionsContainer, says: str) -> None:
+def add_backend(parser: argparse._ActionsContainer, help_text: str) -> None:
     """Add --backend, which may be repeated; the command says how often."""
-    parser.add_argument("--backend", action="append", metavar="NAME", help=says)
+    parser.add_argument("--backend", action="append", metavar="NAME", help=help_text)
 
 
 def add_json(
@@ -103,14 +103,14 @@ def add_json(
         what: What the help calls the result.
         default: `argparse.SUPPRESS` where a parser above this one has the option, too.
     """
-    says = f"print the {what} as JSON"
-    parser.add_argument("--json", action="store_true", default=default, help=says)
+    help_text = f"print the {what} as JSON"
+    parser.add_argument("--json", action="store_true", default=default, help=help_text)
 
 
 def add_seed(parser: argparse._ActionsContainer, what: str) -> None:
     """Add --seed, of what is drawn at random."""
-    says = f"random seed of {what} (0)"
-    parser.add_argument("--seed", type=typed_int, default=0, metavar="N", help=says)
+    help_text = f"random seed of {what} (0)"
+    parser.add_argument("--seed", type=typed_int, default=0, metavar="N", help=help_text)
 
 
 def add_seconds(parser: argparse._ActionsContainer) -> None:
@@ -125,31 +125,31 @@ def add_timestep(parser: argparse._ActionsContainer) -> None:
 
 def add_jobs(parser: argparse._ActionsContainer) -> None:
     """Add --jobs, the number of processes."""
-    says = "parallel processes (default: one a processor)"
-    parser.add_argument("--jobs", type=typed_int, metavar="N", help=says)
+    help_text = "parallel processes (default: one a processor)"
+    parser.add_argument("--jobs", type=typed_int, metavar="N", help=help_text)
 
 
 def add_model(
-    parser: argparse._ActionsContainer, says: str = "the model", default: str | None = None
+    parser: argparse._ActionsContainer, help_text: str = "the model", default: str | None = None
 ) -> None:
     """Add the model, as a word that may be left out."""
     if default is not None:
-        says += f" (default {default})"
-    parser.add_argument("model", nargs="?", default=default, metavar="NAME|FILE", help=says)
+        help_text += f" (default {default})"
+    parser.add_argument("model", nargs="?", default=default, metavar="NAME|FILE", help=help_text)
 
 
 def add_trust(parser: argparse._ActionsContainer) -> None:
     """Add --trust-binary, which `cli.main` obeys."""
-    says = "read a binary model (.mjb); a damaged one can do harm"
-    parser.add_argument("--trust-binary", action="store_true", help=says)
+    help_text = "read a binary model (.mjb); a damaged one can do harm"
+    parser.add_argument("--trust-binary", action="store_true", help=help_text)
 
 
 def add_menagerie(parser: argparse._ActionsContainer) -> None:
     """Add --menagerie, the folder in which models are looked up, and --trust-binary."""
     add_trust(parser)
     folder = os.environ.get("MENAGERIE") or None
-    says = "look the model up in this folder of public models (default $MENAGERIE)"
-    parser.add_argument("--menagerie", default=folder, metavar="DIR", help=says)
+    help_text = "look the model up in this folder of public models (default $MENAGERIE)"
+    parser.add_argument("--menagerie", default=folder, metavar="DIR", help=help_text)
 
 
 def word_of_one_backend(words: Sequence[str] | None, what: str) -> str:

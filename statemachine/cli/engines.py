@@ -64,8 +64,8 @@ def run(options: argparse.Namespace) -> int:
     """Show what is here."""
     from ..lab.installation.engines import answer, page
 
-    here = answer(request_of(options))
-    return show(page(here), here, options.json)
+    result = answer(request_of(options))
+    return show(page(result), result, options.json)
 
 
 def run_add(options: argparse.Namespace) -> int:

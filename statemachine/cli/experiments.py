@@ -13,4 +13,4 @@ EXPERIMENTS = {
 
 def experiments() -> str:
     """Return a line for each experiment."""
-    return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
+    return "\n".join(f"  {name:<9} {description}" for name, description in EXPERIMENTS.items())

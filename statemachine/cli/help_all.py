@@ -32,5 +32,5 @@ def shorten_help(parser: argparse.ArgumentParser, first: Collection[str]) -> Non
     }
     for action in later:
         action.help = argparse.SUPPRESS
-    says = f"every option: {len(later)} more"
-    parser.add_argument("--help-all", action=_HelpAll, nargs=0, const=later, help=says)
+    help_text = f"every option: {len(later)} more"
+    parser.add_argument("--help-all", action=_HelpAll, nargs=0, const=later, help=help_text)

@@ -104,15 +104,17 @@ def _add_option(
     parser: argparse.ArgumentParser,
     flag: str,
     metavar: str,
-    says: str,
+    help_text: str,
     settings: Mapping[str, Any] | None = None,
 ) -> None:
     """Add an option of the table of lessons; one without a metavar is a switch."""
     if not metavar:
-        parser.add_argument(flag, action="store_true", help=says)
+        parser.add_argument(flag, action="store_true", help=help_text)
         return
     further = dict(settings or {})
-    parser.add_argument(flag, metavar=metavar, type=_TYPES.get(metavar, str), help=says, **further)
+    parser.add_argument(
+        flag, metavar=metavar, type=_TYPES.get(metavar, str), help=help_text, **further
+    )
 
 
 def request_of(options: argparse.Namespace) -> LessonRequest:

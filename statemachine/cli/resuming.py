@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .common import INTERRUPTED, complain
+from .common import INTERRUPTED, print_error
 
 
 @contextmanager
@@ -23,5 +23,5 @@ def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
     except KeyboardInterrupt:
         if written is not None and written.exists():
             text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
-            raise SystemExit(complain(text, INTERRUPTED)) from None
+            raise SystemExit(print_error(text, INTERRUPTED)) from None
         raise

@@ -19,7 +19,7 @@ from .common import (
     add_seconds,
     add_seed,
     add_timestep,
-    complain,
+    print_error,
     show,
     word_of_one_backend,
 )
@@ -82,13 +82,13 @@ def add(parser: argparse.ArgumentParser) -> None:
 def _action(
     actions: argparse._SubParsersAction[argparse.ArgumentParser],
     name: str,
-    says: str,
+    help_text: str,
     description: str | None = None,
 ) -> argparse.ArgumentParser:
     """Add the parser of an action."""
     return actions.add_parser(
         name,
-        help=says,
+        help=help_text,
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -129,8 +129,8 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_output(parser: argparse.ArgumentParser, usual: str) -> None:
-    says = f"where to (default {usual})"
-    parser.add_argument("-o", "--output", metavar="FILE", help=says)
+    help_text = f"where to (default {usual})"
+    parser.add_argument("-o", "--output", metavar="FILE", help=help_text)
 
 
 def run(_options: argparse.Namespace) -> int:
@@ -281,5 +281,7 @@ def _write(trace: Trace, target: Path) -> int:
             "wrote qpos or qvel, or the engine does not repeat"
         )
     if header.ended:
-        return complain(f"the run ended early, and is written until then: {header.ended}", SAYS_NO)
+        return print_error(
+            f"the run ended early, and is written until then: {header.ended}", SAYS_NO
+        )
     return 0

@@ -137,14 +137,14 @@ def run(options: argparse.Namespace) -> int:
 def _announce(options: argparse.Namespace, view: BrowserView, port: int, token: str) -> None:
     """Print the address of the page, who can reach it, and what is not drawn."""
     everywhere = options.host in ("0.0.0.0", "::")
-    here = everywhere or options.host in ("127.0.0.1", "::1", "localhost")
+    is_local = everywhere or options.host in ("127.0.0.1", "::1", "localhost")
     host = f"[{options.host}]" if ":" in options.host else options.host
-    address = f"http://{'localhost' if here else host}:{port}/?token={token}"
+    address = f"http://{'localhost' if is_local else host}:{port}/?token={token}"
     if options.port not in (0, port):
         print(f"port {options.port} is taken, so it is {port}")
     print(address)
     print(printable(f"shows {view.what}; Ctrl-C ends it"))
-    if everywhere or not here:
+    if everywhere or not is_local:
         print(f"whoever has this address and reaches port {port} here can move the sliders")
     else:
         machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"

@@ -179,7 +179,7 @@ def _lesson_cells(entry: Lesson, number: int) -> Iterator[dict[str, Any]]:
     name = entry.name
     page = _page(entry, DEFAULT, {})
     title = f"{number}. {page.title}" if entry.on_path else page.title
-    yield _cell(f"{name}-text", "markdown", f"## {title}\n\n{_opening(page)}")
+    yield _cell(f"{name}-text", "markdown", f"## {title}\n\n{opening_text(page)}")
     questions = _questions(page)
     if questions:
         yield _cell(f"{name}-prediction", "code", f'prediction = ""  # {_letters(questions)}')
@@ -201,8 +201,8 @@ def _letters(questions: list[Question]) -> str:
 
 
 def _page(entry: Lesson, backend: str, options: dict[str, Any]) -> Page:
-    taken = take(entry, load(entry.model, backend=backend), backend, options)
-    return page_of_lesson(entry, {backend: taken})
+    result = take(entry, load(entry.model, backend=backend), backend, options)
+    return page_of_lesson(entry, {backend: result})
 
 
 def _leading(page: Page) -> list[Text]:
@@ -216,7 +216,7 @@ def _leading(page: Page) -> list[Text]:
     return paragraphs
 
 
-def _opening(page: Page) -> str:
+def opening_text(page: Page) -> str:
     """Write the first paragraphs and the questions, without what answers them."""
     paragraphs = [block_as_markdown(block, inline) for block in _leading(page)]
     questions = [asked(question) for question in _questions(page)]

@@ -188,7 +188,7 @@ def cuts(lines: Sequence[str]) -> set[int]:
     A diagram is some lines without an empty one between them of which one is drawn. A program may
     have empty lines.
     """
-    found: set[int] = set()
+    positions: set[int] = set()
     plain = [_COLOUR.sub("", line).rstrip() for line in lines]
     begin = 0
     for is_empty, group in itertools.groupby(plain, key=lambda line: not line):
@@ -197,11 +197,11 @@ def cuts(lines: Sequence[str]) -> set[int]:
         if is_empty:
             is_between = 0 < begin < end < len(plain)
             if is_between and _is_program(plain[begin - 1]) and _is_program(plain[end]):
-                found |= set(range(begin, end + 1))
+                positions |= set(range(begin, end + 1))
         elif _is_program(run[0]) or any(_DRAWN.search(line) for line in run):
-            found |= set(range(begin + 1, end))
+            positions |= set(range(begin + 1, end))
         begin = end
-    return found
+    return positions
 
 
 def _is_program(line: str) -> bool:

@@ -19,7 +19,8 @@ from ..errors import BadInputError, MissingEngineError
 from ..installed import raise_if_interrupted
 from .raw_engine import RawEngine
 
-_ROOMS: dict[str, str] = {
+# The room of each engine, as "package.module:Class".
+ROOMS: dict[str, str] = {
     "mujoco": f"{__name__}.mujoco:MujocoEngine",
     "pybullet": f"{__name__}.pybullet:PybulletEngine",
     "pinocchio": f"{__name__}.pinocchio:PinocchioEngine",
@@ -29,8 +30,8 @@ _ROOMS: dict[str, str] = {
 def raw_engine_names() -> list[str]:
     """Return the names of the engines that may have a room, whether or not they are installed."""
     for entry in importlib.metadata.entry_points(group="statemachine.engines"):
-        _ROOMS.setdefault(entry.name, entry.value)
-    return list(_ROOMS)
+        ROOMS.setdefault(entry.name, entry.value)
+    return list(ROOMS)
 
 
 def register(name: str, kind: str) -> None:
@@ -46,7 +47,7 @@ def register(name: str, kind: str) -> None:
     Raises:
         BadInputError: There is another room of that name.
     """
-    if _ROOMS.setdefault(name, kind) != kind:
+    if ROOMS.setdefault(name, kind) != kind:
         raise BadInputError(f"there is a room for {name!r} already; choose another name")
 
 
@@ -60,15 +61,15 @@ def raw_engine_of(engine: str | None) -> RawEngine:
         MissingEngineError: Its room cannot be imported.
     """
     # What is installed is looked through for names that are not known alone: that takes long.
-    if engine is None or (engine not in _ROOMS and engine not in raw_engine_names()):
+    if engine is None or (engine not in ROOMS and engine not in raw_engine_names()):
         return RawEngine(engine or "")
-    module, _, kind = _ROOMS[engine].partition(":")
+    module, _, kind = ROOMS[engine].partition(":")
     try:
         return getattr(importlib.import_module(module), kind)(engine)
     except (ImportError, AttributeError) as error:
         raise_if_interrupted(error)
         raise MissingEngineError(
-            f"the room of {engine!r} cannot be loaded from {_ROOMS[engine]!r}: {error}",
+            f"the room of {engine!r} cannot be loaded from {ROOMS[engine]!r}: {error}",
             engine=engine,
         ) from error
 

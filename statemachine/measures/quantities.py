@@ -35,7 +35,7 @@ class Quantity:
         unit: SI unit.
         plural: What several of the kind are called.
         moves: Whether it says where something is.
-        own: Whether it is a coordinate of its own, and nothing that follows from others.
+        is_coordinate: Whether it is a coordinate of its own, and nothing that follows from others.
         of_base: Whether it is a coordinate of the floating base of the robot.
         is_outcome: Whether it is one number of a whole run, without a curve over time.
         tolerance: A difference that does not matter [unit]; None: `tolerance_of` says it of a run.
@@ -46,7 +46,7 @@ class Quantity:
     unit: str
     plural: str
     moves: bool = False
-    own: bool = False
+    is_coordinate: bool = False
     of_base: bool = False
     is_outcome: bool = False
     tolerance: float | None = None
@@ -59,7 +59,7 @@ _KINDS = (
         "rad",
         "joints",
         moves=True,
-        own=True,
+        is_coordinate=True,
         tolerance=ENCODER_COUNT,
         reason=_ENCODER_COUNT_REASON,
     ),
@@ -68,7 +68,7 @@ _KINDS = (
         "m",
         "slides",
         moves=True,
-        own=True,
+        is_coordinate=True,
         tolerance=1e-4,
         reason="a tenth of a millimetre",
     ),
@@ -86,7 +86,7 @@ _KINDS = (
         "m",
         "free bodies",
         moves=True,
-        own=True,
+        is_coordinate=True,
         tolerance=1e-3,
         reason="a millimetre: chosen for bodies of centimetres (--tolerance body=5mm for larger "
         "ones)",
@@ -96,7 +96,7 @@ _KINDS = (
         "rad",
         "rotation of free bodies",
         moves=True,
-        own=True,
+        is_coordinate=True,
         tolerance=np.radians(1.0),
         reason="a degree: it moves what is 57 mm from the origin by 1 mm",
     ),
@@ -105,7 +105,7 @@ _KINDS = (
         "m",
         "position of the base",
         moves=True,
-        own=True,
+        is_coordinate=True,
         of_base=True,
         tolerance=1e-3,
         reason="a millimetre",
@@ -115,7 +115,7 @@ _KINDS = (
         "rad",
         "rotation of the base",
         moves=True,
-        own=True,
+        is_coordinate=True,
         of_base=True,
         tolerance=np.radians(0.1),
         reason="0.1°: it moves what is 0.57 m from the origin of the base by 1 mm",

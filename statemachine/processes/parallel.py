@@ -42,9 +42,9 @@ _TRACKERS = (
     "multiprocessing.resource_tracker",
     "joblib.externals.loky.backend.resource_tracker",
 )
-_PAYS = 0.1  # [s] of work that a fork takes over; for less it costs more than it saves
+WORTH_A_FORK = 0.1  # [s] of work that a fork takes over; for less it costs more than it saves
 _LOOK = 0.2  # [s] between two looks at whether all is to end
-_LEAST, _LONGEST = 20.0, 50.0  # [s] without a result, or so many times what one takes
+LEAST_WAIT, _LONGEST = 20.0, 50.0  # [s] without a result, or so many times what one takes
 _work: Sequence[Callable[[], Any]] = ()  # of the forks that are made
 
 
@@ -215,7 +215,9 @@ def forks_for(number: int, seconds: float, jobs: int | None) -> int:
     if not hasattr(os, "fork") or sys.platform == "darwin":
         return 1
     if jobs is None:
-        most = 1 if threading.active_count() > 1 else min(most, int(number * seconds / _PAYS))
+        most = (
+            1 if threading.active_count() > 1 else min(most, int(number * seconds / WORTH_A_FORK))
+        )
     return max(1, most)
 
 
@@ -248,7 +250,7 @@ def in_forks(
     """
     global _work  # noqa: PLW0603  (forks find it here, and nothing is pickled)
     _work = work
-    limit = max(_LEAST, _LONGEST * seconds)
+    limit = max(LEAST_WAIT, _LONGEST * seconds)
     outcomes = _shared(range(len(work)), jobs, ended, limit, meanwhile)
     for number, (error, _) in dict(outcomes).items():
         if isinstance(error, BrokenProcessPool):

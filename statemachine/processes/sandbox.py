@@ -37,7 +37,7 @@ GB = 1024**3
 # Address space, of which engines reserve far more than they use.
 MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 2
-_FLOOD = GB // 4  # bytes of output that only a loop without end writes
+FLOOD_BYTES = GB // 4  # bytes of output that only a loop without end writes
 _NO_MEMORY = "MemoryError|bad_alloc|annot allocate memory"  # at the end of stderr
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 # Where a process cannot limit its computing time, it is watched from outside.
@@ -165,7 +165,7 @@ def run(
         def exceeded() -> str:
             if WATCHED and cpu_of(process) - before > limits.cpu:
                 return "cpu"
-            flooded = any(os.fstat(file.fileno()).st_size > _FLOOD for file in (out, err))
+            flooded = any(os.fstat(file.fileno()).st_size > FLOOD_BYTES for file in (out, err))
             return "flood" if flooded else ""
 
         try:
@@ -258,13 +258,13 @@ def _how(end: End, code: int, used: float, most_cpu: float, most_clock: float) -
         "memory": "asks for more memory than there is for it",
         "cpu": f"took longer than {most_cpu:g} s of computing",
         "clock": f"took longer than {most_clock:g} s on the clock, and computed for {used:.1f} s",
-        "flood": f"prints more than {_FLOOD >> 20} MB, and was ended there",
+        "flood": f"prints more than {FLOOD_BYTES >> 20} MB, and was ended there",
     }
     return words[end]
 
 
 _asked = threading.Lock()
-_answers: dict[str, bool] = {}
+shut_in_answers: dict[str, bool] = {}
 
 
 def shut_in() -> bool:
@@ -276,12 +276,12 @@ def shut_in() -> bool:
     if sys.platform != "linux":
         return False
     with _asked:
-        if "" not in _answers:
-            _answers[""] = _tried()
-        return _answers[""]
+        if "" not in shut_in_answers:
+            shut_in_answers[""] = runs_shut_in()
+        return shut_in_answers[""]
 
 
-def _tried() -> bool:
+def runs_shut_in() -> bool:
     """Return whether a Python that is shut in, and sees nothing but Python, comes to its end."""
     with tempfile.TemporaryDirectory() as folder, _written(bare_python()) as view:
         command = [sys.executable, "-I", "-S", "-c", "import ctypes, json, os; os.listdir('.')"]

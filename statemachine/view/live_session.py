@@ -71,13 +71,13 @@ class LiveSession(Session, ExitStack):
         )
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
-        self._arms: list[_Arm] = []
+        self.arms: list[_Arm] = []
         # Those of the last moment that was good.
         self._time = 0.0
         self._poses: tuple[EnginePose, ...] = ()
         try:
             for model in models:
-                self._arms.append(_Arm(model, self.enter_context(make_data(model))))
+                self.arms.append(_Arm(model, self.enter_context(make_data(model))))
             self.reset(keyframe)
         except BaseException:
             self.close()
@@ -86,7 +86,7 @@ class LiveSession(Session, ExitStack):
     def set_ctrl(self, index: int, value: float) -> None:
         if not 0 <= index < len(self.controls) or not np.isfinite(value):
             raise BadInputError(f"actuator {index} cannot be set to {value}")
-        for _, data in self._arms:
+        for _, data in self.arms:
             data.ctrl[index] = value
 
     def advance(self, count: int = 1) -> None:
@@ -95,7 +95,7 @@ class LiveSession(Session, ExitStack):
             self.steps += count
 
     def reset(self, keyframe: int | str | None = None) -> None:
-        for model, data in self._arms:
+        for model, data in self.arms:
             reset(model, data, keyframe)
         self._error, self.steps = "", 0
         self._resets += 1
@@ -105,10 +105,10 @@ class LiveSession(Session, ExitStack):
 
         Looking changes nothing: the run goes on as if nobody had looked.
         """
-        solid = self._arms[0].data
+        solid = self.arms[0].data
         if self._all_do(forward):
             self._time = solid.time
-            self._poses = tuple(self._pose(model, data) for model, data in self._arms)
+            self._poses = tuple(self._pose(model, data) for model, data in self.arms)
         return self._snapshot(self._time, np.array(solid.ctrl), self._poses)
 
     def _pose(self, model: Model, data: Data) -> EnginePose:
@@ -126,7 +126,7 @@ class LiveSession(Session, ExitStack):
         """Call a verb on every engine; return whether there is no error, now or before."""
         if self._error:
             return False
-        for model, data in self._arms:
+        for model, data in self.arms:
             try:
                 verb(model, data)
             except StateMachineError as error:

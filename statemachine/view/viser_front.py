@@ -37,7 +37,7 @@ class ViserFront:
 
     _readout: viser.GuiHtmlHandle
     _switch: viser.GuiButtonHandle
-    _seek: viser.GuiSliderHandle[float] | None
+    seek: viser.GuiSliderHandle[float] | None
     _sliders: list[viser.GuiSliderHandle[float]]
 
     def __init__(
@@ -83,8 +83,8 @@ class ViserFront:
                 self._resets = frame.resets
                 self._follow(frame)
             # Not out of the hand of someone who drags it.
-            if self._seek is not None and time.monotonic() - self._dragged > _HELD:
-                self._seek.value = min(frame.steps * self._session.timestep, self._seek.max)
+            if self.seek is not None and time.monotonic() - self._dragged > _HELD:
+                self.seek.value = min(frame.steps * self._session.timestep, self.seek.max)
             self._switch.label = "Pause" if frame.running else "Run"
             self._say(frame, pace, note)
 
@@ -180,12 +180,12 @@ class ViserFront:
             ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
             self._on(ghost.on_update, lambda: partial(self._show_ghost, ghost.value))
         self._sliders = []
-        self._seek = None
+        self.seek = None
         if session.length:
-            self._seek = gui.add_slider(
+            self.seek = gui.add_slider(
                 "seek [s]", 0.0, float(session.length), float(session.timestep), 0.0
             )
-            self._on(self._seek.on_update, partial(self._sought, self._seek))
+            self._on(self.seek.on_update, partial(self._sought, self.seek))
         if session.controls:
             with gui.add_folder("ctrl"):
                 for index in range(len(session.controls)):
@@ -220,7 +220,7 @@ class ViserFront:
             return  # nobody reads faster
         self._when = now
         rows = readout(frame, pace, self._session.tip)
-        self._readout.content = _page(rows, warning(frame, note))
+        self._readout.content = page_of_rows(rows, warning(frame, note))
 
     # What comes back
 
@@ -299,7 +299,7 @@ def warning(frame: Frame, note: str) -> str:
     return f"{frame.error}. Reset to go on." if frame.error else note
 
 
-def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:
+def page_of_rows(rows: Sequence[tuple[str, str]], warning: str) -> str:
     cells = "".join(
         f"<tr><td style='{_DIM}'>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
         for name, value in rows

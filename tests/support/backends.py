@@ -24,7 +24,7 @@ def registered(name: str, loader: str) -> Iterator[str]:
     try:
         yield name
     finally:
-        backends._BACKENDS.pop(name)
+        backends.BACKENDS.pop(name)
 
 
 def bullet_clients() -> set[int]:
@@ -40,7 +40,7 @@ RELEASES = ("mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={engine_version('mujoco'
 
 def process_of(model: Any) -> int:
     """Return the number of the process in which the engine of a Model runs."""
-    return Server.of(model._reading.engine).pid
+    return Server.of(model.reading.engine).pid
 
 
 def load_made_up(path: Path, defaults: Any = "model") -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -90,8 +90,10 @@ def _controller(model: sm.Model, _seed: int) -> Controller:
 SWING = Scenario(
     *("swing", "The servos are told two poses.", "", 1.0, _controller),
     *("", lambda _model: None),
-    own=True,
+    is_user_function=True,
 )
+HOME = replace(SWING, keyframe="home")
+STILL = replace(SWING, controller=lambda _model, _seed: lambda _model, _data: [0.0])
 
 
 def explained(
@@ -103,6 +105,16 @@ def explained(
         for side, text, engine in zip(("left", "right"), (left, right), engines, strict=True)
     ]
     return explain(WhyRequest(models[0], models[1], more.pop("scenario", SWING), **more))
+
+
+def shares(found: Explanation) -> dict[str, float]:
+    """Return the part of each cause; of one without any it is not a number."""
+    return {row.name: float("nan") if row.share is None else row.share for row in found.shares}
+
+
+def is_equalized(found: Explanation) -> bool:
+    """Tell whether nothing is left where all causes are equalized."""
+    return found.equalized_gap is not None and found.equalized_gap <= 1e-9 * found.gap + 1e-12
 
 
 def with_changes(text: str, changes: Iterable[tuple[str, str]]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .explained import (
@@ -113,38 +115,43 @@ def said_otherwise(name: str) -> str:
     return with_actuators_swapped(right) if name == "permuted actuators" else right
 
 
-EQUIVALENT = {
-    "mesh in another order": (mesh(), mesh(order=1)),
-    "connect swapped": (
+Sides = Callable[[], tuple[str, str]]
+
+# Two sides that say the same in other words, by what is other.
+EQUIVALENT: dict[str, Sides] = {
+    "mesh in another order": lambda: (mesh(), mesh(order=1)),
+    "connect swapped": lambda: (
         equality('<connect body1="lower" body2="ball" anchor="0 0 -0.1"/>'),
         equality('<connect body1="ball" body2="lower" anchor="-0.6 0 0"/>'),
     ),
-    "weld swapped": (
+    "weld swapped": lambda: (
         equality('<weld body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
         equality('<weld body1="ball" body2="lower" anchor="0.3 0 -0.05"/>'),
     ),
-    "weld in another frame": (
+    "weld in another frame": lambda: (
         equality('<weld body1="ball" body2="lower" anchor="0 0 -0.1"/>'),
         lowered(equality('<weld body1="ball" body2="lower" anchor="0 0 -0.05"/>')),
     ),
-    "connect in another frame": (
+    "connect in another frame": lambda: (
         equality('<connect body1="lower" body2="ball" anchor="0 0 -0.1"/>'),
         lowered(equality('<connect body1="ball" body2="lower" anchor="-0.6 0 0"/>')),
     ),
-    "mocap body fixed": (ledge('mocap="true"'), ledge("")),
+    "mocap body fixed": lambda: (ledge('mocap="true"'), ledge("")),
 }
 
-
-BROUGHT_OVER = [
-    (mesh(), mesh(size=0.055), "shape of ball_shape"),
-    (mesh(), mesh(noise=1e-4), "shape of ball_shape"),
-    (hills(), hills(2.0), "heights of floor"),
-    (
-        equality('<weld name="w" body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
-        equality('<weld name="w" body1="ball" body2="lower" anchor="0.35 0 -0.05"/>'),
+# Two sides with one cause, by what differs: the sides, and the cause.
+OTHER_SHAPES: dict[str, tuple[Sides, str]] = {
+    "a larger mesh": (lambda: (mesh(), mesh(size=0.055)), "shape of ball_shape"),
+    "a mesh with noise": (lambda: (mesh(), mesh(noise=1e-4)), "shape of ball_shape"),
+    "another height field": (lambda: (hills(), hills(2.0)), "heights of floor"),
+    "a weld the other way round": (
+        lambda: (
+            equality('<weld name="w" body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
+            equality('<weld name="w" body1="ball" body2="lower" anchor="0.35 0 -0.05"/>'),
+        ),
         "parameters of w",
     ),
-]
+}
 
 
 EXTRA = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import mmap
 import os
 import re
@@ -11,6 +13,8 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+
+from statemachine.cli import main
 
 from .requirements import ROOT
 
@@ -49,6 +53,22 @@ def of_python(
     done.stderr = without_estimates(done.stderr)
     assert code in (None, done.returncode), done.stdout + done.stderr
     return done
+
+
+def run_main(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run a command in this process, as the fixture `here` does, where its test's scope is wider.
+
+    Returns:
+        Its exit code, and what it printed.
+    """
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main([str(word) for word in words])
+    printed: list[str] = []
+    for stream in (out, err):
+        stream.seek(0)
+        printed.append(stream.read())
+    return subprocess.CompletedProcess(words, code, printed[0], without_estimates(printed[1]))
 
 
 def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:

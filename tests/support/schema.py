@@ -527,6 +527,33 @@ def coverage(text: str) -> Coverage:
     return Coverage(tuple(attributes), *(tuple(group) for group in groups.values()))
 
 
+def _says(root: Element, edit: AttributeEdit) -> bool:
+    """Tell whether a document says what an edit puts there."""
+    element = list(edit.attribute.elements(root))[edit.number]
+    return element.get(edit.attribute.name) == edit.value
+
+
+def merged(text: str, edits: Sequence[AttributeEdit]) -> list[str]:
+    """Return a text with all edits; those that would undo another one's stand in a further text."""
+    texts: list[str] = []
+    pending = list(edits)
+    while pending:
+        whole: str = text
+        applied: list[AttributeEdit] = []
+        later: list[AttributeEdit] = []
+        for edit in pending:
+            candidate = edit.applied(whole)
+            root = ElementTree.fromstring(candidate)
+            if all(_says(root, earlier) for earlier in applied):
+                whole = candidate
+                applied.append(edit)
+            else:
+                later.append(edit)
+        texts.append(whole)
+        pending = later
+    return texts
+
+
 def spec_elements(spec: mujoco.MjSpec, attribute: SchemaAttribute) -> dict[str, object]:
     """Return the elements of a specification that can have an attribute, by their names."""
     lists = {

@@ -24,7 +24,7 @@ _OUTPUTS = [
     "o.npz", "o.csv", "o.svg", "o.html", "/dev/full", "/nowhere/o.npz", "o", "", ".", "a\nb.npz",
     "x" * 300 + ".npz", "folder.npz", "\udcff.npz", "link.npz",
 ]  # fmt: skip
-_BASES = [
+BASES = [
     ["lesson", "state"],
     ["lesson", "gravity", "--json"],
     ["conventions", "quaternion"],
@@ -49,7 +49,7 @@ def run(seed: int, tries: int) -> Tally:
     draw, tally = random.Random(seed), Tally()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _furnish(folder)
+        furnish(folder)
         for _ in range(tries):
             words = odd(draw)
             tally.tried += 1
@@ -61,7 +61,7 @@ def run(seed: int, tries: int) -> Tally:
 
 def odd(draw: random.Random) -> list[str]:
     """Draw a command with a word changed, left out, put in or said twice."""
-    words = list(draw.choice(_BASES))
+    words = list(draw.choice(BASES))
     place = draw.randrange(1, len(words)) if len(words) > 1 else 1
     pool = draw.choice([_NUMBERS, _NAMES, _OUTPUTS])
     kind = draw.random()
@@ -91,7 +91,7 @@ def examine(words: list[str], folder: Path) -> str:
     return ""
 
 
-def _furnish(folder: Path) -> None:
+def furnish(folder: Path) -> None:
     """Write the files that the commands work on."""
     run_bounded(command("trace", "record", "hold", "--seconds", "0.05", "-o", "t.npz"), folder)
     (folder / "idle.py").write_text("def controller(model, data): return None\n")

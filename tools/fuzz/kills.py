@@ -21,7 +21,7 @@ from ._tally import ROOT, Tally, environment
 TRIES = 100
 _OLD = b"what was there before\n"
 # Reads a trace, says that it begins, and writes it again and again.
-_WRITER = """
+WRITER = """
 import sys
 from statemachine.lab.recordings import export_csv, read, write
 source, target = sys.argv[1:]
@@ -70,7 +70,7 @@ def _files(target: Path) -> list[Path]:
 
 def _kill(source: Path, target: Path, after: float) -> None:
     """Start a writer, and kill it some time after it has begun."""
-    words = [sys.executable, "-c", _WRITER, str(source), str(target)]
+    words = [sys.executable, "-c", WRITER, str(source), str(target)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, cwd=ROOT, env=environment()) as writer:
         assert writer.stdout is not None
         writer.stdout.readline()

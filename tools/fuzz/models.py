@@ -33,7 +33,7 @@ _VALUES = [
     "a&#10;b", "j" * 5000, "関節", "../../etc", "%s%n", "[red]x[/red]", "/etc/passwd",
 ]  # fmt: skip
 # One file and one reader, in a process of its own; what it says begins with RESULT.
-_READER = """
+READER = """
 import sys, warnings
 warnings.simplefilter("ignore")
 import numpy as np
@@ -73,7 +73,7 @@ def run(seed: int, tries: int) -> Tally:
             path.write_bytes(content)
             reader = draw.choice(readers)
             tally.tried += 1
-            problem = examine([sys.executable, "-c", _READER, str(path), reader], path.parent)
+            problem = examine([sys.executable, "-c", READER, str(path), reader], path.parent)
             if problem:
                 tally.failures.append(f"{reader}, {change}: {problem}")
     return tally

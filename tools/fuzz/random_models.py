@@ -30,7 +30,7 @@ _CODES = (0, 1, 2, 3, 74)
 _SHORT = ("--seconds", "0.05")
 _EXPERIMENTS = ("hold", "gravity", "droop", "fall", "waves")
 # Words of a command, and how often one is drawn beside the others. LEFT and RIGHT are the files.
-_COMMANDS: dict[tuple[str, ...], int] = {
+COMMANDS: dict[tuple[str, ...], int] = {
     ("compare", "--models", "LEFT", "RIGHT"): 60,
     ("compare", "--models", "LEFT", "RIGHT", "--json"): 10,
     ("compare", "EXPERIMENT", "LEFT", "RIGHT", *_SHORT): 30,
@@ -146,7 +146,7 @@ def examined(
     draw = random.Random(seed)
     files = pair(draw, folder)
     tasks: list[Callable[[], str]] = []
-    chosen = draw.choices([*_COMMANDS], [*_COMMANDS.values()], k=readers)
+    chosen = draw.choices([*COMMANDS], [*COMMANDS.values()], k=readers)
     for words in chosen:
         typed = typed_words(draw, words, *files)
         tasks.append(lambda typed=typed: ended_badly(typed))

@@ -43,7 +43,7 @@ def run(seed: int, tries: int) -> Tally:
         tracemalloc.start()
         for _ in range(tries):
             source = draw.choice(sources)
-            change = draw.choice(_CHANGES if source.suffix == ".npz" else _CHANGES[:3])
+            change = draw.choice(CHANGES if source.suffix == ".npz" else CHANGES[:3])
             bad, exact = change(draw, good[source], trace)
             source.write_bytes(bad)
             tally.tried += 1
@@ -83,7 +83,7 @@ def _same(found: Trace, trace: Trace) -> bool:
     )
 
 
-def _flip(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]:
+def flip(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]:
     """Flip one bit, anywhere or near the end, where the lists of contents are."""
     bad = bytearray(good)
     far = len(bad) if draw.random() < 0.6 else min(len(bad), 6000)
@@ -165,8 +165,8 @@ def _packed(trace: Trace, facts: dict[str, Any], entries: dict[str, Any]) -> byt
     return out.getvalue()
 
 
-_CHANGES: list[Callable[[random.Random, bytes, Trace], tuple[bytes, bool]]] = [
-    _flip,
+CHANGES: list[Callable[[random.Random, bytes, Trace], tuple[bytes, bool]]] = [
+    flip,
     _scramble,
     _cut,
     _column,

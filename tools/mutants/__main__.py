@@ -54,7 +54,7 @@ def _end(running: subprocess.Popen[bytes], tree: Path) -> None:
                 os.kill(int(started.parent.name), signal.SIGKILL)
 
 
-def _tried(site: Site, tests: list[str], tree: Path) -> tuple[str, str]:
+def outcome_of(site: Site, tests: list[str], tree: Path) -> tuple[str, str]:
     """Return what became of a mutant, and the test that noticed it."""
     if not tests:
         return "not covered", ""
@@ -105,7 +105,7 @@ def _run(mutants: Sequence[Mutant]) -> list[Row]:
         mutant, site = found[number]
         if str(mutant) not in tried:
             tree = free.get()
-            outcome = _tried(site, chosen[number], tree) if site else ("gone", "")
+            outcome = outcome_of(site, chosen[number], tree) if site else ("gone", "")
             free.put(tree)
             tried[str(mutant)] = outcome
             with log.open("a", encoding="utf-8") as lines:

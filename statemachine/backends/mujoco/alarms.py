@@ -35,10 +35,10 @@ _BAD = re.compile(r"value in (\w+) at \w+ (\d+).*Time = ([-+.\deE]+\d)")
 
 Handler = Callable[[str], object]
 
-_TEXTS: deque[str] = deque(maxlen=256)
+RECENT_TEXTS: deque[str] = deque(maxlen=256)
 # A function in C: a Ctrl-C inside one in Python would have to cross MuJoCo, which ends
 # the process. So it is chained, in Python, only to the handler of somebody else.
-_KEEP = _TEXTS.append
+_KEEP = RECENT_TEXTS.append
 _LOCK = threading.RLock()  # a finalizer may run within
 _users = 0
 
@@ -180,7 +180,7 @@ class Alarms:
         # Where it is not reset, what is bad stays bad.
         bad = np.flatnonzero(~(np.abs(getattr(raw, quantity)) <= HUGE)).tolist()
         if trusted and (resets or steps > 1):
-            for text in reversed(list(_TEXTS)):
+            for text in reversed(list(RECENT_TEXTS)):
                 match = _BAD.search(text)
                 if not match or match[1].lower() != quantity:
                     continue

@@ -122,7 +122,7 @@ def _taken_over(model: MujocoModel) -> dict[str, Any]:
 class ServedModel(HiddenModel):
     """What an engine in a Python of its own makes of a file, with what was edited in it."""
 
-    _reading: EngineReading
+    reading: EngineReading
     _inner: MujocoModel
     _own: Capabilities | None
 
@@ -142,7 +142,7 @@ class ServedModel(HiddenModel):
             backend=reading.engine.name,
             engine_version=reading.version,
             capabilities=record,
-            _reading=reading,
+            reading=reading,
             _inner=inner,
             _own=capabilities,
             **_taken_over(inner),
@@ -151,7 +151,7 @@ class ServedModel(HiddenModel):
     @property
     def unshared(self) -> tuple[UnsharedElement, ...]:
         """Return what only this engine, or only the installed MuJoCo, reads in the file."""
-        return self._reading.unshared
+        return self.reading.unshared
 
     @property
     def compiled(self) -> mujoco.MjModel:
@@ -160,7 +160,7 @@ class ServedModel(HiddenModel):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> ServedModel:
         inner = self._inner.with_compiled(compiled)
-        return ServedModel(self._reading, self._own, inner)._inherit_start(self, {})
+        return ServedModel(self.reading, self._own, inner)._inherit_start(self, {})
 
     def _replace(self, options: dict[str, Any]) -> ServedModel:
-        return ServedModel(self._reading, self._own, self._inner._replace(options))
+        return ServedModel(self.reading, self._own, self._inner._replace(options))

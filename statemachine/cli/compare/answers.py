@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import EndedEarlyError
-from ..common import INTERRUPTED, TerminalReporter, complain, show
+from ..common import INTERRUPTED, TerminalReporter, print_error, show
 from .options import check_options
 from .requests import explain_request_of, request_of
 
@@ -71,7 +71,7 @@ def _stop_is_said() -> Iterator[None]:
     except KeyboardInterrupt as stop:
         if type(stop) is not KeyboardInterrupt:
             raise
-        raise SystemExit(complain("stopped before anything is known", INTERRUPTED)) from None
+        raise SystemExit(print_error("stopped before anything is known", INTERRUPTED)) from None
 
 
 def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
@@ -166,18 +166,18 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     if files.html is not None:
         try:
             made_by = page_command(request, asked, files.html)
-            whole = compare_report.whole_page(result, asked, made_by, reporter)
+            report_page = compare_report.whole_page(result, asked, made_by, reporter)
         except InterruptedExplanation as stop:
-            complain(f"stopped: {files.html} was not written", 0)
+            print_error(f"stopped: {files.html} was not written", 0)
             show(why.page(stop.result, options.details), stop.result, options.json)
             return INTERRUPTED
-        line = write_page(files.html, result.run.traces, ShownModels.of(request.run), whole)
+        line = write_page(files.html, result.run.traces, ShownModels.of(request.run), report_page)
         print(line, file=sys.stderr)
     if files.junit is not None:
         write_tests(files.junit, [result.comparison])
     if options.json:
-        for line in (*result.run.unmatched, *result.run.said):
-            complain(line, 0)
+        for line in (*result.run.unmatched, *result.run.notes):
+            print_error(line, 0)
     code = show(page, result.figures(), options.json)
     _write_pictures(files, result, renderer)
     return code

@@ -15,7 +15,7 @@ KIND = "statemachine predictions"
 
 
 def answers_in(file: Path) -> dict[str, dict[str, Any]]:
-    """The first answer to each question, by lesson and question.
+    """Return the first answer to each question, by "lesson: question".
 
     Raises:
         BadInputError: The file is no such record.
@@ -38,7 +38,7 @@ def answers_in(file: Path) -> dict[str, dict[str, Any]]:
 
 
 def score(file: Path) -> str:
-    """How many predictions were right, of how many."""
+    """Return how many predictions were right: "3 of 5"."""
     try:
         answers = answers_in(file).values()
     except BadInputError:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from .course_code import course_code
-from .likeness import NO_CODE, OwnCode, likeness, own_code
+from .likeness import NO_CODE, StudentCode, likeness, student_code
 from .submissions import Submission
 
 ALIKE = 0.95  # from this likeness on two submissions belong to one group
@@ -91,7 +91,7 @@ def compare_submissions(submitted: Sequence[Submission]) -> ClassLikeness:
     pairs: dict[tuple[str, str], float] = {}
     nearest: dict[str, Nearest] = {}
     for left, right in itertools.combinations(codes, 2):
-        share = likeness(codes[left].whole, codes[right].whole)
+        share = likeness(codes[left].all_shingles, codes[right].all_shingles)
         pairs[left, right] = share
         for one, other in ((left, right), (right, left)):
             if share > 0 and (one not in nearest or share > nearest[one].likeness):
@@ -109,7 +109,7 @@ def compare_submissions(submitted: Sequence[Submission]) -> ClassLikeness:
 
 
 def _group(
-    students: tuple[str, ...], codes: Sequence[OwnCode], shares: Sequence[float]
+    students: tuple[str, ...], codes: Sequence[StudentCode], shares: Sequence[float]
 ) -> AlikeGroup:
     """Return a group of submissions.
 
@@ -120,7 +120,7 @@ def _group(
     """
     size = min(code.size for code in codes)
     solution = course_code().solution
-    closest = max(likeness(code.whole, solution) for code in codes)
+    closest = max(likeness(code.all_shingles, solution) for code in codes)
     return AlikeGroup(
         students=students,
         least=min(shares),
@@ -131,19 +131,19 @@ def _group(
     )
 
 
-def _code_of(submission: Submission) -> OwnCode:
+def _code_of(submission: Submission) -> StudentCode:
     """Return the code of a submission, without what is handed out."""
     if submission.path is None:
         return NO_CODE
     files = [submission.path]
-    for name, file in submission.own.items():
+    for name, file in submission.files.items():
         if name.endswith(".py") and file != submission.path:
             files.append(file)
-    return own_code(files).without(course_code().handed_out)
+    return student_code(files).without(course_code().handed_out)
 
 
 def _groups_of(
-    names: Mapping[str, OwnCode], pairs: Mapping[tuple[str, str], float]
+    names: Mapping[str, StudentCode], pairs: Mapping[tuple[str, str], float]
 ) -> list[list[str]]:
     """Return groups in which each submission is alike to at least one other of its group."""
     group_of = {name: [name] for name in names}
@@ -169,13 +169,13 @@ def _near_pairs(
     With the members of a group, only the most alike pair counts.
     """
     first_of = {name: group[0] for group in groups for name in group}
-    told: set[frozenset[str]] = set()
+    listed: set[frozenset[str]] = set()
     near: list[tuple[str, str]] = []
     for left, right in sorted(pairs, key=lambda pair: -pairs[pair]):
         between = frozenset((first_of.get(left, left), first_of.get(right, right)))
         if pairs[left, right] < NEARLY_ALIKE:
             break
-        if len(between) == 2 and between not in told:
-            told.add(between)
+        if len(between) == 2 and between not in listed:
+            listed.add(between)
             near.append((left, right))
     return near

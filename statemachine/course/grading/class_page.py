@@ -66,7 +66,7 @@ class ClassPage(PageContent):
 
     @property
     def size(self) -> str:
-        """How many students or files count."""
+        """Return the number of students or files that count: "12 students"."""
         counted = self.result.counted
         return count(len(counted), "student" if counted[0].student else "file")
 
@@ -77,17 +77,17 @@ class ClassPage(PageContent):
 
     @property
     def solved(self) -> int:
-        """How many have all functions right."""
+        """Return the number of submissions whose functions are all right."""
         return sum(entry.solved for entry in self.result.counted)
 
     @property
     def is_watched(self) -> bool:
-        """Whether what some code reads is only watched, not prevented."""
+        """Tell whether the reads of some student's code are only watched, not prevented."""
         return any(entry.watched for entry in self.result.entries)
 
     @property
     def looks(self) -> list[_Look]:
-        """What somebody should look at."""
+        """Return what a teacher should look at, with the submission that it is in."""
         looks: list[_Look] = []
         for entry in self.result.entries:
             looks += [_Look(entry.label, text) for text in entry.looks]
@@ -105,18 +105,18 @@ class ClassPage(PageContent):
 
     @property
     def has_likeness(self) -> bool:
-        """Whether any two submissions are alike, or nearly."""
+        """Tell whether any two submissions are alike, or nearly."""
         return bool(self.result.alike) or bool(self.result.nearly_alike)
 
     @property
     def strangers_size(self) -> str:
-        """How many files are of nobody on the roster; "" for none."""
+        """Return the number of files of nobody on the roster, "2 files"; "" where there is none."""
         number = len(self.result.strangers)
         return count(number, "file") if number else ""
 
     @property
     def strangers_heading(self) -> str:
-        """What stands above them."""
+        """Return the heading above these files."""
         return f"Not on the roster ({self.strangers_size})"
 
 
@@ -132,7 +132,7 @@ class _Group:
 
     @property
     def percent(self) -> str:
-        """How much they are alike, rounded down so that 100 % is the same code."""
+        """Return how much they are alike, rounded down so that 100 % is the same code."""
         least, most = _percent(self.group.least), _percent(self.group.most)
         return most if least == most else f"{least.removesuffix('%')} to {most}"
 

@@ -57,30 +57,30 @@ class ClassEntry:
     @property
     @only_on_pages
     def label(self) -> str:
-        """Who handed it in; without a roster, what it is called."""
+        """Return the student who handed it in; without a roster, the name of the submission."""
         return self.student if self.student else self.name
 
     @property
     def right(self) -> int:
-        """How many functions do what they should."""
+        """Return the number of functions that do what they should."""
         return sum(judgement.passed for judgement in self.functions)
 
     @property
     @only_on_pages
     def alike(self) -> str:
-        """How much it is like another submission, and which; "" where it is like none."""
+        """Return the likeness to the nearest submission, and its name; "" where it is like none."""
         return f"{math.floor(100 * self.likeness)}% {self.nearest}" if self.nearest else ""
 
     @property
     def judged(self) -> bool:
-        """Whether there is a verdict on each function, or nothing to judge."""
+        """Tell whether there is a verdict on each function, or nothing to judge."""
         complete = bool(self.functions) and all(judgement.judged for judgement in self.functions)
         return complete or self.refusal == NOTHING
 
     @property
     @only_on_pages
     def partly_judged(self) -> bool:
-        """Whether there is a verdict on some function, and none on another."""
+        """Tell whether there is a verdict on some function, and none on another."""
         verdicts = {judgement.judged for judgement in self.functions}
         return len(verdicts) > 1
 
@@ -98,24 +98,24 @@ class ClassEntry:
     @property
     @only_on_pages
     def solved(self) -> bool:
-        """Whether all functions of the exercise do what they should."""
+        """Tell whether all functions of the exercise do what they should."""
         return self.right == len(JUDGES)
 
     @property
     def watched(self) -> bool:
-        """Whether it was judged where what a student's code reads is only watched."""
+        """Tell whether it was judged where the reads of a student's code are only watched."""
         return self.made_with.endswith(WATCHED)
 
     @property
     def looks(self) -> tuple[str, ...]:
-        """What somebody should look at, each once."""
+        """Return what a teacher should look at, each once."""
         remarks = (text for judgement in self.functions for text in judgement.remarks)
         return tuple(dict.fromkeys(text for text in remarks if text.startswith(LOOK)))
 
     @property
     @only_on_pages
     def remarks(self) -> tuple[FunctionRemark, ...]:
-        """What is not right, a remark for each function; of the whole file, only one."""
+        """Return what is not right, a remark for each function; of the whole file, only one."""
         if self.refusal:
             return (FunctionRemark("", self.refusal),)
         remarks: list[FunctionRemark] = []
@@ -149,7 +149,7 @@ class FunctionRemark:
 
     @property
     def line(self) -> str:
-        """The remark, after the short name of the function."""
+        """Return the remark, after the short name of the function."""
         name = self.function.removeprefix("demo_")
         return f"{name}: {self.text}" if name else self.text
 

@@ -67,12 +67,12 @@ def judge_all(
         room = _ClassRoom(judge, VerdictStore(judged_before.folder(), made_with), tests)
         work: dict[str, Callable[[], ClassEntry]] = {}
         for submission in submitted:
-            content = digest(submission.own)
+            content = digest(submission.files)
             entry = ClassEntry(submission.name, content, (), submission.refusal, made_with)
             known = before.get((content, made_with), entry)
             if known.judged:
                 entry = known
-            entry = room.taken_over(_with_facts(entry, submission, comparison))
+            entry = room.with_stored_verdicts(_with_facts(entry, submission, comparison))
             if room.is_complete(submission, entry):
                 entries[submission.name] = entry
             else:
@@ -137,7 +137,7 @@ class _ClassRoom:
     store: VerdictStore
     tests: bool
 
-    def taken_over(self, entry: ClassEntry) -> ClassEntry:
+    def with_stored_verdicts(self, entry: ClassEntry) -> ClassEntry:
         """Return an entry with what was found out about the same content before."""
         known = self.store.find(entry.sha256)
         if not entry.judged and known.functions:
@@ -155,13 +155,13 @@ class _ClassRoom:
         """Return the entry with what is not known yet, and keep that."""
         if submission.path is not None and not entry.judged:
             try:
-                grade = self.judge.judge(submission.path, own=submission.own)
+                grade = self.judge.judge(submission.path, submitted_files=submission.files)
                 entry = replace(entry, functions=grade.functions)
             except BadInputError as error:
                 entry = replace(entry, refusal=str(error))
         file = self._tests_to_run(submission, entry)
         if file is not None:
-            entry = replace(entry, tests=_caught(file, self.judge.backend, submission.own))
+            entry = replace(entry, tests=_caught(file, self.judge.backend, submission.files))
         if entry.judged and not entry.looks and not entry.refusal:
             tests = entry.tests if _COUNTED.match(entry.tests) else ""
             self.store.keep(entry.sha256, KnownVerdicts(entry.functions, tests))
@@ -174,10 +174,10 @@ class _ClassRoom:
         return submission.named(EXERCISE_FILES[1])
 
 
-def _caught(file: Path, backend: str, own: Mapping[str, Path]) -> str:
+def _caught(file: Path, backend: str, submitted_files: Mapping[str, Path]) -> str:
     """Return how many faults a student's tests catch, and which they do not."""
     try:
-        examination = examine(file, backend, own=own)
+        examination = examine(file, backend, submitted_files=submitted_files)
     except StateMachineError as error:
         return str(error)
     if examination.failures:

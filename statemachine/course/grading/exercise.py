@@ -88,17 +88,17 @@ class Grade:
     @property
     @only_on_pages
     def unwritten(self) -> int:
-        """How many functions are not written yet."""
+        """Return the number of functions that are not written yet."""
         return sum(not judgement.written for judgement in self.functions)
 
     @property
     def right(self) -> int:
-        """How many functions do what they should."""
+        """Return the number of functions that do what they should."""
         return sum(judgement.passed for judgement in self.functions)
 
     @property
     def passed(self) -> bool:
-        """Whether all functions do what they should."""
+        """Tell whether all functions do what they should."""
         return self.right == len(self.functions)
 
 
@@ -188,24 +188,24 @@ class ExerciseJudge(ExitStack):
         self,
         file: AnyPath,
         progress: Progress = no_progress,
-        own: Mapping[str, Path] | None = None,
+        submitted_files: Mapping[str, Path] | None = None,
     ) -> Grade:
         """Judge each function of a student's file.
 
         Args:
             file: A Python file; nothing of it runs in this process.
             progress: Told the fraction that is done.
-            own: All files that belong to it, by their names in its folder; without, what it
-                names beside it.
+            submitted_files: All files that belong to it, by their names in its folder; without,
+                what it names beside it.
 
         Raises:
             BadInputError: There is no such file, it is not a Python file, or a link to one.
         """
-        if own is None and Path(file).is_symlink():
+        if submitted_files is None and Path(file).is_symlink():
             raise BadInputError(refusal_of(Path(file), Path(file).name))
-        path = _python_file(Path(file))
+        path = python_file(Path(file))
         folder = Path(tempfile.mkdtemp(dir=self._folder))
-        files = own if own else named_by(path)
+        files = submitted_files if submitted_files else named_by(path)
         copy = _copied(path, files, folder / "own")
         judgements = self._judge_functions(copy, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
@@ -321,7 +321,7 @@ def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Ju
     return Judgement(name, True, False, (text,), judged=is_judged)
 
 
-def _python_file(path: Path) -> Path:
+def python_file(path: Path) -> Path:
     try:
         path = path.expanduser().resolve()
         kind = kind_of_path(path)
@@ -373,13 +373,15 @@ class _Copy:
             beside = path.is_relative_to(self.folder)
             file = self.before / path.relative_to(self.folder) if beside else path
             if file.exists():
-                here = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
-                others[here.as_posix()] = beside or has_solutions(file)
+                shown_path = (
+                    file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
+                )
+                others[shown_path.as_posix()] = beside or has_solutions(file)
         return others
 
 
-def _copied(path: Path, own: Mapping[str, Path], folder: Path) -> _Copy:
+def _copied(path: Path, submitted_files: Mapping[str, Path], folder: Path) -> _Copy:
     folder.mkdir()
     folder = folder.resolve()
-    copy = copied_to(folder, path, own)
+    copy = copied_to(folder, path, submitted_files)
     return _Copy(copy, folder, path.parents[len(copy.relative_to(folder).parts) - 1])

@@ -35,7 +35,7 @@ T = TypeVar("T")
 _VARIABLE = "STATEMACHINE_JUDGED"
 _KIND = "statemachine verdicts 1"
 _OLD = 120 * 24 * 3600.0  # [s] since it was written: then it is removed
-_PACKAGE = Path(__file__).resolve().parents[2]
+PACKAGE = Path(__file__).resolve().parents[2]
 _SUFFIXES = (".py", ".xml", ".json", ".so", ".pyd")
 
 
@@ -136,7 +136,7 @@ def software_digest() -> str:
     """Return a digest of what decides a verdict beside the engine: this package, Python, NumPy."""
     sha = hashlib.sha256()
     sha.update(f"{sys.version} {np.__version__} {platform.platform()}".encode())
-    for root in (_PACKAGE, models_dir()):
+    for root in (PACKAGE, models_dir()):
         for file in sorted(_software(root)):
             content = file.read_bytes()
             name = file.relative_to(root).as_posix()

@@ -34,7 +34,7 @@ _Definition = ast.FunctionDef | ast.ClassDef | ast.Assign | ast.AnnAssign
 
 
 @dataclass(frozen=True)
-class OwnCode:
+class StudentCode:
     """What a student wrote: the functions that are judged, and what they use of the same files.
 
     Attributes:
@@ -44,21 +44,23 @@ class OwnCode:
     shingles: Mapping[str, frozenset[str]]
 
     @cached_property
-    def whole(self) -> frozenset[str]:
+    def all_shingles(self) -> frozenset[str]:
         """Digests of all shingles."""
         return frozenset().union(*self.shingles.values())
 
     @property
     def size(self) -> int:
         """Number of different shingles: about one for each token."""
-        return len(self.whole)
+        return len(self.all_shingles)
 
-    def without(self, other: frozenset[str]) -> OwnCode:
+    def without(self, other: frozenset[str]) -> StudentCode:
         """Return the code without shingles that others have, too."""
-        return OwnCode({name: some - other for name, some in self.shingles.items() if some - other})
+        return StudentCode(
+            {name: some - other for name, some in self.shingles.items() if some - other}
+        )
 
 
-NO_CODE = OwnCode({})
+NO_CODE = StudentCode({})
 
 
 def likeness(left: frozenset[str], right: frozenset[str]) -> float:
@@ -67,7 +69,7 @@ def likeness(left: frozenset[str], right: frozenset[str]) -> float:
     return 2 * len(left & right) / total if total else 0.0
 
 
-def own_code(files: Sequence[Path]) -> OwnCode:
+def student_code(files: Sequence[Path]) -> StudentCode:
     """Return what the functions that are judged consist of.
 
     A function that is still to be written (it raises NotImplementedError) is left out.
@@ -78,8 +80,8 @@ def own_code(files: Sequence[Path]) -> OwnCode:
     return code_of_trees([_tree(file) for file in files])
 
 
-def code_of_trees(trees: Sequence[ast.Module]) -> OwnCode:
-    """Return the same as `own_code` of the syntax trees of files."""
+def code_of_trees(trees: Sequence[ast.Module]) -> StudentCode:
+    """Return the same as `student_code` of the syntax trees of files."""
     definitions: dict[str, tuple[_Definition, _Names]] = {}
     for tree in trees:
         names = _Names.of(tree)
@@ -93,7 +95,7 @@ def code_of_trees(trees: Sequence[ast.Module]) -> OwnCode:
                 digests |= _shingles(*definitions[name])
             if digests:
                 shingles[judged] = frozenset(digests)
-    return OwnCode(shingles)
+    return StudentCode(shingles)
 
 
 def shingles_of_file(file: Path) -> frozenset[str]:
@@ -158,11 +160,11 @@ class _Names:
 
     Attributes:
         modules: What an imported name is, with its module.
-        own: Names that the file gives to variables, arguments and functions.
+        defined: Names that the file gives to variables, arguments and functions.
     """
 
     modules: Mapping[str, str]
-    own: frozenset[str]
+    defined: frozenset[str]
 
     @classmethod
     def of(cls, tree: ast.Module) -> _Names:
@@ -185,7 +187,7 @@ class _Names:
 
     def token(self, name: str) -> str:
         """Return what stands for a name."""
-        if name in self.own:
+        if name in self.defined:
             return _NAME + name
         return self.modules.get(name, name)
 

@@ -113,7 +113,7 @@ class ClassResult:
 
     @property
     def complete(self) -> bool:
-        """Whether every submission could be judged."""
+        """Tell whether every submission could be judged."""
         return all(entry.judged for entry in self.entries)
 
 
@@ -186,10 +186,10 @@ def _mistakes(entries: Sequence[ClassEntry]) -> tuple[Mistake, ...]:
 def _merged(mistakes: Sequence[Mistake]) -> list[Mistake]:
     """Return mistakes, those as one that the same students made in the same functions."""
     merged: dict[tuple[tuple[str, ...], frozenset[str]], Mistake] = {}
-    alone: list[Mistake] = []
+    rare: list[Mistake] = []
     for mistake in mistakes:
         if mistake.count < COMMON:
-            alone.append(mistake)
+            rare.append(mistake)
             continue
         key = (mistake.functions, frozenset(mistake.students))
         if key in merged:
@@ -197,7 +197,7 @@ def _merged(mistakes: Sequence[Mistake]) -> list[Mistake]:
             merged[key] = replace(first, others=(*first.others, mistake.remark))
         else:
             merged[key] = mistake
-    return [*merged.values(), *alone]
+    return [*merged.values(), *rare]
 
 
 def _wrong_remarks(entry: ClassEntry) -> Iterator[tuple[str, str]]:

@@ -29,7 +29,7 @@ _MEMORY_MOST = 2 * sandbox.GB
 _RECORD_MOST = 40_000_000  # bytes
 _TEXT_MOST = 2000  # characters
 _PACKAGES = Path(__file__).resolve().parents[3]
-_CHILD = (
+CHILD_PROGRAM = (
     "import sys; sys.path.insert(0, sys.argv[2]); "
     "from statemachine.course.grading.inside.child import main; main(sys.argv[1])"
 )
@@ -80,7 +80,7 @@ class FunctionRecording:
 
 def record(
     path: Path,
-    own: Path,
+    student_folder: Path,
     name: str,
     backend: str,
     limits: TimeLimits,
@@ -91,7 +91,7 @@ def record(
 
     Args:
         path: The file.
-        own: The folder of all files that belong to it.
+        student_folder: The folder of all files that belong to it.
         name: Of the function.
         backend: Of the backend.
         limits: What it may take.
@@ -104,7 +104,7 @@ def record(
     job = folder / "job"
     facts = {
         "file": str(path),
-        "own": str(own),
+        "student_folder": str(student_folder),
         "function": name,
         "backend": backend,
         "cpu": limits.cpu,
@@ -114,7 +114,7 @@ def record(
         "alone": not sandbox.shut_in(),
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
-    command = [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)]
+    command = [sys.executable, "-P", "-c", CHILD_PROGRAM, str(job), str(_PACKAGES)]
 
     def has_begun() -> bool:
         return bool(content(answers, 1))
@@ -126,7 +126,7 @@ def record(
         cwd=scratch,
         env=environment(backend),
         writable=folder,
-        view=view_of(backend, [own]),
+        view=view_of(backend, [student_folder]),
         stop=stop,
     )
     recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
@@ -147,11 +147,11 @@ def environment(backend: str) -> dict[str, str]:
     Where it is shut in, it is told of no folder that it is not shown.
     """
     names = _KEPT if sandbox.shut_in() else (*_KEPT, "PATH", "PYTHONPATH")
-    kept = {name: os.environ[name] for name in names if name in os.environ}
+    variables = {name: os.environ[name] for name in names if name in os.environ}
     if sandbox.shut_in():
-        kept["PATH"] = os.defpath
-        kept["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
-    return {**kept, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+        variables["PATH"] = os.defpath
+        variables["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
+    return {**variables, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
@@ -227,14 +227,14 @@ def in_folder(folder: Path) -> dict[str, Path]:
 
     A link that leads out of the folder is no part of it.
     """
-    found = {}
+    files = {}
     for file in sorted(_walked(folder)):
         outside = file.is_symlink() and leads_out(file, folder)
         if not outside and file.is_file() and file.stat().st_size <= LARGEST:
-            found[file.relative_to(folder).as_posix()] = file
-            if len(found) == _MOST:
+            files[file.relative_to(folder).as_posix()] = file
+            if len(files) == _MOST:
                 break
-    return found
+    return files
 
 
 def refused_links(folder: Path) -> str:
@@ -258,18 +258,18 @@ def _walked(folder: Path, folders_too: bool = False) -> Iterator[Path]:
             yield Path(place, name)
 
 
-def named_by(file: Path, somebody_elses: Callable[[Path], bool] | None = None) -> dict[str, Path]:
+def named_by(file: Path, is_excluded: Callable[[Path], bool] | None = None) -> dict[str, Path]:
     """Return a file and what it names beside it, but for what is somebody else's.
 
     Args:
         file: The student's.
-        somebody_elses: Tells that; without, a file is that holds functions of the exercise.
+        is_excluded: Tells that; without, a file is that holds functions of the exercise.
 
     Raises:
         BadInputError: It names a link that leads out of the folder.
     """
-    is_others = somebody_elses or has_solutions
-    own, waiting = {file.name: file}, [file]
+    is_others = is_excluded or has_solutions
+    named_files, waiting = {file.name: file}, [file]
     beside = [entry for entry in file.parent.iterdir() if not entry.name.startswith(".")]
     while waiting:
         words = set(re.findall(r"\w+", start_of(waiting.pop()).decode("utf-8", "replace")))
@@ -285,29 +285,31 @@ def named_by(file: Path, somebody_elses: Callable[[Path], bool] | None = None) -
             files = {f"{entry.name}/{name}": inside for name, inside in package.items()}
             for name, other in (files or {entry.name: entry}).items():
                 fits = other.is_file() and other.stat().st_size <= LARGEST
-                if name not in own and fits and not is_others(other):
-                    own[name] = other
+                if name not in named_files and fits and not is_others(other):
+                    named_files[name] = other
                     waiting.append(other)
-    return own
+    return named_files
 
 
-def copied_to(folder: Path, file: Path, own: Mapping[str, Path]) -> Path:
+def copied_to(folder: Path, file: Path, submitted_files: Mapping[str, Path]) -> Path:
     """Copy a student's file and what belongs to it into a folder; return the copy of the file.
 
     Args:
         folder: A new one.
         file: The student's.
-        own: All files that belong to it, by their names in the folder.
+        submitted_files: All files that belong to it, by their names in the folder.
     """
     real = file.resolve()
-    names = [name for name, each in own.items() if each.resolve() == real]
+    names = [name for name, each in submitted_files.items() if each.resolve() == real]
     if not names:  # a hidden file, or one of very many
-        names, own = [file.name], {file.name: file}
-    for name, each in own.items():
+        names, submitted_files = [file.name], {file.name: file}
+    for name, each in submitted_files.items():
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(start_of(each))
-    return folder / min(names, key=lambda name: own[name].is_symlink())  # not a link to it
+    return folder / min(
+        names, key=lambda name: submitted_files[name].is_symlink()
+    )  # not a link to it
 
 
 def digest(files: Mapping[str, Path]) -> str:

@@ -149,7 +149,7 @@ def _note_judged_again(submitted: Sequence[Submission], table: Path, reporter: R
     """Note how many files the table has no verdict on: they are judged again, and may be slow."""
     if not table.exists():
         return
-    contents = {digest(each.own) for each in submitted if each.path is not None}
+    contents = {digest(each.files) for each in submitted if each.path is not None}
     again = 0
     for (content, _), entry in read(table).items():
         if content in contents and not entry.judged:

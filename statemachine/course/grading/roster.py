@@ -45,12 +45,12 @@ class _Student:
 
     @property
     def name(self) -> str:
-        """What the student is called."""
+        """Return the student's full name."""
         return " ".join(self.names)
 
     @property
     def cells(self) -> Sequence[str]:
-        """All cells, names first."""
+        """Return all cells of the student's line, names first."""
         return [*self.names, *self.others]
 
 
@@ -74,21 +74,21 @@ def enrolled(
     rows = _rows_of(roster)
     students = list(_students(rows))
     left = list(submitted)
-    theirs: dict[int, list[Submission]] = {}
+    by_student: dict[int, list[Submission]] = {}
     # Whoever is named in full comes first: one of two who share a surname may have handed in
     # nothing, and the file is the other's.
     for matches in (_is_exact, _is_named_in_full, _has_part_of_name):
         for number, student in enumerate(students):
-            if number not in theirs:
-                found = [each for each in left if matches(student, each)]
-                if found:
-                    theirs[number] = found
-                if len(found) == 1:
-                    left.remove(found[0])
+            if number not in by_student:
+                candidates = [each for each in left if matches(student, each)]
+                if candidates:
+                    by_student[number] = candidates
+                if len(candidates) == 1:
+                    left.remove(candidates[0])
     of_students: list[Submission] = []
     for number, student in enumerate(students):
-        of_students.append(_submission_of(student, theirs.get(number, [])))
-    is_silent = bool(students) and bool(theirs) and 0 not in theirs
+        of_students.append(_submission_of(student, by_student.get(number, [])))
+    is_silent = bool(students) and bool(by_student) and 0 not in by_student
     if is_silent and not _is_header(rows[0]) and not re.search(r"\d", students[0].name):
         reporter.note(
             f"the first row of {roster.name} ({', '.join(students[0].cells)}) is taken for a "
@@ -151,14 +151,14 @@ def _is_like_a_name(cell: str) -> bool:
     return cell[0].isupper() and _WORDS.fullmatch(cell) is not None
 
 
-def _submission_of(student: _Student, theirs: Sequence[Submission]) -> Submission:
+def _submission_of(student: _Student, submissions: Sequence[Submission]) -> Submission:
     """Return what a student handed in; a row with the reason where that is not one submission."""
-    if len(theirs) == 1:
-        return replace(theirs[0], student=student.name)
+    if len(submissions) == 1:
+        return replace(submissions[0], student=student.name)
     refusal = NOTHING
-    if theirs:
-        names = ", ".join(submission.name for submission in theirs)
-        refusal = f"{len(theirs)} may be theirs: {names}"
+    if submissions:
+        names = ", ".join(submission.name for submission in submissions)
+        refusal = f"{len(submissions)} may be theirs: {names}"
     return Submission(student.name, None, refusal, student=student.name)
 
 

@@ -51,14 +51,14 @@ def modules_of(backend: str) -> tuple[str, ...]:
     return (*names, *_FOR_TESTS)
 
 
-def view_of(backend: str, own: Iterable[Path], faults: bool = False) -> View:
+def view_of(backend: str, student_folders: Iterable[Path], faults: bool = False) -> View:
     """Return what a student's process on a backend is shown.
 
     Args:
         backend: On which it runs.
-        own: Folders of what the student handed in, and of nobody else's.
+        student_folders: Folders of what the student handed in, and of nobody else's.
         faults: Whether it runs tests on arms with faults, and so needs what makes these.
     """
     more = [_PACKAGE / "course" / "grading" / _FAULTS] if faults else []
     machine = _of_machine(backend, os.environ.get("PYTHONPATH"))
-    return machine.with_more([*own, *more])
+    return machine.with_more([*student_folders, *more])

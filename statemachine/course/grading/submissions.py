@@ -36,11 +36,11 @@ class Submission:
 
     @property
     def label(self) -> str:
-        """Who handed it in; without a roster, what it is called."""
+        """Return the student who handed it in; without a roster, the name of the submission."""
         return self.student if self.student else self.name
 
     @property
-    def own(self) -> dict[str, Path]:
+    def files(self) -> dict[str, Path]:
         """Files that belong to it, by their names in its folder; alone in that of a class."""
         if self.folder:
             return in_folder(self.folder)
@@ -48,7 +48,7 @@ class Submission:
 
     def named(self, name: str) -> Path | None:
         """Return the first of its files that is called so."""
-        return next((file for file in self.own.values() if file.name == name), None)
+        return next((file for file in self.files.values() if file.name == name), None)
 
 
 def submissions(paths: Sequence[AnyPath]) -> list[Submission]:

@@ -10,7 +10,7 @@ import numpy as np
 from ...installed import require
 from ..description.file_form import NotWrittenError
 from ..records import Edit, ElementReference, SpecEdit
-from . import _fields as fields
+from . import compared_fields as fields
 
 # Attributes of a description that say what an actuator drives.
 _DRIVES = ("trntype", "target", "slidersite", "refsite")

@@ -13,7 +13,7 @@ from ..description.file_form import NotWrittenError
 from ..description.file_numbers import beginning_text, degrees_of, number_text, numbers_text, tidied
 from ..description.xml_source import AttributeText, XmlElement
 from ..records import ElementReference
-from . import _fields as fields
+from . import compared_fields as fields
 from ._file_target import FileTarget
 from ._orientation import CompilerSettings, orientation_texts
 from ._quantities import word_in

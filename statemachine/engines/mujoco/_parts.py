@@ -23,10 +23,10 @@ from ..records import (
     ModelDifference,
     SpecEdit,
 )
-from ._fields import word_of
 from ._quantities import plain, same
 from ._rigid_parts import apart, quat_of
 from ._sides import NEAR, Sides, copies, name_of, zeros
+from .compared_fields import word_of
 from .respecified import SIMPLE
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...installed import require
 from ..records import DifferingQuantity
-from . import _fields as fields
+from . import compared_fields as fields
 
 _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
 

@@ -12,7 +12,7 @@ from ...installed import require
 from ...rotations import Placement
 from ..description.shapes import one_to_one
 from ..records import TURNED, BodyPair, Counterparts, DifferingQuantity, Edit, ModelDifference
-from . import _fields as fields
+from . import compared_fields as fields
 from ._quantities import differing, plain
 from ._rigid_parts import Solids, apart, placed, quat_of
 

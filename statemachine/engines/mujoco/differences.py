@@ -1,9 +1,9 @@
 """All that two compiled models differ in and that can change a motion; and how to undo it.
 
-What is compared is in the tables of `_fields`. Frames, inertias and shapes are compared in the
-frame of the rigid part that they belong to: so fixed bodies, other frames of one solid, or an
-inertia given by other axes are no difference. Each difference comes with the edits that bring the
-second model to the first, in the second one's own terms.
+What is compared is in the tables of `compared_fields`. Frames, inertias and shapes are compared
+in the frame of the rigid part that they belong to: so fixed bodies, other frames of one solid, or
+an inertia given by other axes are no difference. Each difference comes with the edits that bring
+the second model to the first, in the second one's own terms.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from ...installed import require
 from ...measures.text import grouped
 from ..records import Counterparts, DifferingQuantity, Edit, ModelDifference, QuantityValue
-from . import _fields as fields
+from . import compared_fields as fields
 from ._drives import drives
 from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
 from ._flexes import flexes

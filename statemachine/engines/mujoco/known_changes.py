@@ -47,7 +47,7 @@ def known_changes(
     concerned = list(_concerned(left, right, runs))
     if not concerned:
         return []
-    measured = _measured(left.backend), _measured(right.backend)
+    measured = probe_results(left.backend), probe_results(right.backend)
     changes: list[KnownChange] = []
     for name, probe, elements in concerned:
         before, after = measured[0].get(probe), measured[1].get(probe)
@@ -57,7 +57,7 @@ def known_changes(
 
 
 @functools.cache
-def _measured(backend: str) -> dict[str, float | None]:
+def probe_results(backend: str) -> dict[str, float | None]:
     """Return what each probe measures on a release.
 
     Raises:

@@ -16,7 +16,7 @@ from ..description.file_form import FileForm, NotWrittenError
 from ..description.file_numbers import number_text, numbers_text
 from ..description.xml_source import AttributeText, XmlElement, XmlSource
 from ..records import Edit, SpecEdit
-from . import _fields as fields
+from . import compared_fields as fields
 from ._file_target import FileTarget
 from ._mjcf_elements import MjcfElements
 from ._mjcf_weights import MjcfWeights

@@ -17,7 +17,7 @@ from ...backends.compiled.model import ENGINE_ERRORS, compiler_warnings, read_sp
 from ...errors import ModelError
 from ...interface import Array
 from ..records import Edit, ElementReference, SpecEdit
-from . import _fields as fields
+from . import compared_fields as fields
 
 ACTIVATIONS = "activations"
 SIMPLE = "simple"  # of a body: whether its mass matrix may be stored as a diagonal

@@ -20,7 +20,7 @@ from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries,
 
 # How many arguments come before `physicsClientId` where it is given by its place, which the
 # engine's functions do not tell. It is the last one in all of these.
-_BEFORE_CLIENT = {
+ARGUMENTS_BEFORE_CLIENT = {
     "applyExternalForce": 5,
     "applyExternalTorque": 4,
     "calculateInverseDynamics": 5,
@@ -228,7 +228,7 @@ def client_of(function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> 
     """Return the number of the world that a call is about; None where that cannot be told."""
     if "physicsClientId" in kwargs:
         return int(kwargs["physicsClientId"])
-    place = _BEFORE_CLIENT.get(function)
+    place = ARGUMENTS_BEFORE_CLIENT.get(function)
     if place is None:
         return None if args else 0
     return int(args[place]) if len(args) > place else 0  # the engine's own default

@@ -87,8 +87,8 @@ class PybulletDials(Dials):
         joint = values["damping"] if dials.get("damping") == "model" else np.zeros(raw.nv)
         acts: dict[str, Act] = {
             "inertia": partial(_set_inertias, inertias=raw.body_inertia),
-            "damping": partial(_set_damping, body=0.0, joint=joint),
-            "limits": partial(_set_limits, ranges=None),
+            "damping": partial(set_damping, body=0.0, joint=joint),
+            "limits": partial(set_limits, ranges=None),
             "surfaces": partial(
                 _set_surfaces, surfaces=cast("PybulletModel", self.emulated).plan.surfaces
             ),
@@ -96,13 +96,13 @@ class PybulletDials(Dials):
         }
         if plan:
             del acts["inertia"]
-        return _with_settings(model, [act for name, act in acts.items() if name in dials], plan)
+        return with_settings(model, [act for name, act in acts.items() if name in dials], plan)
 
     def _with_law(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         own, fresh = cast("PybulletModel", self.emulated), self.model.compiled
         ways: dict[str, Act] = {
-            "damping": partial(_set_damping, body=BODY_DAMPING, joint=fresh.dof_damping),
-            "limits": partial(_set_limits, ranges=_ranges(self.model)),
+            "damping": partial(set_damping, body=BODY_DAMPING, joint=fresh.dof_damping),
+            "limits": partial(set_limits, ranges=joint_ranges(self.model)),
             "surfaces": partial(_fresh_surfaces, plan=own.plan, whole=self._whole),
             "self-collision": partial(_no_self_collision, plan=own.plan, whole=self._whole),
         }
@@ -124,7 +124,7 @@ class PybulletDials(Dials):
         if "equality" not in dials and self._whole and raw.neq:
             raw = copy.copy(raw)
             raw.eq_active0[:] = False
-        return _with_settings(model, acts, Plan(raw) if raw is not model.compiled else None)
+        return with_settings(model, acts, Plan(raw) if raw is not model.compiled else None)
 
     def _weighed_by_the_engine(self, compiled: Any) -> Any:
         """Make a compiled model whose bodies weigh what the engine gives them of its own."""
@@ -160,7 +160,7 @@ class PybulletDials(Dials):
         return np.array(frictions)
 
 
-def _with_settings(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
+def with_settings(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
     """Return a Model whose worlds are given some settings; what `forward` computes knows nothing
     of it.
     """
@@ -183,7 +183,7 @@ def _has(model: Model, name: str, value: Any) -> bool:
     return known is not None and np.array_equal(known, value)
 
 
-def _ranges(model: Model) -> dict[int, tuple[float, float]]:
+def joint_ranges(model: Model) -> dict[int, tuple[float, float]]:
     """Return the range of each joint that has one, by degree of freedom."""
     return {
         int(model.jnt_dofadr[j]): (float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1]))
@@ -196,7 +196,7 @@ def _set_inertias(world: World, inertias: np.ndarray) -> None:
         world.change(body, link, localInertiaDiagonal=inertias[b].tolist())
 
 
-def _set_damping(world: World, body: float, joint: np.ndarray) -> None:
+def set_damping(world: World, body: float, joint: np.ndarray) -> None:
     for tree in world.trees:
         world.change_all(tree.body, linearDamping=body, angularDamping=body)
     for tree_body, index, dof in world.joints():
@@ -204,7 +204,7 @@ def _set_damping(world: World, body: float, joint: np.ndarray) -> None:
         world.change(tree_body, index, jointDamping=float(joint[dof]))
 
 
-def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) -> None:
+def set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) -> None:
     """Set the engine's own limits of position and of speed; without ranges, none."""
     for body, index, dof in world.joints():
         low, high = (ranges or {}).get(dof, (-_WIDE, _WIDE))
@@ -221,7 +221,7 @@ def _set_surfaces(world: World, surfaces: Surfaces) -> None:
     world.set_friction(surfaces.slide, surfaces.spin, surfaces.roll)
 
 
-def _harden(world: World) -> None:
+def harden(world: World) -> None:
     """Give contacts the parameters of a fresh world: they do not yield."""
     pb.setPhysicsEngineParameter(
         globalCFM=0.0, contactERP=CONTACT_ERP, physicsClientId=world.client
@@ -230,7 +230,7 @@ def _harden(world: World) -> None:
 
 def _fresh_surfaces(world: World, plan: Plan, whole: bool) -> None:
     """Set the friction and hardness of what was loaded, and let all meet that are two robots."""
-    _harden(world)
+    harden(world)
     solids = list(world.solids())
     none = np.zeros(len(solids))
     world.set_friction(none + FRICTION, none, none)

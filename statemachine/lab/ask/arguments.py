@@ -75,7 +75,7 @@ class RunArguments:
 
     @property
     def pairs_of_names(self) -> Mapping[str, str]:
-        """Names of the left by those of the right, where any are given."""
+        """Return the names of the left by those of the right; empty where none were named."""
         return {} if self.names is None else self.names
 
     def request(self) -> Request:
@@ -267,6 +267,6 @@ def check_alone(function: Callable[..., object], arguments: Mapping[str, object]
     parameters = list(inspect.signature(function).parameters.values())
     request = type(arguments[parameters[0].name]).__name__
     for parameter in parameters[1:]:
-        given = arguments[parameter.name]
-        if parameter.name != "reporter" and given != parameter.default:
+        value = arguments[parameter.name]
+        if parameter.name != "reporter" and value != parameter.default:
             raise BadInputError(f"a {request} says all that is asked: leave {parameter.name} out")

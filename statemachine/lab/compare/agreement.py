@@ -72,7 +72,7 @@ class SideRun:
 
     @property
     def run(self) -> RunFacts:
-        """What the run was."""
+        """Return the facts of the run: engine, experiment, timestep [s], options, provenance."""
         header = self.trace.header
         return RunFacts(
             backend=header.backend,
@@ -87,7 +87,7 @@ class SideRun:
 
     @property
     def rows(self) -> int:
-        """How many rows the trace has."""
+        """Return the number of rows of the trace."""
         return len(self.trace)
 
 
@@ -127,9 +127,9 @@ class Comparison:
 
     @property
     def gap_of_moments(self) -> float | None:
-        """How far apart the moments are [s], where both sides have others between them; else None.
+        """Return the time between two compared moments [s]; None where that is about one step.
 
-        Sides whose timesteps meet now and then alone are compared there alone.
+        Sides whose timesteps meet only now and then are compared only at those moments.
         """
         steps = self.left.trace.timestep, self.right.trace.timestep
         spacing = self.until / max(1, self.moments - 1)
@@ -137,11 +137,11 @@ class Comparison:
 
     @property
     def outcome(self) -> ComparisonOutcome:
-        """What came of it.
+        """Return the outcome of the comparison, in a word.
 
         "ended" where a side ended before its time; "differs" where one base floats and the other is
         fixed, or a quantity does not agree at every moment; "nothing moved" where all agree, but
-        there was nothing to compare.
+        there was nothing to compare; else "agrees".
         """
         if self.ended:
             return "ended"
@@ -153,7 +153,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether something moved, every quantity agrees always, and both runs came to their end.
+        """Tell whether something moved, every quantity agrees always, and both runs are complete.
 
         Forces of contacts and changes of energy count as motion, see `MotionExtent`.
         """
@@ -161,7 +161,10 @@ class Comparison:
 
     @property
     def ended(self) -> bool:
-        """Whether a side ended before its time: nobody knows what it would have done."""
+        """Tell whether a side ended before its time.
+
+        Nobody knows what it would have done afterwards.
+        """
         return bool(self.left.trace.header.ended or self.right.trace.header.ended)
 
     @property
@@ -198,7 +201,7 @@ def compare(
     """
     site = default_tip(left.header, right.header) if tip is None else tip
     curves, pairs = series(left, right, site), touches(left, right)
-    if not any(QUANTITIES[curve.kind].own for curve in curves):
+    if not any(QUANTITIES[curve.kind].is_coordinate for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
     longest = max(left.timestep, right.timestep)
     agreements = []
@@ -219,7 +222,7 @@ def compare(
     for touch in pairs:
         missed = missed_touch(touch, left, right, labels.short)
         agreements.append(first_touch(touch, missed, until, allowed))
-    strange = [
+    not_finite = [
         f"{agreement.name}: {agreement.note}, so it cannot agree"
         for agreement in agreements
         if agreement.note.startswith("no number")
@@ -236,7 +239,7 @@ def compare(
         moments=len(common.time),
         until=until,
         agreements=tuple(agreements),
-        notes=tuple(notes_on(left, right, common, strange)),
+        notes=tuple(notes_on(left, right, common, not_finite)),
         motion=motion,
         bases=bases,
         outcomes=outcomes,
@@ -265,7 +268,7 @@ def _motion(left: Trace, right: Trace, least: LeastMotion, until: float) -> Moti
 
 
 def _settled(curve: Series) -> float:
-    """How far apart they are in the end, on average."""
+    """Return the mean difference of a curve over the last tenth of the time [the curve's unit]."""
     tail = at_the_end(curve.time)
     # Of a force the mean counts: stiff contacts ring from step to step.
     if curve.kind == "force":
@@ -274,7 +277,7 @@ def _settled(curve: Series) -> float:
 
 
 def _reach(trace: Trace, curve: Series) -> float:
-    """How far a site gets from where the first jointed body has its origin [m]."""
+    """Return the largest distance of a site from the origin of the first jointed body [m]."""
     positions, _ = trace.site(curve.name.partition(",")[0])
     if "xpos" in trace and len(trace.header.bodies) > 1:
         positions = positions - trace["xpos"][:, 1]
@@ -292,9 +295,9 @@ def _agreement_of(curve: Series, allowed: Tolerance) -> Agreement:
         verdict = "settles" if settled <= allowed.value else "differs"
         since = float(curve.time[beyond[0]])
     note = ""
-    strange = int(np.count_nonzero(~np.isfinite(curve.difference)))
-    if strange:
-        note = f"no number at {strange} of {len(curve.difference)} moments"
+    nonfinite_count = int(np.count_nonzero(~np.isfinite(curve.difference)))
+    if nonfinite_count:
+        note = f"no number at {nonfinite_count} of {len(curve.difference)} moments"
         verdict = "differs"
     gap = Deviation.of(curve.difference, curve.time, QUANTITIES[curve.kind].unit)
     return Agreement(

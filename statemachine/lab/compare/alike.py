@@ -19,8 +19,8 @@ from .matching import match_models
 from .sides import Request, Side
 
 
-def called(trace: Trace, file: str) -> Trace:
-    """A run whose file goes by another name."""
+def with_model_file(trace: Trace, file: str) -> Trace:
+    """Return a trace like `trace` whose provenance names another model file."""
     made_by = replace(trace.header.provenance, model_file=file)
     return Trace(replace(trace.header, provenance=made_by), trace.columns)
 
@@ -28,7 +28,14 @@ def called(trace: Trace, file: str) -> Trace:
 def match_sides(
     sides: Sequence[Side], left: Model, right: Model, names: Mapping[str, str]
 ) -> Matched | None:
-    """Which is which; None for one file, of which every engine has the same ids."""
+    """Match the joints, actuators, bodies and sites of the Models of two sides.
+
+    Returns:
+        The pairs; None for one file with equal joints, of which every engine has the same ids.
+
+    Raises:
+        TraceError: Both have joints, and none in common.
+    """
     if left.path == right.path and not names and left.joint_names == right.joint_names:
         return None
     matched = match_models(left, right, names)
@@ -105,22 +112,28 @@ def translated(trace: Trace, matched: Matched, right_start: SideStart) -> Trace:
     """
     recorded = SideStart(trace.qpos, trace.qvel, trace.ctrl)
     poses = {"mocap_pos": matched.right.mocap_pos0, "mocap_quat": matched.right.mocap_quat0}
-    led = {
-        name: matched.moved(name, trace[name].reshape(len(trace), -1), pose.ravel())
+    mocap_poses = {
+        name: matched.to_right(name, trace[name].reshape(len(trace), -1), pose.ravel())
         for name, pose in poses.items()
         if name in trace
     }
-    return replace_layout(trace, matched.right, *matched.start(recorded, right_start), led)
+    return replace_layout(trace, matched.right, *matched.start(recorded, right_start), mocap_poses)
 
 
-def for_left(trace: Trace, model: Model, request: Request) -> Trace:
-    """A trace as one of the left's Model; matched by the model that it was recorded with."""
+def in_layout_of_left(trace: Trace, model: Model, request: Request) -> Trace:
+    """Return a trace in the layout of the left's Model.
+
+    A trace of another layout is matched by the model that it was recorded with.
+
+    Raises:
+        TraceError: That model is not found, or cannot be matched.
+    """
     header = trace.header
     layout = layout_of(model)
     compared = ("joints", "actuators", "jnt_type", "nmocap")
     if all(getattr(header, name) == layout[name] for name in compared):
-        led = {name: trace[name] for name in MOCAP if name in trace}
-        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, led)
+        mocap_poses = {name: trace[name] for name in MOCAP if name in trace}
+        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, mocap_poses)
     try:
         file, _ = model_file(header, request.menagerie, request.trace_file(0))
         matched = match_models(load(file), model, request.names)
@@ -132,8 +145,11 @@ def for_left(trace: Trace, model: Model, request: Request) -> Trace:
     return translated(trace, matched, start_of(model, None))
 
 
-def in_terms_of_right(left: Trace, right: Trace, matched: Matched | None) -> Trace:
-    """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
+def in_layout_of_right(left: Trace, right: Trace, matched: Matched | None) -> Trace:
+    """Return the left's run in the layout of the right's Model.
+
+    Coordinates that only the right has keep the values that they start with.
+    """
     if matched is None:
         return left
     right_start = SideStart(right.qpos[0], right.qvel[0], right.ctrl[0])
@@ -141,7 +157,7 @@ def in_terms_of_right(left: Trace, right: Trace, matched: Matched | None) -> Tra
 
 
 def same_commands(left: Trace, right: Trace) -> bool:
-    """Whether the right was told what the left was, from the same start."""
+    """Tell whether both sides have the same start and the same commands."""
     return (
         np.array_equal(left.qpos[0], right.qpos[0])
         and np.array_equal(left.qvel[0], right.qvel[0])
@@ -150,7 +166,7 @@ def same_commands(left: Trace, right: Trace) -> bool:
 
 
 def commands_alike(left: Trace, right: Trace) -> bool:
-    """Whether the right was told at each of its moments what the left was."""
+    """Tell whether the command of the right is that of the left at each moment of the right."""
     since, times = right.time - right.time[0], left.time - left.time[0]
     early = 1e-6 * left.timestep  # as `play` has it
     rows = np.searchsorted(times - early, since, side="right") - 1
@@ -159,24 +175,34 @@ def commands_alike(left: Trace, right: Trace) -> bool:
 
 
 def replace_layout(
-    trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array, led: Mapping[str, Array]
+    trace: Trace,
+    model: Model,
+    qpos: Array,
+    qvel: Array,
+    ctrl: Array,
+    mocap_poses: Mapping[str, Array],
 ) -> Trace:
-    """A run as if it were one of another Model: states and commands, and nothing derived."""
+    """Return a run in the layout of another Model: states and commands, and nothing derived."""
     columns = {"time": trace.time, "qpos": qpos, "qvel": qvel, "ctrl": ctrl}
     header = replace(trace.header, **layout_of(model))
-    poses = {name: led[name].reshape(len(trace), *header.shape(name)) for name in led}
+    poses = {
+        name: mocap_poses[name].reshape(len(trace), *header.shape(name)) for name in mocap_poses
+    }
     return Trace(header, columns | poses)
 
 
 def with_bodies_of(trace: Trace, model: Model) -> Trace:
-    """A run whose bodies go by the names that its own Model has, for what is drawn with that."""
+    """Return a run with the body names of its own Model, which draws it."""
     return Trace(replace(trace.header, bodies=model.body_names), trace.columns)
 
 
 def _renamed(
     left_names: Sequence[str], right_names: Sequence[str], pairs: Pairs
 ) -> tuple[str, ...]:
-    """The names of the right, those of the left for what both have."""
+    """Return the names of the right, with those of the left for what both have.
+
+    A name of the left that means something else on the right gets "(right)" behind it.
+    """
     names = list(right_names)
     for k, name in enumerate(names):
         if name and name in left_names:
@@ -189,7 +215,7 @@ def _renamed(
 def controller_for_right(
     controller: Controller, matched: Matched, right_start: Array
 ) -> Controller:
-    """A controller that gives the right what another one gives the left.
+    """Return a controller that gives the right Model the commands that another gives the left.
 
     Where it gives no command ctrl stays as it is, as it does on the left.
 
@@ -203,6 +229,6 @@ def controller_for_right(
         ctrl = controller(model, data)
         if ctrl is None:
             return None
-        return matched.moved("ctrl", np.asarray(ctrl, np.float64), right_start)
+        return matched.to_right("ctrl", np.asarray(ctrl, np.float64), right_start)
 
     return translate

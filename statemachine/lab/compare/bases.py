@@ -58,22 +58,22 @@ def load_sides(
         StateMachineError: As `Side.load`.
     """
     is_open = [_leaves_base_open(side, options) for side in sides]
-    taken_by: Literal["left", "right", ""] = ""
+    inherited_by: Literal["left", "right", ""] = ""
     if is_open[0] is is_open[1]:
         left, right = (side.load(**options) for side in sides)
     else:
-        taker = is_open.index(True)
-        giver = sides[1 - taker].load(**options)
-        if base_of(giver) == "free":
-            taken_by = _SIDES[taker]
-            model = _floating(sides[taker], options, giver, names, is_left=not taker)
+        open_side = is_open.index(True)
+        reference = sides[1 - open_side].load(**options)
+        if base_of(reference) == "free":
+            inherited_by = _SIDES[open_side]
+            model = _floating(sides[open_side], options, reference, names, is_left=not open_side)
         else:
-            model = sides[taker].load(**options)  # it is fixed, as of every such file
-        left, right = (giver, model) if taker else (model, giver)
+            model = sides[open_side].load(**options)  # it is fixed, as of every such file
+        left, right = (reference, model) if open_side else (model, reference)
     bases = Bases(
         left=base_of(left),
         right=base_of(right),
-        taken_by=taken_by,
+        inherited_by=inherited_by,
         floating_loader=_floating_loader((left, right), is_open),
         frame=_base_frame(left, right, names),
     )
@@ -128,13 +128,13 @@ def _leaves_base_open(side: Side, options: Mapping[str, OptionValue]) -> bool:
 
 
 def _start_of(
-    giver: Model, taker: Model, names: Mapping[str, str], *, is_left: bool
+    reference: Model, model: Model, names: Mapping[str, str], *, is_left: bool
 ) -> FreeBase | None:
     """Return where a base has to start to be where that of another Model is; None at its own place.
 
     Args:
-        giver: The other Model.
-        taker: The Model.
+        reference: The other Model.
+        model: The Model.
         names: Joints, bodies and sites of the left that go by other names on the right.
         is_left: Whether the other Model is the left.
     """
@@ -142,16 +142,21 @@ def _start_of(
         quat_of_matrix,  # it needs MuJoCo, which a trace does not
     )
 
-    free_joint, own = free_joint_of_base(giver), free_joint_of_base(taker)
-    if free_joint is None or own is None:
+    free_joint, base_joint = free_joint_of_base(reference), free_joint_of_base(model)
+    if free_joint is None or base_joint is None:
         return None
-    place = _place_of(giver, free_joint)
+    place = _place_of(reference, free_joint)
     if is_left:
-        place = place @ _frame_on_right(giver, taker, int(giver.jnt_bodyid[free_joint]), names)
+        place = place @ _frame_on_right(
+            reference, model, int(reference.jnt_bodyid[free_joint]), names
+        )
     else:
-        place = place @ _frame_on_right(taker, giver, int(taker.jnt_bodyid[own]), names).inverse
-    here = _place_of(taker, own)
-    if place.distance(here) <= _SAME and place.angle(here) <= _SAME:
+        place = (
+            place
+            @ _frame_on_right(model, reference, int(model.jnt_bodyid[base_joint]), names).inverse
+        )
+    base_place = _place_of(model, base_joint)
+    if place.distance(base_place) <= _SAME and place.angle(base_place) <= _SAME:
         return None
     x, y, z = place.pos.tolist()
     qw, qx, qy, qz = quat_of_matrix(place.mat.ravel()).tolist()

@@ -225,22 +225,22 @@ def _departures(
     """Make the perturbed runs, in this process or in forks of it, in the order of `work`."""
     began = time.perf_counter()
     first = work[0]()
-    took, done = time.perf_counter() - began, 1
-    progress(done / len(work))
+    seconds, count = time.perf_counter() - began, 1
+    progress(count / len(work))
     yield first
 
     def ran(_number: int, _departure: _Departure) -> None:
-        nonlocal done
-        done += 1
-        progress(done / len(work))
+        nonlocal count
+        count += 1
+        progress(count / len(work))
 
     rest = work[1:]
     # A function of the user's may keep something from one run to the next.
     if jobs is None and any(rerun is not None and rerun.writes_state for rerun in reruns):
         jobs = 1
-    forks = forks_for(len(rest), took, jobs)
+    forks = forks_for(len(rest), seconds, jobs)
     if forks > 1:
-        for departure in in_forks(rest, forks, ran, took):
+        for departure in in_forks(rest, forks, ran, seconds):
             if departure is None:
                 raise EngineError("a run for the chaos floor ended its process twice")
             yield departure
@@ -270,10 +270,10 @@ def _departure(
         curves, count = series(trace, perturbed, comparison.tip), len(perturbed)
         for touch in touches(trace, perturbed):
             left_first, right_first = touch.left.first, touch.right.first
-            apart = comparison.until
+            gap = comparison.until
             if left_first is not None and right_first is not None:
-                apart = abs(left_first - right_first)
-            distances[f"{touch.pair}{_FIRST_TOUCH}"] = np.array([apart])
+                gap = abs(left_first - right_first)
+            distances[f"{touch.pair}{_FIRST_TOUCH}"] = np.array([gap])
         for outcome in outcomes_of(trace, perturbed, comparison.until):
             far = np.inf if run.header.ended else outcome.difference
             distances[outcome.name] = np.array([far])
@@ -291,8 +291,8 @@ def _named_as(known: Mapping[str, Array], distances: dict[str, Array]) -> dict[s
     named = dict(distances)
     for ending in (NORMAL, _FIRST_TOUCH):
         pairs = {name.removesuffix(ending): name for name in known if name.endswith(ending)}
-        own = {name.removesuffix(ending): name for name in distances if name.endswith(ending)}
-        for pair, name in with_left_pair_names(pairs, own).items():
+        measured = {name.removesuffix(ending): name for name in distances if name.endswith(ending)}
+        for pair, name in with_left_pair_names(pairs, measured).items():
             named[f"{pair}{ending}"] = named.pop(name)
     return named
 
@@ -352,7 +352,7 @@ def _chance_of(gap: Array, width: Array, tolerance: float, tail: NDArray[np.bool
     settled = float(gap[tail].mean())
     if not settled <= tolerance:
         pairs.append((settled, float(width[tail].max())))
-    found = {against_floor(*pair) for pair in pairs}
-    if "beyond" in found:
+    verdicts = {against_floor(*pair) for pair in pairs}
+    if "beyond" in verdicts:
         return "beyond"
-    return "cannot be told" if "cannot be told" in found else "inside"
+    return "cannot be told" if "cannot be told" in verdicts else "inside"

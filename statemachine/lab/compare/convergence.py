@@ -67,25 +67,25 @@ class GapLimit:
     @property
     @only_on_pages
     def as_given(self) -> float:
-        """The gap with the steps as given [unit]."""
+        """Return the gap with the timesteps that the sides have [unit]."""
         return self.gaps[0]
 
     @property
     @only_on_pages
     def finest(self) -> float:
-        """The gap with the finest steps [unit]."""
+        """Return the gap with the finest timesteps [unit]."""
         return self.gaps[-1]
 
     @property
     @only_on_pages
     def left_moved(self) -> float:
-        """How far the left is from its own run with the finest steps [unit]."""
+        """Return the distance of the left from its own run with the finest timesteps [unit]."""
         return self.moved[0]
 
     @property
     @only_on_pages
     def right_moved(self) -> float:
-        """How far the right is from its own run with the finest steps [unit]."""
+        """Return the distance of the right from its own run with the finest timesteps [unit]."""
         return self.moved[1]
 
 
@@ -101,8 +101,8 @@ class Convergence:
         engines: The backends of the two sides, each once.
         until: The last moment that is compared [s].
         touch: When something touches first in any of the runs [s]; None if nothing does.
-        before: Each quantity until then; of a run that begins with a touch there is none.
-        whole: Each quantity over all of the run; the same as `before` if nothing touches.
+        before_touch: Each quantity until then; of a run that begins with a touch there is none.
+        whole_run: Each quantity over all of the run; the same as `before_touch` if nothing touches.
         motion: How far both sides move with the steps as given.
     """
 
@@ -112,38 +112,40 @@ class Convergence:
     engines: frozenset[str] = field(metadata={"json": False})
     until: float
     touch: float | None
-    before: tuple[GapLimit, ...]
-    whole: tuple[GapLimit, ...]
+    before_touch: tuple[GapLimit, ...]
+    whole_run: tuple[GapLimit, ...]
     motion: MotionExtent
 
     @property
     def is_still(self) -> bool:
-        """Whether nothing moves and there is no gap: then nothing was compared."""
-        return not self.motion.moved and all(limit.verdict == "rounding" for limit in self.whole)
+        """Tell whether nothing moves and there is no gap, so that nothing was compared."""
+        return not self.motion.moved and all(
+            limit.verdict == "rounding" for limit in self.whole_run
+        )
 
     @property
     def vanishes(self) -> bool:
-        """Whether no gap is more than discretisation, over the whole run."""
-        return all(limit.verdict in ("rounding", "discretisation") for limit in self.whole)
+        """Tell whether every gap over the whole run is discretisation or rounding."""
+        return all(limit.verdict in ("rounding", "discretisation") for limit in self.whole_run)
 
     @property
     def unclear(self) -> bool:
-        """Whether some gap has no steady order."""
-        return any(limit.verdict == "unclear" for limit in (*self.whole, *self.before))
+        """Tell whether the order of some gap is not steady."""
+        return any(limit.verdict == "unclear" for limit in (*self.whole_run, *self.before_touch))
 
     @property
     @only_on_pages
     def may_be_contact(self) -> bool:
-        """Whether two engines touch something, each by a contact law that depends on its step."""
+        """Tell whether two engines touch something, each by a contact law with its own timestep."""
         return self.touch is not None and len(self.engines) > 1
 
     @property
     @only_on_pages
     def state(self) -> GapState:
-        """What becomes of the gap over the whole run: that of the quantity that is told first."""
+        """Return in a word what becomes of the gap over the whole run: that of the `lead`."""
         if self.is_still:
             return "still"
-        if all(limit.verdict == "rounding" for limit in self.whole):
+        if all(limit.verdict == "rounding" for limit in self.whole_run):
             return "rounding"
         if self.vanishes:
             return "vanishes"
@@ -157,19 +159,19 @@ class Convergence:
     @property
     @only_on_pages
     def lead(self) -> GapLimit:
-        """The quantity that is told first.
+        """Return the quantity that a page names first.
 
         It is one whose gap stays, or one that is unclear, whichever are more often; of these a
         coordinate if there is one, and of those with its unit the one with the largest gap.
         """
-        stays = [limit for limit in self.whole if limit.verdict in ("stays", "in part")]
-        unclear = [limit for limit in self.whole if limit.verdict == "unclear"]
-        candidates: Sequence[GapLimit] = self.whole
+        stays = [limit for limit in self.whole_run if limit.verdict in ("stays", "in part")]
+        unclear = [limit for limit in self.whole_run if limit.verdict == "unclear"]
+        candidates: Sequence[GapLimit] = self.whole_run
         if len(stays) > len(unclear):
             candidates = stays
         elif unclear:
             candidates = unclear
-        coordinates = [limit for limit in candidates if QUANTITIES[limit.kind].own]
+        coordinates = [limit for limit in candidates if QUANTITIES[limit.kind].is_coordinate]
         if coordinates:
             candidates = coordinates
         alike = [limit for limit in candidates if limit.unit == candidates[0].unit]
@@ -178,8 +180,11 @@ class Convergence:
     @property
     @only_on_pages
     def until_touch(self) -> TouchState:
-        """Whether the gap that does not vanish begins with the first touch."""
-        verdicts = {limit.verdict for limit in self.before}
+        """Return what is left of the gap before the first touch.
+
+        "gap" also where nothing touches, or where the gap vanishes over the whole run.
+        """
+        verdicts = {limit.verdict for limit in self.before_touch}
         if self.touch is None or self.vanishes or not verdicts:
             return "gap"
         if verdicts == {"rounding"}:
@@ -248,8 +253,8 @@ def _result(runs: Sequence[tuple[Trace, Trace]]) -> Convergence:
         engines=engines,
         until=until,
         touch=touch,
-        before=before,
-        whole=whole,
+        before_touch=before,
+        whole_run=whole,
         motion=motion_of(sides, SEEN, until),
     )
 
@@ -330,7 +335,7 @@ def _limit(quantity: _Quantity, chosen: NDArray[np.bool_]) -> GapLimit:
 
 
 def verdict_of(gaps: list[float], rounding: float) -> tuple[LimitVerdict, float | None]:
-    """What becomes of a gap, and what it tends to.
+    """Return the verdict on a gap whose steps are halved, and its limit [unit]; None if unknown.
 
     Three gaps give the observed order of convergence and the limit (Richardson's extrapolation;
     P. J. Roache, "Quantification of uncertainty in computational fluid dynamics", Annual Review

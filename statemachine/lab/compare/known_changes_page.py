@@ -26,37 +26,37 @@ class ShownChange:
 
     @property
     def name(self) -> KnownChangeName:
-        """Which change it is."""
+        """Return the name of the change."""
         return self.change.name
 
     @property
     def probe(self) -> str:
-        """What was measured."""
+        """Return the name of the probe that measures the change."""
         return self.change.probe
 
     @property
     def left(self) -> float:
-        """What the probe measures on the older one."""
+        """Return what the probe measures on the older release."""
         return self.change.left
 
     @property
     def right(self) -> float:
-        """What the probe measures on the newer one."""
+        """Return what the probe measures on the newer release."""
         return self.change.right
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """What of the model it concerns."""
+        """Return the elements of the model that the change concerns."""
         return self.change.elements
 
     @property
     def more(self) -> str:
-        """The release on which the probe measures more."""
+        """Return the release on which the probe measures the larger magnitude."""
         return self.release if abs(self.left) > abs(self.right) else self.next
 
     @property
     def less(self) -> str:
-        """The release on which the probe measures less."""
+        """Return the release on which the probe measures the smaller magnitude."""
         return self.next if abs(self.left) > abs(self.right) else self.release
 
 

@@ -15,7 +15,7 @@ from ...measures import SAME_MOMENT, CommonMoments
 from ...measures.text import few, milliseconds, numbers, significant
 from ..recordings import Header, Trace
 from ..runs.floating import base_of
-from .series import joint_columns, tell
+from .series import both_have, joint_columns
 
 Two = tuple[str, str]
 # Columns that are compared, and what a page calls them.
@@ -41,9 +41,9 @@ class Labels(NamedTuple):
 
 
 def labels_of(left: Header, right: Header) -> Labels:
-    """The names of two runs."""
+    """Return the labels of two runs, long and short, by what differs between them."""
     engines = left.label, right.label
-    others = list(_apart(left, right))
+    others = list(_differing_labels(left, right))
     backends = left.backend, right.backend
     with_defaults = _with_defaults(left), _with_defaults(right)
     short = with_defaults
@@ -65,7 +65,7 @@ def _with_defaults(header: Header) -> str:
     return header.backend
 
 
-def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterator[str]:
+def lines_on_unmatched(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterator[str]:
     """Yield a line for a side that has what the other has not, as `Matched.only` tells it."""
     unmatched_on_both = [kind for kind in only[0] if only[0].get(kind) and only[1].get(kind)]
     for unmatched, label in zip(only, labels, strict=True):
@@ -81,7 +81,7 @@ def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterato
 
 
 def files_apart(left: Sequence[str], right: Sequence[str]) -> Two:
-    """The shortest ends of two paths, given by their parts, that are not the same."""
+    """Return the shortest ends of two paths, given by their parts, that are not the same."""
     counts = range(1, max(len(left), len(right)) + 1)
     differing = (count for count in counts if left[-count:] != right[-count:])
     count = next(differing, 1)
@@ -89,7 +89,10 @@ def files_apart(left: Sequence[str], right: Sequence[str]) -> Two:
 
 
 def options_apart(left: Mapping[str, OptionValue], right: Mapping[str, OptionValue]) -> Two:
-    """The options that differ, as they are typed; what a side does not say is of its file."""
+    """Return the options that differ, as they are typed on either side.
+
+    What a side does not set is the value of its file.
+    """
     differing = [
         name
         for name in dict.fromkeys([*left, *right])
@@ -107,7 +110,7 @@ def _typed_options(names: Iterable[str], options: Mapping[str, OptionValue]) -> 
 
 
 def typed_option(name: str, value: OptionValue | None) -> str:
-    """An option as one types it: "timestep=0.002", "contacts=off", "gravity=0,0,-9.8"."""
+    """Return an option as one types it: "timestep=0.002", "contacts=off", "gravity=0,0,-9.8"."""
     match value:
         case bool():
             return f"{name}={'on' if value else 'off'}"
@@ -116,8 +119,8 @@ def typed_option(name: str, value: OptionValue | None) -> str:
     return f"{name}={','.join(f'{number:.15g}' for number in np.atleast_1d(value))}"
 
 
-def _apart(left: Header, right: Header) -> Iterator[Two]:
-    """What differs besides the engine, the weightiest first."""
+def _differing_labels(left: Header, right: Header) -> Iterator[Two]:
+    """Yield what differs besides the engine, as a pair of labels, the weightiest first."""
     left_file, right_file = left.provenance.model_file, right.provenance.model_file
     left_digest, right_digest = left.provenance.model_sha256, right.provenance.model_sha256
     if left_file != right_file:
@@ -125,7 +128,7 @@ def _apart(left: Header, right: Header) -> Iterator[Two]:
     elif left_digest != right_digest:
         last = left_file.split("/")[-1]
         yield f"{last} ({left_digest[:8]})", f"{last} ({right_digest[:8]})"
-    left_options, right_options = _with_known(left, right), _with_known(right, left)
+    left_options, right_options = _options_to_compare(left, right), _options_to_compare(right, left)
     if base_of(left) == base_of(right):  # one of them took it over, or the file of one says it
         left_options.pop("base", None)
         right_options.pop("base", None)
@@ -148,8 +151,8 @@ def _start_of(header: Header) -> str:
     return header.keyframe or "the default state"
 
 
-def _with_known(header: Header, other: Header) -> dict[str, OptionValue]:
-    """The options of a run, and what it has where only the other one says an option."""
+def _options_to_compare(header: Header, other: Header) -> dict[str, OptionValue]:
+    """Return the options of a run, and its values of those that only the other run sets."""
     known: dict[str, OptionValue] = {
         "timestep": header.timestep,
         "substeps": header.substeps,
@@ -224,7 +227,7 @@ def _notes_on_joints(left: Trace, right: Trace, labels: Two) -> Iterator[str]:
 def _notes_on_columns(left: Trace, right: Trace) -> Iterator[str]:
     missing: dict[str, None] = {}
     for column, what in _COMPARED.items():
-        if not tell(left, right, column) and (column in left or column in right):
+        if not both_have(left, right, column) and (column in left or column in right):
             missing[what] = None
     if missing:
         yield f"not compared, for one side does not tell it: {', '.join(missing)}"
@@ -286,5 +289,5 @@ def _notes_on_side(trace: Trace, label: str) -> Iterator[str]:
             f"{label}: in {header.rewritten} rows the state was written, by the controller; that "
             "is not part of the commands"
         )
-    if header.single:
+    if header.single_precision:
         yield f"the recorded run of {header.backend} keeps all but its state in single precision"

@@ -66,18 +66,18 @@ class Matched(Counterparts):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader should know, in sentences."""
+        """Return what a reader should know of the pairs, in sentences."""
         return (*(pair.note for pair in self.renamed), *self.other_notes)
 
     @property
     def reordered(self) -> bool:
-        """Whether who writes ctrl by number meets other actuators on the right."""
+        """Tell whether an index into ctrl means another actuator on the right."""
         places = [right_id for _, right_id in self.actuators]
         return places != sorted(places)
 
     @property
     def only_beside_bases(self) -> tuple[Only, Only]:
-        """What each Model alone has, but for the free joint of the base of its robot."""
+        """Return what each Model alone has, but for the free joint of the base of its robot."""
         left, right = (
             _without_base(model, only)
             for model, only in zip((self.left, self.right), self.only, strict=True)
@@ -86,7 +86,7 @@ class Matched(Counterparts):
 
     @property
     def joints_elsewhere(self) -> bool:
-        """Whether who reads qpos or qvel by number meets other joints on the right."""
+        """Tell whether an index into qpos or qvel means another joint on the right."""
         left, right = self.left, self.right
         return any(
             left.jnt_qposadr[left_id] != right.jnt_qposadr[right_id]
@@ -96,45 +96,45 @@ class Matched(Counterparts):
 
     @property
     def mocap_elsewhere(self) -> bool:
-        """Whether who moves mocap bodies by number meets others on the right."""
+        """Tell whether an index into mocap_pos means another mocap body on the right."""
         left_places, right_places = self.places["mocap_pos"]
         return left_places != right_places
 
     def start(self, left: SideStart, right: SideStart) -> SideStart:
-        """The start of the left Model in the right's terms; the rest is that of `right`."""
+        """Return the start of the left in the right's layout; the rest is that of `right`."""
         return SideStart(
-            qpos=self.moved("qpos", left.qpos, right.qpos),
-            qvel=self.moved("qvel", left.qvel, right.qvel),
-            ctrl=self.moved("ctrl", left.ctrl, right.ctrl),
+            qpos=self.to_right("qpos", left.qpos, right.qpos),
+            qvel=self.to_right("qvel", left.qvel, right.qvel),
+            ctrl=self.to_right("ctrl", left.ctrl, right.ctrl),
         )
 
     def state(self, left: State, right: State) -> State:
-        """The right Model's State `right` with what a State of the left tells of it.
+        """Return `right`, a State of the right Model, with the values of a State of the left.
 
-        Beside the time these are the arrays in `places` that both have.
+        Copied are the time, and of the arrays in `places` those that both have.
         """
         arrays = {
-            name: self.moved(name, left[name], right[name])
+            name: self.to_right(name, left[name], right[name])
             for name in self.places
             if name in dict(left.layout) and name in dict(right.layout)
         }
         return right.with_parts(time=left["time"], **arrays)
 
-    def moved(self, part: str, values: Array, right_start: Array) -> Array:
-        """An array of the right Model, from that of the left.
+    def to_right(self, part: str, values: Array, right_start: Array) -> Array:
+        """Return an array of the left in the right's layout, (k,) or (n, k).
 
         Args:
             part: Its name in `places`.
             values: (m,) or (n, m) of the left.
             right_start: (k,) of the right, for what has no counterpart.
         """
-        return _moved(values, right_start, *self.places[part])
+        return _with_counterparts(values, right_start, *self.places[part])
 
     @cached_property
     def places(self) -> Mapping[str, list[list[int]]]:
-        """By array of a State, where in it on either side the counterparts are.
+        """Return the indices of the counterparts on the left and on the right, by array of a State.
 
-        Activations are of actuators that have as many of them.
+        Activations are matched for actuators that have as many of them on both sides.
         """
         left, right = self.left.compiled, self.right.compiled
         activations: Iterable[tuple[int, int]] = ()
@@ -159,7 +159,7 @@ class Matched(Counterparts):
                 yield left_id, right_id
 
     def _spans(self, start: str, end: str) -> list[list[int]]:
-        """The places of the joints of both, in qpos or qvel."""
+        """Return the indices of the common joints in qpos or qvel, of the left and of the right."""
         places: list[list[int]] = [[], []]
         for side, model in enumerate((self.left, self.right)):
             starts = [*getattr(model, start).tolist(), getattr(model, end)]
@@ -213,7 +213,7 @@ def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int
     return sorted(pairs)
 
 
-def _moved(
+def _with_counterparts(
     values: Array, right_start: Array, left_places: Sequence[int], right_places: Sequence[int]
 ) -> Array:
     """Return values (k,) or (n, k) of the left at their places in a start (m,) of the right."""

@@ -94,7 +94,7 @@ def match_models(
     joints = _joints(matching)
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.left: solid for solid in _solids(trees)}
-    solids = (*by_body.values(), *_led(left, right, names))
+    solids = (*by_body.values(), *_mocap_pairs(left, right, names))
     by_name = _by_name(left.body_names, right.body_names, names)
     bodies = _and_further(((solid.left, solid.right) for solid in solids), by_name)
     sites = _sites(left, right, names, trees)
@@ -154,11 +154,11 @@ def _only(
         sites: Pairs of ids.
     """
     model, other = models
-    further_sites = _rest(model.site_names, sites, side)
+    further_sites = _unmatched_names(model.site_names, sites, side)
     joint_names = [joint_name(model, joint) for joint in range(model.njnt)]
     return {
-        "joint": _rest(joint_names, joints, side),
-        "actuator": _rest(model.actuator_names, actuators, side),
+        "joint": _unmatched_names(joint_names, joints, side),
+        "actuator": _unmatched_names(model.actuator_names, actuators, side),
         "site": tuple(name for name in further_sites if name not in other.body_names),
     }
 
@@ -214,10 +214,11 @@ def _bodies_hang_alike(trees: MatchedTrees, pair: Pair) -> bool:
     return above is not None and trees.right.carrier(pair.right).is_of_body(above.right)
 
 
-def _led(left: Model, right: Model, names: Mapping[str, str]) -> list[BodyPair]:
-    """The mocap bodies: no joint moves them, but they are not part of the world; by name.
+def _mocap_pairs(left: Model, right: Model, names: Mapping[str, str]) -> list[BodyPair]:
+    """Return the pairs of mocap bodies, by name.
 
-    Those without a name in both are one where as many others come before them.
+    No joint moves them, but they are not part of the world. Those without a name in both are a
+    pair where as many others come before them.
     """
     left_bodies, right_bodies = _mocap_bodies_of(left), _mocap_bodies_of(right)
     left_names = [left.body_names[body] for body in left_bodies]
@@ -240,8 +241,8 @@ def _by_name(
     left_names: Sequence[str], right_names: Sequence[str], names: Mapping[str, str]
 ) -> Pairs:
     right_ids = {name: k for k, name in enumerate(right_names) if name}
-    wanted = [names.get(name, name) for name in left_names]
-    return tuple((k, right_ids[name]) for k, name in enumerate(wanted) if name in right_ids)
+    names_on_right = [names.get(name, name) for name in left_names]
+    return tuple((k, right_ids[name]) for k, name in enumerate(names_on_right) if name in right_ids)
 
 
 def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, int]]) -> Pairs:
@@ -255,7 +256,7 @@ def _sites(
     names: Mapping[str, str],
     trees: MatchedTrees,
 ) -> Pairs:
-    """By name, then by place: of what is left, those in one place of the same solid."""
+    """Return the pairs of sites: by name, then those in one place of the same rigid body."""
     left_places, right_places = _frame_places(trees.left), _frame_places(trees.right)
 
     def in_one_place(left_id: int, right_id: int) -> bool:
@@ -284,7 +285,7 @@ def _frame_places(tree: GroupTree) -> list[tuple[int, Placement]]:
 
 
 def _actuators(left: Model, right: Model, joints: Pairs, names: Mapping[str, str]) -> Pairs:
-    """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
+    """Return the pairs of actuators: by name, then the n-th of a joint and the n-th of its pair."""
     of_one_joint = (
         (left_id, right_id)
         for left_id, left_joint in enumerate(left.actuator_jntid.tolist())
@@ -294,9 +295,9 @@ def _actuators(left: Model, right: Model, joints: Pairs, names: Mapping[str, str
     return _and_further(_by_name(left.actuator_names, right.actuator_names, names), of_one_joint)
 
 
-def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
-    taken = {pair[side] for pair in pairs}
-    return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in taken)
+def _unmatched_names(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
+    matched_ids = {pair[side] for pair in pairs}
+    return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in matched_ids)
 
 
 def _joints_by_place(matching: Matching) -> Iterator[RenamedPair]:
@@ -328,7 +329,7 @@ def _by_place(
 def missing_parts(
     left: Model, right: Model, options: Mapping[str, OptionValue]
 ) -> tuple[tuple[str, str], ...]:
-    """What one of two Models has nothing of, and the other has, as far as it acts.
+    """Return what one of two Models lacks and the other has, as far as the options leave it on.
 
     Args:
         left: The one.

@@ -24,7 +24,9 @@ LeastMotion = Mapping[str, float]
 # What two runs have to move by so that a gap that is rounding says that they move alike: 100 times
 # what the arithmetic of an engine makes of a run, 1e-6 rad and 1e-7 m.
 SEEN: LeastMotion = {
-    kind: 100 * RUN_FLOORS[quantity.unit] for kind, quantity in QUANTITIES.items() if quantity.own
+    kind: 100 * RUN_FLOORS[quantity.unit]
+    for kind, quantity in QUANTITIES.items()
+    if quantity.is_coordinate
 }
 
 
@@ -54,7 +56,7 @@ class MotionExtent:
 
     @property
     def is_compared(self) -> bool:
-        """Whether anything was compared that could have differed."""
+        """Tell whether anything was compared that could have differed."""
         return self.moved or self.loaded
 
 
@@ -114,7 +116,7 @@ def least_motions(tolerances: Mapping[str, float] | None) -> LeastMotion:
     """
     least: dict[str, float] = {}
     for kind, quantity in QUANTITIES.items():
-        if quantity.own and quantity.tolerance is not None:
+        if quantity.is_coordinate and quantity.tolerance is not None:
             least[kind] = quantity.tolerance
             if tolerances is not None and kind in tolerances:
                 least[kind] = min(tolerances[kind], quantity.tolerance)

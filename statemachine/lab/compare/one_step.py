@@ -143,9 +143,12 @@ def _scale_of(matched: Matched, readings: Sequence[StepReading]) -> RobotScale:
 def _states(
     rerun: Rerun, data: Data, inputs: Mapping[str, Array], every: int
 ) -> Iterator[tuple[int, State, dict[str, Array]]]:
-    """The run again: every so many-th row, its State, and what the step before it found.
+    """Run a recorded run again, and yield every so many-th row.
 
     Whoever asks takes the step from there on `data`.
+
+    Yields:
+        The row; its State; the derived arrays of the step before it, by name.
     """
     model = rerun.model
     reset(model, data, rerun.keyframe)
@@ -175,7 +178,7 @@ def _put(
 
 
 def _leading(measured: Sequence[StageMeasure], moments: int) -> list[tuple[str, str]]:
-    """For each moment the first stage beyond its tolerance, and its worst element."""
+    """Return for each moment the first stage beyond its tolerance, and its worst element."""
     leading = [("", "")] * moments
     for measure in sorted(measured, key=lambda m: -STAGES.index(m.stage)):
         for row in np.flatnonzero(measure.beyond.any(axis=1)).tolist():
@@ -184,7 +187,7 @@ def _leading(measured: Sequence[StageMeasure], moments: int) -> list[tuple[str, 
 
 
 def _gaps(
-    measured: Sequence[StageMeasure], times: Sequence[float], leads: Mapping[str, int]
+    measured: Sequence[StageMeasure], times: Sequence[float], first_counts: Mapping[str, int]
 ) -> tuple[StageGap, ...]:
     """Return the gap of each stage, by that of its units that is farthest beyond its tolerance."""
     gaps = []
@@ -194,15 +197,15 @@ def _gaps(
             by_unit = [_not_compared(stage)]
         # Of the measures of one stage that of pairs comes last, and says more than joints do.
         gap = max(reversed(by_unit), key=_weight)
-        gaps.append(replace(gap, leads=leads[stage]))
+        gaps.append(replace(gap, first_count=first_counts[stage]))
     return tuple(gaps)
 
 
 def _not_compared(stage: str) -> StageGap:
     """Return the gap of a stage of which there are no figures."""
     if stage == FOUND:
-        return StageGap(stage, told=True, reason="nothing touches")
-    return StageGap(stage, told=False, reason="an engine does not tell it")
+        return StageGap(stage, is_available=True, reason="nothing touches")
+    return StageGap(stage, is_available=False, reason="an engine does not tell it")
 
 
 def _weight(gap: StageGap) -> tuple[bool, float]:
@@ -213,7 +216,7 @@ def _weight(gap: StageGap) -> tuple[bool, float]:
 
 
 def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
-    """Return how far apart the sides are in one unit of a stage; no leads are counted yet."""
+    """Return how far apart the sides are in one unit of a stage; `first_count` is 0."""
     row, element = measure.worst
     worst = float(measure.apart[row, element])
     at, where = None, ""
@@ -225,7 +228,7 @@ def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
     first = times[hits[0]] if hits else None
     return StageGap(
         stage=measure.stage,
-        told=True,
+        is_available=True,
         unit=measure.unit,
         scale=measure.scale,
         tolerance=measure.tolerance,
@@ -248,10 +251,10 @@ def _spikes(
         if measure.stage != AFTER:
             continue
         most = measure.apart.max(axis=1)
-        stands = measure.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
+        is_spike = measure.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
         padded = np.concatenate([[-np.inf], most, [-np.inf]])
-        stands &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
-        for row in np.flatnonzero(stands).tolist():
+        is_spike &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
+        for row in np.flatnonzero(is_spike).tolist():
             stage, where = leading[row]
             size, joint = float(most[row]), int(np.argmax(measure.apart[row]))
             spike = Spike(

@@ -66,7 +66,7 @@ class RunOutcome:
 
     @property
     def is_on_one_side(self) -> bool:
-        """Whether one side fell and the other did not."""
+        """Tell whether one side fell and the other did not."""
         return (self.left is None) is not (self.right is None)
 
     @property
@@ -152,8 +152,8 @@ def _tracking_error(trace: Trace, count: int, kind: JointType) -> float | None:
         return None
     places = [header.jnt_qposadr[header.actuator_jntid[i]] for i in servos]
     targets = trace.ctrl[: count - 1, servos] / gears[servos]
-    apart = targets - trace.qpos[1:count, places]
-    return float(np.sqrt(np.mean(apart**2)))
+    errors = targets - trace.qpos[1:count, places]
+    return float(np.sqrt(np.mean(errors**2)))
 
 
 def _outcome(
@@ -165,9 +165,11 @@ def _outcome(
 ) -> RunOutcome:
     """Compare one number of two runs."""
     kind = OUTCOMES[name]
-    ours, theirs = (until if value is None else value for value in (left, right))
-    allowed = tolerance_of(kind, np.array([ours]), np.array([theirs]), 0.0, 0.0, tolerances)
-    difference = abs(ours - theirs)
+    left_value, right_value = (until if value is None else value for value in (left, right))
+    allowed = tolerance_of(
+        kind, np.array([left_value]), np.array([right_value]), 0.0, 0.0, tolerances
+    )
+    difference = abs(left_value - right_value)
     is_one_alone = (left is None) is not (right is None)
     return RunOutcome(
         name=name,

@@ -38,7 +38,7 @@ EXACT = Uncertainty()
 
 
 def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
-    """What words like "0.1mm" and "0.1deg" say.
+    """Return the uncertainty that words like "0.1mm" and "0.1deg" mean.
 
     Raises:
         BadInputError: A word is invalid, or a length or an angle is given twice.
@@ -64,7 +64,7 @@ def perturbed_runs(
     derive: bool = True,
     progress: Progress = no_progress,
 ) -> Iterator[Trace]:
-    """The same run, again and again, from starts and with commands that differ by rounding.
+    """Repeat the run with starts and commands that differ by rounding, and yield the traces.
 
     Positions, velocities and commands change by at most 1e-12 of themselves (of 1 where they
     are less), drawn anew for each run and each command. A quaternion is turned by such an
@@ -105,7 +105,7 @@ def perturbed_run(
     derive: bool = True,
     progress: Progress = no_progress,
 ) -> Trace:
-    """The run with the number `k` of `perturbed_runs`, which depends on no other."""
+    """Return the run with the number `k` of `perturbed_runs`, which depends on no other."""
     if seed < 0:
         raise BadInputError(f"seed must not be negative; got {seed}")
     draw = np.random.default_rng([seed, k])
@@ -138,7 +138,7 @@ def displaced(
     along: Callable[[], float],
     far: Callable[[], float],
 ) -> Array:
-    """A start (nq,) away from another one.
+    """Return a start (nq,) that is displaced from another one.
 
     Args:
         model: Whose joints they are.
@@ -193,7 +193,7 @@ def turn(quat: Array, by: Array) -> None:
 
 
 def direction(draw: np.random.Generator) -> Array:
-    """A unit vector (3,), every direction as likely as any other."""
+    """Draw a unit vector (3,), every direction as likely as any other."""
     vector = draw.standard_normal(3)
     return vector / np.linalg.norm(vector)
 
@@ -205,7 +205,10 @@ def _nudged(values: Array, draw: np.random.Generator) -> Array:
 
 
 def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
-    """A controller whose commands differ by rounding, and what is commanded without one."""
+    """Return a controller whose commands differ by rounding from those of another one.
+
+    Where a controller gives no command, the ctrl of the start is nudged once, and stays.
+    """
 
     def nudging(model: Model, data: Data) -> Array | None:
         ctrl = None if controller is None else controller(model, data)

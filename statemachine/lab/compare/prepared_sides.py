@@ -24,7 +24,7 @@ from ..runs.floating import Bases
 from ..runs.scenarios import Controller, Scenario
 from .alike import (
     controller_for_right,
-    for_left,
+    in_layout_of_left,
     match_sides,
 )
 from .bases import load_sides
@@ -86,7 +86,7 @@ def prepare_sides(request: Request) -> PreparedSides:
     left_start, notes = None, list(loaded.bases.notes())
     if trace is not None:
         refuse_of_run(request)
-        trace = for_left(trace, left, request)
+        trace = in_layout_of_left(trace, left, request)
         scenario, seed = recorded_scenario(trace), trace.header.provenance.seed
         left_start = SideStart(trace.qpos[0], trace.qvel[0], trace.ctrl[0])
         played = request.experiment
@@ -101,7 +101,7 @@ def prepare_sides(request: Request) -> PreparedSides:
         return scenario.controller(model, request.seed)
 
     def right_controller(model: Model) -> Controller:
-        if scenario.own:
+        if scenario.is_user_function:
             controller = scenario.controller(model, request.seed)
         else:
             controller = scenario.controller(left, request.seed)
@@ -132,7 +132,7 @@ def prepare_sides(request: Request) -> PreparedSides:
             _starting(right_rerun, right_start.keyframe, right_start.written), scenario, seed
         ),
     )
-    notes += request.taken
+    notes += request.notes_on_parts
     notes += dict.fromkeys(chain(*notes_on_engines))
     notes += read_otherwise(left, right)
     return PreparedSides(reruns, matched, loaded.bases, tuple(notes))
@@ -204,9 +204,9 @@ def _of_scenario(rerun: Rerun, scenario: Scenario, seed: int | None) -> Rerun:
     return replace(
         rerun,
         experiment=scenario.name,
-        says=scenario.says,
+        description=scenario.description,
         seed=seed,
-        writes_state=scenario.own,  # ours write nothing but ctrl
+        writes_state=scenario.is_user_function,  # ours write nothing but ctrl
     )
 
 

@@ -91,9 +91,9 @@ def _options_of(run: Request, folders: bool) -> list[str]:
             value = "DIR"
         if value != getattr(usual, name):
             arguments.append(f"{name}={value!r}")
-    for side, giver in zip(run.sides, ("right", "left"), strict=False):
-        if side.taken is not None:
-            arguments += [f"{part}={giver!r}" for part in side.taken.parts]
+    for side, source in zip(run.sides, ("right", "left"), strict=False):
+        if side.replaced_parts is not None:
+            arguments += [f"{part}={source!r}" for part in side.replaced_parts.parts]
     if run.sides and "timestep" in run.options:
         arguments.append(f"timestep={run.options['timestep']!r}")
     return arguments

@@ -51,7 +51,7 @@ class Agreement:
     note: str = ""
 
     def tolerances(self) -> float:
-        """How many tolerances the largest difference is; what is not a number is beyond all."""
+        """Return the largest difference in tolerances; infinite where it is not a number."""
         if self.max == 0:
             return 0.0  # the tolerance of what does not move may be zero, too
         share = self.max / self.tolerance if self.tolerance else np.inf

@@ -59,11 +59,11 @@ def recorded_scenario(*traces: Trace) -> Scenario:
     seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
     return Scenario(
         name=header.experiment,
-        says=header.says,
+        description=header.description,
         model="",
         seconds=seconds,
         controller=lambda _model, _seed: controller_of_trace(traces[0]),
-        elsewhere=header.says,
+        general_description=header.description,
         needs=lambda _model: None,
         options=header.options,
     )

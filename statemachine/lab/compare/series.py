@@ -59,7 +59,7 @@ class JointColumns(NamedTuple):
 
 
 def joint_columns(header: Header, name: str) -> JointColumns:
-    """Those of a joint that a run has, by its label."""
+    """Return the type of a joint and its columns in qpos and qvel, by the joint's label."""
     number = header.joint_labels.index(name)
     kind = JointType(header.jnt_type[number])
     qpos, dof = header.jnt_qposadr[number], header.jnt_dofadr[number]
@@ -67,12 +67,12 @@ def joint_columns(header: Header, name: str) -> JointColumns:
 
 
 def at_the_end(time: Array) -> NDArray[np.bool_]:
-    """Which moments (n,) are among the last tenth of the time."""
+    """Return which moments (n,) are among the last tenth of the time."""
     return time >= time[-1] - SETTLED * (time[-1] - time[0])
 
 
 def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
-    """All curves that both traces have: joints, fingertip, free bodies, energy, forces.
+    """Return all curves that both traces have: joints, fingertip, free bodies, energy, forces.
 
     Args:
         left: A trace.
@@ -88,11 +88,11 @@ def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
         if name in right_names:
             curves += _joint(name, time, sides, is_base=name == base)
     site = default_tip(left.header, right.header) if tip is None else tip
-    if site and tell(left, right, "site_xpos") and tell(left, right, "site_xmat"):
+    if site and both_have(left, right, "site_xpos") and both_have(left, right, "site_xmat"):
         curves += _site(site, time, sides)
-    if tell(left, right, "energy"):
+    if both_have(left, right, "energy"):
         curves.append(_curve("energy", "energy", time, *_energy_changes(sides)))
-    if tell(left, right, "contact_force"):
+    if both_have(left, right, "contact_force"):
         curves += _normal_forces_of_pairs(time, sides)
     return curves
 
@@ -140,8 +140,8 @@ def _normal_forces_of_pairs(time: Array, sides: Sides) -> list[Series]:
 
 def _curve(name: str, kind: str, time: Array, left: Array, right: Array) -> Series:
     """Numbers (n,), or vectors (n, k)."""
-    apart = np.abs(left - right) if left.ndim == 1 else distances(left, right)
-    return Series(name, kind, time, left, right, apart)
+    gap = np.abs(left - right) if left.ndim == 1 else distances(left, right)
+    return Series(name, kind, time, left, right, gap)
 
 
 def _turned(name: str, kind: str, time: Array, left: Array, right: Array) -> Series:
@@ -166,13 +166,13 @@ def _joint(name: str, time: Array, sides: Sides, *, is_base: bool) -> list[Serie
     if kind in SCALARS:
         return [_curve(name, SCALARS[kind], time, *(side[:, 0] for side in values))]
     curves = []
-    called, of_body = (BASE, "base") if is_base else (name, "body")
+    label, of_body = (BASE, "base") if is_base else (name, "body")
     if kind is JointType.FREE:
         positions = [side[:, :3] for side in values]
-        curves.append(_curve(f"{called}, position", of_body, time, *positions))
+        curves.append(_curve(f"{label}, position", of_body, time, *positions))
     with np.errstate(invalid="ignore"):  # all zero is not a rotation: NaN, which never agrees
         rotations = [matrix_from_quat(_unit_length(side[:, -4:])) for side in values]
-        curves.append(_turned(f"{called}, rotation", f"{of_body} rotation", time, *rotations))
+        curves.append(_turned(f"{label}, rotation", f"{of_body} rotation", time, *rotations))
     return curves
 
 
@@ -224,7 +224,7 @@ def total_forces(trace: Trace) -> dict[str, Array]:
 
 
 def _sums(trace: Trace, forces: Array) -> dict[str, Array]:
-    """Sums (n, k) of the forces (c, k) of all contacts between each pair of bodies."""
+    """Return the sums (n, k) of the forces (c, k) of all contacts between each pair of bodies."""
     sums = {}
     for pair, places in trace.contact_pairs.items():
         sums[pair] = np.zeros((len(trace), forces.shape[1]))
@@ -241,10 +241,11 @@ def world_forces(trace: Trace) -> Array:
     return np.where((bodies[:, 0] > bodies[:, 1])[:, None], -forces, forces)
 
 
-def tell(left: Trace, right: Trace, column: str) -> bool:
-    """Whether both traces tell a column: an engine that does not leaves it out, or NaN in it.
+def both_have(left: Trace, right: Trace, column: str) -> bool:
+    """Tell whether both traces have figures in a column.
 
-    Of contacts a run without any tells all that there is.
+    An engine that does not offer it leaves the column out, or NaN in it. A column of contacts is
+    complete where a run has no contact.
     """
     return all(
         column in trace and not (trace[column].size and np.isnan(trace[column]).all())

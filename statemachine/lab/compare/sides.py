@@ -46,7 +46,7 @@ class Side:
         options: As `load` takes them: those of `Model.replace`, base,
             balance_inertia, meshes.
         menagerie: A menagerie folder to look the name up in.
-        taken: Parts of another side's file that stand in place of its own.
+        replaced_parts: Parts of another side's file that stand in place of its own.
         loaded: The Model that all of the above is of, where somebody loaded it, and perhaps changed
             it since; None where it is still to be loaded.
     """
@@ -56,7 +56,7 @@ class Side:
     defaults: Literal["model", "engine"] = "model"
     options: Mapping[str, OptionValue] = field(default_factory=dict)
     menagerie: str | None = None
-    taken: TakenParts | None = None
+    replaced_parts: ReplacedParts | None = None
     loaded: Model | None = field(default=None, repr=False, metadata={"json": False})
 
     @classmethod
@@ -75,14 +75,14 @@ class Side:
 
     @property
     def path(self) -> Path:
-        """Its file; raises as `models.resolve` does."""
+        """Return the path of its model file; raises as `models.resolve` does."""
         if self.loaded is not None:
             return self.loaded.path
         return resolve(self.model, self.menagerie)
 
     @property
     def label(self) -> str:
-        """As one types it, without folders: "so101@mujoco timestep=0.002"."""
+        """Return the side as one types it, without folders: "so101@mujoco timestep=0.002"."""
         options = (typed_option(name, value) for name, value in self.options.items())
         return " ".join([f"{without_folders(self.model)}@{self.chosen_backend()}", *options])
 
@@ -96,29 +96,35 @@ class Side:
         Raises:
             StateMachineError: As `load` does.
         """
-        wanted: dict[str, OptionValue | FreeBase] = {**options, **self.options}
+        all_options: dict[str, OptionValue | FreeBase] = {**options, **self.options}
         if base is not None:
-            wanted.setdefault("base", base)
+            all_options.setdefault("base", base)
         if self.loaded is not None:
-            return self._from_loaded(self.loaded, wanted)
+            return self._from_loaded(self.loaded, all_options)
         load_it = partial(self.chosen_backend().load_to_run, self.model, menagerie=self.menagerie)
-        if self.taken is None:
-            return load_it(**wanted)
-        read = {name: wanted.pop(name) for name in READ_OPTIONS if name in wanted}
-        model = self.taken.given_to(load_it(**read))
-        return model.replace(**wanted) if wanted else model
+        if self.replaced_parts is None:
+            return load_it(**all_options)
+        read = {name: all_options.pop(name) for name in READ_OPTIONS if name in all_options}
+        model = self.replaced_parts.apply_to(load_it(**read))
+        return model.replace(**all_options) if all_options else model
 
-    def _from_loaded(self, model: Model, wanted: dict[str, OptionValue | FreeBase]) -> Model:
+    def _from_loaded(self, model: Model, all_options: dict[str, OptionValue | FreeBase]) -> Model:
         """Return a loaded Model with the options that it does not have yet."""
-        if self.taken is not None:
-            model = self.taken.given_to(model)  # all else is as its file has it
+        if self.replaced_parts is not None:
+            model = self.replaced_parts.apply_to(model)  # all else is as its file has it
         else:
-            wanted = {name: wanted[name] for name in wanted if not _has(model, name, wanted[name])}
-        return model.replace(**wanted) if wanted else model
+            all_options = {
+                name: all_options[name]
+                for name in all_options
+                if not _has(model, name, all_options[name])
+            }
+        return model.replace(**all_options) if all_options else model
 
     def taking(self, parts: Sequence[str], of: Side, names: Mapping[str, str]) -> Side:
-        """Itself with some parts of another side's file; `names` as of `TakenParts`."""
-        return replace(self, taken=TakenParts(tuple(parts), of, names)) if parts else self
+        """Itself with some parts of another side's file; `names` as of `ReplacedParts`."""
+        return (
+            replace(self, replaced_parts=ReplacedParts(tuple(parts), of, names)) if parts else self
+        )
 
 
 def _has(model: Model, name: str, value: OptionValue | FreeBase) -> bool:
@@ -127,35 +133,36 @@ def _has(model: Model, name: str, value: OptionValue | FreeBase) -> bool:
 
 
 @dataclass(frozen=True)
-class TakenParts:
+class ReplacedParts:
     """Parts of a file that another file gets instead of its own.
 
     Attributes:
         parts: "actuators", "floor": the planes that are fixed to the world.
-        of: The side whose file has them.
-        names: Joints, bodies and sites of `of` that go by other names in the file that gets them.
+        source: The side whose file has them.
+        names: Joints, bodies and sites of `source` that go by other names in the file that gets
+            them.
     """
 
     parts: tuple[str, ...]
-    of: Side
+    source: Side
     names: Mapping[str, str] = field(default_factory=dict)
 
-    def given_to(self, model: Model) -> Model:
-        """A Model of the same engine and file that has them.
+    def apply_to(self, model: Model) -> Model:
+        """Return a Model of the same engine and file that has the parts of the other file.
 
         Raises:
             StateMachineError: It cannot be made.
         """
-        giver = load_to_run(self.of.model, menagerie=self.of.menagerie)
-        matched = match_models(giver, model, self.names)
+        source_model = load_to_run(self.source.model, menagerie=self.source.menagerie)
+        matched = match_models(source_model, model, self.names)
         names = {
-            "joint": _renamed(giver.joint_names, model.joint_names, matched.joints),
-            "body": _renamed(giver.body_names, model.body_names, matched.bodies),
-            "site": _renamed(giver.site_names, model.site_names, matched.sites),
+            "joint": _renamed(source_model.joint_names, model.joint_names, matched.joints),
+            "body": _renamed(source_model.body_names, model.body_names, matched.bodies),
+            "site": _renamed(source_model.site_names, model.site_names, matched.sites),
         }
         return model.with_compiled(
             raw_engine_of(DEFAULT).with_parts(
-                model.path, giver.path, self.parts, names, model.read_options
+                model.path, source_model.path, self.parts, names, model.read_options
             )
         )
 
@@ -189,8 +196,8 @@ def _without(
     side: Side, options: Mapping[str, OptionValue], common: Mapping[str, OptionValue]
 ) -> Side:
     """Return a side with those of some options that are not among the common ones."""
-    own = {name: value for name, value in options.items() if name not in common}
-    return replace(side, options=own)
+    side_options = {name: value for name, value in options.items() if name not in common}
+    return replace(side, options=side_options)
 
 
 @dataclass(frozen=True)
@@ -233,7 +240,7 @@ class Request:
 
     @property
     def is_traces(self) -> bool:
-        """Whether traces were named, not an experiment."""
+        """Tell whether traces were named, not an experiment."""
         return any(isinstance(what, Trace) or is_trace(what) for what in self.what)
 
     def traces(self) -> list[Trace]:
@@ -251,7 +258,7 @@ class Request:
 
     @property
     def words(self) -> list[str]:
-        """What is run, and the model if one is said, as one types them, without folders."""
+        """Return what is run, and the model if one is named, as one types them, without folders."""
         words = [word_of(what) for what in self.what]
         if self.model:
             words.append(without_folders(self.model))
@@ -259,31 +266,31 @@ class Request:
 
     @property
     def experiment(self) -> str:
-        """What is run, in a word: an experiment, a function, or the file of the first trace."""
+        """Return in a word what is run: an experiment, a function, or the file of a trace."""
         return word_of(self.what[0])
 
     @property
     def is_typed(self) -> bool:
-        """Whether all of it can be typed, and nothing is a function, a trace or a Model itself."""
+        """Tell whether a command line can ask it: no function, trace or Model is an object."""
         words = all(isinstance(what, str) for what in self.what)
         return words and all(side.loaded is None for side in self.sides)
 
     @property
     def labels(self) -> tuple[str, str]:
-        """What both sides are called; where no sides were said, their backends."""
+        """Return the labels of both sides; where no sides are named, those of the backends."""
         if self.sides:
             left, right = self.sides
             return numbered((left.label, right.label))
         return numbered(self.backends)
 
     @property
-    def taken(self) -> tuple[str, ...]:
-        """A line for each side that has parts of the other's file."""
+    def notes_on_parts(self) -> tuple[str, ...]:
+        """Return a line for each side that has parts of the other's file."""
         names = (("left", "right"), ("right", "left"))
         return tuple(
-            f"the {name} has the {listed(side.taken.parts)} of the {other}, not its own"
+            f"the {name} has the {listed(side.replaced_parts.parts)} of the {other}, not its own"
             for side, (name, other) in zip(self.sides, names, strict=False)
-            if side.taken
+            if side.replaced_parts
         )
 
     def call_periods(self, timesteps: tuple[float, float]) -> CallPeriods | None:
@@ -301,7 +308,7 @@ class Request:
         return call_periods(self.every, timesteps)
 
     def both_sides(self, model: str) -> Sequence[Side]:
-        """The two sides; where none were said, one model on the two backends.
+        """Return the two sides; where none are named, one model on the two backends.
 
         Args:
             model: The experiment's own, where none was said either.
@@ -315,7 +322,7 @@ class Request:
         ]
 
     def scenario(self) -> Scenario:
-        """What is run: an experiment of ours, or the function of the user's.
+        """Return the experiment that is run: one of ours, or the function of the user's.
 
         Raises:
             UnknownNameError: There is no such experiment.

@@ -14,7 +14,7 @@ class StageGap:
 
     Attributes:
         stage: Its name.
-        told: Whether both engines tell it.
+        is_available: Whether both engines tell it.
         reason: Why it cannot be compared; "" where it can.
         unit: Of the figures; "" where there are none.
         scale: Its usual size on the two sides [unit]: the median of its largest entry over the
@@ -27,11 +27,11 @@ class StageGap:
         where: The joint, body or pair to look at then.
         beyond: At how many moments it is beyond the tolerance, the floor and the null.
         first: The first of them [s]; None if there is none.
-        leads: At how many of them no earlier stage is, so that it has a cause of its own.
+        first_count: At how many of them no earlier stage is, so that it has a cause of its own.
     """
 
     stage: str
-    told: bool
+    is_available: bool
     reason: str = ""
     unit: str = ""
     scale: float = 0.0
@@ -43,18 +43,18 @@ class StageGap:
     where: str = ""
     beyond: int = 0
     first: float | None = None
-    leads: int = 0
+    first_count: int = 0
 
     @property
     @only_on_pages
     def limit(self) -> float:
-        """What does not count of the element that differs most [unit]."""
+        """Return what does not count of the element that differs most [unit]."""
         return max(self.tolerance, self.floor)
 
     @property
     @only_on_pages
     def of_usual(self) -> float | None:
-        """The largest difference, as a part of the usual size; None of what has none."""
+        """Return the largest difference as a part of the usual size; None where that is zero."""
         return self.worst / self.scale if self.scale else None
 
 
@@ -112,11 +112,11 @@ class OneStep:
     @property
     @only_on_pages
     def differing(self) -> tuple[StageGap, ...]:
-        """The stages that differ at any moment, in the order of a step."""
+        """Return the stages that differ at any moment, in the order of a step."""
         return tuple(gap for gap in self.stages if gap.beyond)
 
     @property
     @only_on_pages
     def is_exact(self) -> bool:
-        """Whether every figure is the same to the last bit."""
+        """Tell whether every figure is the same to the last bit."""
         return all(gap.worst == 0 for gap in self.stages)

@@ -61,14 +61,17 @@ class StageMeasure:
 
     @property
     def worst(self) -> tuple[int, int]:
-        """The moment and the element that differ most: of those that are beyond, if any are."""
+        """Return the row and the element of the largest difference.
+
+        Where differences are beyond the tolerance, only those are looked at.
+        """
         beyond = self.beyond
-        apart = np.where(beyond, self.apart, 0.0) if beyond.any() else self.apart
-        row, element = np.unravel_index(int(np.argmax(apart)), apart.shape)
+        gaps = np.where(beyond, self.apart, 0.0) if beyond.any() else self.apart
+        row, element = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         return int(row), int(element)
 
     def culprit(self, row: int) -> str:
-        """What to look at in a moment: the element that differs most, or where that comes from.
+        """Return the name of the element to look at in a row: the worst, or what moves it.
 
         A body that is elsewhere takes along all that hangs on it, so that the first one counts; a
         mass shows in the entries of every joint that carries it, so that the last of these counts.
@@ -114,9 +117,9 @@ def measures(
         depths = [side[:, :, :1] for side in contacts]
         forces = [side[:, :, 1:] for side in contacts]
         count = len(pairs)
-        found = StageColumn(FOUND, pairs, ["m"] * count)
+        detection = StageColumn(FOUND, pairs, ["m"] * count)
         force = StageColumn(FORCE, pairs, ["N"] * count)
-        by_unit += _by_unit(found, np.full(count, robot.length), *depths)
+        by_unit += _by_unit(detection, np.full(count, robot.length), *depths)
         by_unit += _by_unit(force, np.full(count, robot.force), *forces)
     # What is small beside the other forces, as the contact force of a run in which next to nothing
     # touches, is held against these, and accelerations against what forces give.
@@ -205,20 +208,20 @@ def _by_unit(
     """
     for unit in UNITS:
         places = [k for k, of in enumerate(column.units) if of == unit]
-        apart = _distances(left[:, places], right[:, places])
-        known = np.flatnonzero(np.isfinite(apart).all(axis=0))
-        if len(known):
+        gaps = _distances(left[:, places], right[:, places])
+        finite = np.flatnonzero(np.isfinite(gaps).all(axis=0))
+        if len(finite):
             null = np.nan_to_num(_distances(running[:, places], left[:, places]))
-            names = [column.names[places[k]] for k in known.tolist()]
+            names = [column.names[places[k]] for k in finite.tolist()]
             sizes = _sizes(column.stage, left[:, places], right[:, places])
             yield StageMeasure(
                 column.stage,
                 unit,
                 names,
-                apart[:, known],
-                null[:, known],
+                gaps[:, finite],
+                null[:, finite],
                 scale=_usual_size(sizes),
-                floors=floors[places][known],
+                floors=floors[places][finite],
             )
 
 
@@ -229,7 +232,10 @@ def _usual_size(sizes: Array) -> float:
 
 
 def _distances(left: Array, right: Array) -> Array:
-    """How far apart elements (n, k, size) are (n, k); NaN where one is not told."""
+    """Return the distances (n, k) of elements (n, k, size); NaN where one is unavailable.
+
+    Those of rotation matrices (size 9) are angles [rad].
+    """
     if left.shape[2] == 9:
         shape = *left.shape[:2], 3, 3
         return angle_between(left.reshape(shape), right.reshape(shape))
@@ -237,7 +243,10 @@ def _distances(left: Array, right: Array) -> Array:
 
 
 def _sizes(stage: str, left: Array, right: Array) -> Array:
-    """The largest of all elements (n,); of places their reach, of rotations one radian."""
+    """Return the size (n,) of the largest element at each moment.
+
+    That of places is the extent of all of them, that of rotations one radian.
+    """
     both = np.concatenate([left, right], axis=1)
     if both.shape[2] == 9:
         return np.ones(len(both))
@@ -247,5 +256,5 @@ def _sizes(stage: str, left: Array, right: Array) -> Array:
 
 
 def _largest_scale(rows: Sequence[StageMeasure], stages: Sequence[str], unit: str) -> float:
-    """The largest scale of some stages in a unit."""
+    """Return the largest scale of some stages that have a unit; 0 where none has it."""
     return max((m.scale for m in rows if m.stage in stages and m.unit == unit), default=0.0)

@@ -89,10 +89,10 @@ class StageReader:
         model = self._models[side]
         engine = raw_engine_of(model.backend)
         if engine.primes:
-            given = {name: np.zeros(model.nv) for name in before}
+            arrays = {name: np.zeros(model.nv) for name in before}
             for name, values in before.items():
-                given[name][self._dofs[side]] = values[self._dofs[1 - side]]
-            engine.prime(model, data, given)
+                arrays[name][self._dofs[side]] = values[self._dofs[1 - side]]
+            engine.prime(model, data, arrays)
         return engine.primes
 
     def step(self, side: int, data: Data, qpos: Array, qvel: Array) -> StepReading:
@@ -114,7 +114,7 @@ class StageReader:
         return StepReading([*values, rate[dofs, None]], contacts)
 
     def _read(self, side: int, data: Data, qpos: Array) -> list[Array]:
-        """All columns but the velocity update."""
+        """Return all columns of a side but the velocity update, each (k, size)."""
         model, dofs = self._models[side], self._dofs[side]
         mass = raw_engine_of(model.backend).mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
         forces = []
@@ -204,7 +204,10 @@ PairNames = tuple[Callable[[int, int], str], Sequence[int]]
 
 
 def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
-    """By geoms, where both Models have the same; else by bodies, called as on the left."""
+    """Return for each side a function that names a pair of keys, and the key of each geom.
+
+    Keys are geoms where both Models have the same; else bodies, named as on the left.
+    """
     left, right = matched.left, matched.right
     if left.geom_names == right.geom_names and np.array_equal(left.geom_bodyid, right.geom_bodyid):
         same: PairNames = ContactNames.of(left).geoms, range(left.ngeom)
@@ -225,7 +228,11 @@ def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
 
 
 def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], Ints]:
-    """The degrees of freedom of some joints, a name for each, and 1 for one that turns."""
+    """Return the degrees of freedom of some joints.
+
+    Returns:
+        Their numbers (k,), a name for each, and 1 (k,) for one that turns, else 0.
+    """
     labels = labels_of_joints(model.joint_names, model.jnt_type, model.jnt_bodyid, model.body_names)
     dofs, names, turns = [], [], []
     for joint in joints:

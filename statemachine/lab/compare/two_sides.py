@@ -25,12 +25,12 @@ from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.floating import Bases
 from ..runs.scenarios import SCENARIOS
 from .alike import (
-    called,
-    in_terms_of_right,
+    in_layout_of_right,
     named_as_left,
     same_commands,
+    with_model_file,
 )
-from .labels import files_apart, labels_of, lacking
+from .labels import files_apart, labels_of, lines_on_unmatched
 from .matched import Matched
 from .matching import missing_parts
 from .prepared_sides import prepare_sides
@@ -63,7 +63,7 @@ class SidesRun:
         path: The file of both sides; None if they have two, or were not run here.
         bases: Whether the base of either side floats; None where a run was not made here.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
-        said: What a reader should know of how it was run.
+        notes: What a reader should know of how it was run.
     """
 
     left: Trace
@@ -75,18 +75,18 @@ class SidesRun:
     path: Path | None = None
     bases: Bases | None = None
     missing: tuple[tuple[str, str], ...] = ()
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def traces(self) -> tuple[Trace, Trace]:
-        """The runs of the left and the right."""
+        """Return the traces of the left and the right."""
         return self.left, self.right
 
     @cached_property
     def robot(self) -> RobotScale | None:
-        """How heavy and how large the robot is, of two sides the smaller; None if not known.
+        """Return the weight and the size of the robot, of two sides the smaller; None if not known.
 
-        Of a recorded run the file is read again, if it is here.
+        Of a recorded run the model file is read again, if it is here.
         """
         scales: list[RobotScale] = []
         for trace, rerun in zip(self.traces, self.reruns, strict=True):
@@ -99,13 +99,13 @@ class SidesRun:
 
     @property
     def unmatched(self) -> tuple[str, ...]:
-        """What could not be matched, and what was matched by more than its name."""
+        """Return lines about what could not be matched, or was matched by more than its name."""
         if self.matched is None:
             return ()
         only = self.matched.only
         if self.bases is not None and self.bases.differ:
             only = self.matched.only_beside_bases  # the bases have a line of their own
-        lines = [*lacking(only, labels_of(self.left.header, self.right.header).long)]
+        lines = [*lines_on_unmatched(only, labels_of(self.left.header, self.right.header).long)]
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
@@ -138,7 +138,7 @@ def run_sides(request: Request | str, progress: Progress = no_progress) -> Sides
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
     run = _run_both(request, prepared.reruns, prepared.matched, progress)
-    return replace(run, bases=prepared.bases, said=prepared.notes)
+    return replace(run, bases=prepared.bases, notes=prepared.notes)
 
 
 def _check_what(request: Request) -> None:
@@ -170,15 +170,15 @@ def _run_both(
     commands = _loop(request, left_run, right_run, matched)
     right_runs = [right_run]
     if commands == "its own":
-        left_for_right = in_terms_of_right(left_run, right_run, matched)
+        left_for_right = in_layout_of_right(left_run, right_run, matched)
         in_open_loop = rerun_of_trace(left_for_right, right, reruns[1].defaults, reruns[1].options)
         right_runs.append(in_open_loop.record(progress=progress_of_stage(progress, 0.7, 0.3)))
     missing = missing_parts(left, right, reruns[0].options)
     same_name = left_run.header.provenance.model_file == right_run.header.provenance.model_file
     if left.path != right.path and same_name:  # as much of the paths as tells them apart
         left_file, right_file = files_apart(left.path.parts, right.path.parts)
-        left_run = called(left_run, left_file)
-        right_runs = [called(run, right_file) for run in right_runs]
+        left_run = with_model_file(left_run, left_file)
+        right_runs = [with_model_file(run, right_file) for run in right_runs]
     if matched is not None:
         pairs = [named_as_left(left_run, run, matched) for run in right_runs]
         left_run, right_runs = pairs[0][0], [run for _, run in pairs]
@@ -200,7 +200,7 @@ def _loop(request: Request, left: Trace, right: Trace, matched: Matched | None) 
         return "recorded"
     if left.header.rewritten or right.header.rewritten:
         return "more than ctrl"
-    alike = same_commands(in_terms_of_right(left, right, matched), right)
+    alike = same_commands(in_layout_of_right(left, right, matched), right)
     return "the same" if alike else "its own"
 
 
@@ -226,13 +226,17 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
         options=dict(side.options),
         progress=progress,
     )
-    said = f"the ctrl of {request.experiment} was played on {backend}, from the state it starts in"
-    return SidesRun(traces[0], played, played, said=(said,))
+    note = f"the ctrl of {request.experiment} was played on {backend}, from the state it starts in"
+    return SidesRun(traces[0], played, played, notes=(note,))
 
 
 def _with_recorded(request: Request, progress: Progress) -> SidesRun:
-    """An experiment of which the package has a recorded run of an engine that is not here."""
-    scenario, traces, reruns, said = request.scenario(), [], [], []
+    """Compare an experiment on an engine that is not installed, by its recorded run.
+
+    Raises:
+        MissingEngineError: There is no such recorded run, or neither engine is installed.
+    """
+    scenario, traces, reruns, notes = request.scenario(), [], [], []
     for side in request.both_sides(scenario.model):
         try:
             rerun = rerun_of(scenario, side.load(), defaults=side.defaults)
@@ -244,17 +248,17 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
                 rerun, trace = None, read_shipped_trace(scenario.name, side.engine, side.defaults)
             except StateMachineError:
                 raise error from None
-            said.append(f"{error}; its side is the recorded run that comes with the package")
+            notes.append(f"{error}; its side is the recorded run that comes with the package")
         traces.append(trace)
         reruns.append(rerun)
     if not any(reruns):
         raise MissingEngineError("no engine of the two is installed here", engine=DEFAULT)
     left, right = traces
-    return SidesRun(left, right, right, reruns=(reruns[0], reruns[1]), said=tuple(said))
+    return SidesRun(left, right, right, reruns=(reruns[0], reruns[1]), notes=tuple(notes))
 
 
 def _command(request: Request, backend: BackendChoice) -> str:
-    """The command that records one side of an experiment; "" where it cannot say that."""
+    """Return the command that records one side of an experiment; "" where none can."""
     if request.sides or request.every != 1 or not request.is_typed:
         return ""
     if {*request.options} - {"timestep"}:

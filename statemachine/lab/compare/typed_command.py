@@ -126,8 +126,8 @@ def _words_of_run(run: Request, folders: bool) -> list[str]:
 def _words_of_parts(sides: Sequence[Side]) -> list[str]:
     """Return the options by which one side has parts of the other's file."""
     words: list[str] = []
-    for side, giver in zip(sides, ("right", "left"), strict=False):
-        if side.taken is not None:
-            for part in side.taken.parts:
-                words += [f"--{part}", giver]
+    for side, source in zip(sides, ("right", "left"), strict=False):
+        if side.replaced_parts is not None:
+            for part in side.replaced_parts.parts:
+                words += [f"--{part}", source]
     return words

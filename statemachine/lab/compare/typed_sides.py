@@ -63,7 +63,7 @@ def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side
 
 
 def _split_options(word: str) -> tuple[str, list[str]]:
-    """A side's word, and the options behind it; a file's name may have spaces."""
+    """Return a side's word and the options behind it; a file's name may have spaces."""
     texts: list[str] = []
     option = _LAST_OPTION.search(word)
     while option is not None and not Path(word).exists():
@@ -137,7 +137,7 @@ def _option(text: str) -> tuple[str, OptionValue]:
 def split_words(
     words: Sequence[str], menagerie: str | None = None
 ) -> tuple[tuple[str, ...], tuple[Side, ...]]:
-    """What is to be run, and the sides: two, or one of a model without an engine, or none.
+    """Return what is to be run, and the sides: two, or one of a model without an engine, or none.
 
     Args:
         words: As typed behind `compare`, at least one.
@@ -199,13 +199,13 @@ def _check_number_of_sides(
     Raises:
         BadInputError: There are too many, or too few.
     """
-    alone = _is_model_alone(words, sides)
-    if len(what) > 1 and sides and not alone:
+    is_model_alone = _is_model_alone(words, sides)
+    if len(what) > 1 and sides and not is_model_alone:
         raise BadInputError("two traces have their own sides; a model is one FILE")
     if len(sides) > 2:
         labels = listed([side.label for side in sides])
         raise BadInputError(f"{len(sides)} sides, {labels}: compare takes two")
-    if len(sides) == 1 and not alone:
+    if len(sides) == 1 and not is_model_alone:
         typed = command(["statemachine", "compare", what[0], *words, _on_other_engine(sides[0])])
         raise BadInputError(f"one side only: name the other, as in: {typed}")
     if not sides and is_function(what[0]):
@@ -225,12 +225,12 @@ def _on_other_engine(side: Side) -> str:
 
 
 def _names_file(word: str) -> bool:
-    """Whether a word names a model's file, by its suffix."""
+    """Tell whether a word names a model's file, by its suffix."""
     return Path(word.split("@", maxsplit=1)[0]).suffix.lower() in MODELS
 
 
 def _is_side(word: str, menagerie: str | None) -> bool:
-    """Whether a word is meant as a side: it names a model, or reads as if it did."""
+    """Tell whether a word is meant as a side: it names a model, or reads as if it did."""
     if _names_file(word):
         return True
     try:

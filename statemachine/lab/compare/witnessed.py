@@ -81,7 +81,10 @@ def witness(left: Trace, right: Trace, path: Path | None = None) -> WitnessResul
 
 
 def _readable(file: Path, header: Header, site: str) -> Kinematics:
-    """The robot from a scene's file, or from one that it includes, or from its numbers."""
+    """Return the kinematics of a robot, by the first of its files that has the joints and the site.
+
+    These are the scene's file and what it includes; else the compiled numbers are read.
+    """
     for path in model_files(file):
         try:
             kinematics = Kinematics(path)

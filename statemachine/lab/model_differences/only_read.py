@@ -101,7 +101,7 @@ def _enter_keyframe(
         listing.enter("further", element, "time", times, Meaning(0.5), "s")
     for part in ("qpos", "qvel", "ctrl"):
         theirs = getattr(right, part)
-        moved = matched.moved(part, getattr(left, part), theirs)
+        moved = matched.to_right(part, getattr(left, part), theirs)
         off = np.abs(moved - theirs)
         if off.max(initial=0.0) > _SAME:
             k = int(off.argmax())

@@ -113,7 +113,7 @@ class _Field(NamedTuple):
 class CallRecorder:
     """Recorder of the calls of engines' functions while they are `replaced`; one in a process."""
 
-    _active = False
+    is_active = False  # whether one of this process has replaced the functions
 
     def __init__(self, watches: Mapping[str, CallWatch]) -> None:
         """Take the watches by engine."""
@@ -124,12 +124,12 @@ class CallRecorder:
     @contextmanager
     def replaced(self) -> Iterator[None]:
         """Let the functions tell this recorder that they are called, until the end of the block."""
-        if CallRecorder._active:
+        if CallRecorder.is_active:
             raise BadInputError("a run that is recorded cannot record another")
         with ExitStack() as restore:
-            restore.callback(setattr, CallRecorder, "_active", False)
+            restore.callback(setattr, CallRecorder, "is_active", False)
             restore.callback(setattr, self, "_listening", False)
-            CallRecorder._active = True
+            CallRecorder.is_active = True
             for engine, watch in self._watches.items():
                 for owner, attribute, function in watch.functions():
                     original = vars(owner)[attribute]  # as it lies there: of a class, a descriptor

@@ -76,33 +76,33 @@ class CompareFigures(PageContent):
 
     @property
     def left(self) -> str:
-        """What the left side is called in tables."""
+        """Return the short label of the left side, for tables."""
         return short_labels(self.comparison)[0]
 
     @property
     def right(self) -> str:
-        """What the right side is called in tables."""
+        """Return the short label of the right side, for tables."""
         return short_labels(self.comparison)[1]
 
     @property
-    def says(self) -> str:
-        """What the experiment does; "" where nobody says."""
-        return self.comparison.left.trace.header.says
+    def description(self) -> str:
+        """Return a line on what the experiment does; "" where its header has none."""
+        return self.comparison.left.trace.header.description
 
     @property
     def window(self) -> float:
-        """What the figures of the end are a mean over [s]."""
+        """Return the time at the end over which the final figures are a mean [s]."""
         return SETTLED * self.comparison.until
 
     @property
     def figures(self) -> Table:
-        """A row for each quantity of the motion, and for the energy."""
+        """Return a table with a row for each quantity of the motion, and for the energy."""
         motion = [a for a in self.comparison.agreements if a.kind not in CONTACTS]
         return _figure_table(motion, self.comparison, self.floor)
 
     @property
     def contacts(self) -> Table:
-        """A row for each quantity of contacts, the farthest apart first."""
+        """Return a table with a row for each quantity of contacts, the farthest apart first."""
         contacts = [a for a in self.comparison.agreements if a.kind in CONTACTS]
         contacts.sort(
             key=lambda agreement: (agreement.verdict == "agrees", -agreement.tolerances())
@@ -111,7 +111,7 @@ class CompareFigures(PageContent):
 
     @property
     def pressing(self) -> Table:
-        """How hard each pair of bodies presses."""
+        """Return a table of the normal force between each pair of bodies."""
         return pressing_table(self.comparison)
 
     @property
@@ -121,7 +121,7 @@ class CompareFigures(PageContent):
 
     @property
     def perturbed(self) -> PerturbedRuns | None:
-        """The runs that rounding was looked for with."""
+        """Return what the perturbed runs measured; None where none was made."""
         return None if self.floor is None else _perturbed_runs(self.comparison, self.floor)
 
 
@@ -138,37 +138,40 @@ class CompareSides(PageContent):
 
     @property
     def missing(self) -> Sequence[MissingPart]:
-        """What one side has nothing of."""
+        """Return what one side has nothing of, and the other has."""
         return self.result.finding.missing
 
     @property
     def remarks(self) -> Sequence[str]:
-        """What was paired, what one side alone has, and what else a reader should know."""
+        """Return remarks on pairs of names, on what one side alone has, and other notes."""
         return remarks(self.result.run, self.result.comparison)
 
     @property
     def loop(self) -> Loop | None:
-        """What both sides were told; None where an experiment of ours told both the same."""
+        """Return where the commands of both sides come from.
+
+        None where an experiment of ours commands both the same.
+        """
         return self.result.run.commands if self.result.request.names_sides else None
 
     @property
     def is_off(self) -> bool:
-        """Whether the actuators are off on both sides."""
+        """Tell whether the actuators are off on both sides."""
         return without_actuation(self.result.run.traces)
 
     @property
     def commands(self) -> Table:
-        """What each actuator is commanded."""
+        """Return a table of the command of each actuator."""
         return commands_table(self.result.comparison)
 
     @property
     def loops(self) -> Table:
-        """The figures of the closed and the open loop."""
+        """Return a table of the figures of the closed and the open loop."""
         return loops_table(self.result.comparison, self.result.played)
 
     @property
     def emulated(self) -> Sequence[EmulatedSide]:
-        """What each backend computes for its engine."""
+        """Return for each side what its backend computes in place of its engine."""
         return emulated_sides(self.result.comparison)
 
 
@@ -187,27 +190,27 @@ class CompareSources(PageContent):
 
     @property
     def left(self) -> str:
-        """What the left side is called."""
+        """Return the short label of the left side, for tables."""
         return short_labels(self.comparison)[0]
 
     @property
     def right(self) -> str:
-        """What the right side is called."""
+        """Return the short label of the right side, for tables."""
         return short_labels(self.comparison)[1]
 
     @property
     def events(self) -> Table:
-        """What happens when."""
+        """Return a table of what happens when."""
         return events_table(self.comparison)
 
     @property
     def provenance(self) -> Table:
-        """What made both runs."""
+        """Return a table of what made both runs."""
         return provenance(self.comparison)
 
     @property
     def reads_numbers(self) -> bool:
-        """Whether the third party computed from what the file was compiled to."""
+        """Tell whether the third party computed from the numbers that the file was compiled to."""
         return self.witness is not None and self.witness.grade == SAME_READING
 
 

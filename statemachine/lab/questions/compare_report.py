@@ -82,12 +82,12 @@ class CompareReport(PageContent):
 
     @property
     def total(self) -> int:
-        """How many quantities there are."""
+        """Return the number of quantities."""
         return len(self.runs.comparison.agreements)
 
     @property
     def uncharted(self) -> int:
-        """How many quantities have no chart."""
+        """Return the number of quantities that have no chart."""
         return len(self.runs.comparison.curves) - len(self.runs.charts)
 
 
@@ -201,14 +201,14 @@ def _both_runs(result: CompareResult, finding: Finding) -> BothRuns:
     charts = charts_of(comparison, result.floor)
     lead = [k for k, chart in enumerate(charts) if chart.curve.name == finding.lead.name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
-    spoken = tuple(dict.fromkeys(lead))[:_SPOKEN]
+    named_first = tuple(dict.fromkeys(lead))[:_SPOKEN]
     return BothRuns(
         comparison.left.trace.header.experiment,
         comparison=comparison,
         start=finding.lead.at,
         events=tuple(events_of(comparison)),
         charts=charts,
-        lead=spoken if spoken else (0,),
+        lead=named_first if named_first else (0,),
     )
 
 

@@ -39,12 +39,12 @@ class _Verdict:
 
     @property
     def lead(self) -> Agreement:
-        """The quantity that is farthest beyond its tolerance, or nearest to it."""
+        """Return the quantity that is farthest beyond its tolerance, or nearest to it."""
         return self.finding.lead
 
     @property
     def lead_name(self) -> str:
-        """What that is called in a sentence."""
+        """Return the name of that quantity, as a sentence has it."""
         return _named(self.lead)
 
     @property
@@ -61,23 +61,29 @@ class DifferVerdict(_Verdict, PageContent):
 
     @property
     def bodies(self) -> str:
-        """The two bodies of a first touch, where the lead is one."""
+        """Return the two bodies of a first touch, where the lead is one."""
         return _short(self.lead.name.partition(", ")[0])
 
     @property
     def is_number(self) -> bool:
-        """Whether the lead has a largest difference: it may be no number at some moments."""
+        """Tell whether the lead has a largest difference: it may be NaN at some moments."""
         return self.lead.max == self.lead.max
 
     @property
     def noticed_name(self) -> str | None:
-        """What one would see apart, in a sentence; None for nothing beside the lead."""
+        """Return the name of the quantity that one would see apart, as a sentence has it.
+
+        None where that is the lead, or there is none.
+        """
         noticed = self.finding.noticed
         return None if noticed is None else _named(noticed)
 
     @property
     def event(self) -> tuple[str, str] | None:
-        """The body that touches another when the runs diverge, and the other."""
+        """Return the body that touches another when the runs diverge, and the other.
+
+        None where nothing touches then.
+        """
         at = self.finding.divergence
         if at is None or not at.body:
             return None
@@ -92,7 +98,7 @@ class BasesVerdict(_Verdict, PageContent):
 
     @property
     def bases(self) -> Bases:
-        """Whether the base of each side floats."""
+        """Return whether the base of each side floats."""
         return self.comparison.bases
 
 
@@ -104,12 +110,12 @@ class AgreeVerdict(_Verdict, PageContent):
 
     @property
     def moved(self) -> bool:
-        """Whether a coordinate moved, and not a force or the energy alone."""
+        """Tell whether a coordinate moved, and not only a force or the energy."""
         return self.comparison.motion.moved
 
     @property
     def extents(self) -> list[str]:
-        """How far both sides move at most."""
+        """Return the largest motion of both sides, a phrase for each unit."""
         return extents_of(self.comparison.motion)
 
 
@@ -121,12 +127,12 @@ class EndedVerdict(_Verdict, PageContent):
 
     @property
     def ended(self) -> EarlyEnd:
-        """The run that ended first."""
+        """Return the run that ended first."""
         return min(self.finding.ended, key=lambda early_end: early_end.time)
 
     @property
     def who(self) -> str:
-        """What that side is called."""
+        """Return the label of the side that ended first."""
         return (self.left, self.right)[self.ended.side]
 
     @property
@@ -136,12 +142,12 @@ class EndedVerdict(_Verdict, PageContent):
 
     @property
     def other(self) -> str | None:
-        """What the other side is called, where its run ended early, too."""
+        """Return the label of the other side, where its run ended early, too; else None."""
         return (self.right, self.left)[self.ended.side] if len(self.finding.ended) > 1 else None
 
     @property
     def first(self) -> str | None:
-        """The quantity that leaves its tolerance first; None for none."""
+        """Return the name of the quantity that leaves its tolerance first; None where none does."""
         return None if self.divergence is None else _short(name_of(self.divergence.quantity))
 
 
@@ -158,12 +164,12 @@ class StillVerdict(_Verdict, PageContent):
 
     @property
     def motion(self) -> MotionExtent:
-        """How far both sides move."""
+        """Return the largest motion of both sides."""
         return self.comparison.motion
 
     @property
     def extents(self) -> list[str]:
-        """How far both sides move at most."""
+        """Return the largest motion of both sides, a phrase for each unit."""
         return extents_of(self.motion)
 
 

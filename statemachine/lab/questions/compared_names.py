@@ -81,9 +81,9 @@ def _without_common(names: Sequence[str], width: int) -> list[str]:
         too_long = max(len("".join(of_name)) for of_name in parts) - width
         if len(text) < 2 or too_long <= 0:
             break
-        kept = text[: max(0, len(text) - too_long - 1)]
+        beginning = text[: max(0, len(text) - too_long - 1)]
         for of_name in parts:
-            of_name[first : last + 1] = [f"{kept}…", *[""] * (last - first)]
+            of_name[first : last + 1] = [f"{beginning}…", *[""] * (last - first)]
     return ["".join(of_name) for of_name in parts]
 
 

@@ -72,20 +72,20 @@ class ComparePage(PageContent):
 
     @property
     def experiment(self) -> str:
-        """What was run."""
+        """Return the name of the experiment, function or trace that was compared."""
         experiment = self.result.comparison.left.trace.header.experiment
         return _in_title(Path(experiment).name)
 
     @property
     def file(self) -> str | None:
-        """The file of both sides; None where they have two."""
+        """Return the model file of both sides; None where they have two."""
         traces = traces_of(self.result.comparison)
         left, right = (trace.header.provenance.model_file for trace in traces)
         return _in_title(left) if left == right else None
 
     @property
     def sides(self) -> tuple[str, str] | None:
-        """What the sides are called, where the verdict calls them left and right alone."""
+        """Return both labels, where the verdict has only "the left" and "the right"; else None."""
         comparison = self.result.comparison
         if sentence_labels(comparison)[0] != "the left":
             return None
@@ -94,44 +94,44 @@ class ComparePage(PageContent):
 
     @property
     def moments(self) -> int:
-        """How many moments are compared."""
+        """Return the number of moments that are compared."""
         return self.result.comparison.moments
 
     @property
     def gap_of_moments(self) -> float | None:
-        """How far apart these are [s], where both sides have others between them; else None."""
+        """Return the time between two compared moments [s]; None where that is about one step."""
         return self.result.comparison.gap_of_moments
 
     @property
     def steps(self) -> tuple[str, str]:
-        """The timestep of each side."""
+        """Return the timestep of each side, in milliseconds."""
         left, right = traces_of(self.result.comparison)
         return milliseconds(left.timestep), milliseconds(right.timestep)
 
     @property
     def bases(self) -> Bases:
-        """Whether the base of each side floats, and what of that was taken over."""
+        """Return whether the base of each side floats, and what of it was taken over."""
         run = self.result.run
         return self.result.comparison.bases if run.bases is None else run.bases
 
     @property
     def missing(self) -> list[str]:
-        """What one side has nothing of."""
+        """Return the parts that one side has nothing of."""
         return [missing.part for missing in self.result.finding.missing]
 
     @property
     def until(self) -> float:
-        """How long the comparison is [s]."""
+        """Return the last moment that is compared [s]."""
         return self.result.comparison.until
 
     @property
     def window(self) -> float:
-        """What the figures of the end are a mean over [s]."""
+        """Return the time at the end over which the final figures are a mean [s]."""
         return SETTLED * self.until
 
     @property
     def total(self) -> int:
-        """How many quantities there are."""
+        """Return the number of quantities."""
         return len(self.result.comparison.agreements)
 
 
@@ -145,10 +145,10 @@ def page(result: CompareResult, details: bool = False) -> Page:
     """
     if details:
         return _with_rows(result, WORST, details_of(result))
-    return first_that_fits(_ever_shorter(result))
+    return first_that_fits(_shorter_pages(result))
 
 
-def _ever_shorter(result: CompareResult) -> Iterator[Page]:
+def _shorter_pages(result: CompareResult) -> Iterator[Page]:
     """Yield the page with ever fewer rows, then with a shorter command, too.
 
     A command that can be copied is worth some rows.
@@ -188,9 +188,9 @@ def _with_rows(
     )
     headline = headline_of(finding, comparison, result.instead)
     frame = base_frame_blocks(content.bases.frame)
-    called = call_periods_blocks(periods)
+    call_periods_note = call_periods_blocks(periods)
     state = written_state_blocks(comparison.left.trace, comparison.right.trace)
-    blocks = [*state, *called, *frame, *_known_changes(result), *render_blocks(content)]
+    blocks = [*state, *call_periods_note, *frame, *_known_changes(result), *render_blocks(content)]
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
 
 
@@ -219,7 +219,7 @@ def side_counts(result: CompareResult) -> SideCounts:
         if side.trace.header.defaults == "model":
             emulated += len(side.trace.header.provenance.emulated)
     # Each pair has a remark of its own.
-    notes = len(run.said) + len(comparison.notes) + max(0, remarks - by_place)
+    notes = len(run.notes) + len(comparison.notes) + max(0, remarks - by_place)
     return SideCounts(by_place, unmatched, emulated, notes)
 
 

@@ -55,116 +55,119 @@ class ConvergencePage(PageContent):
 
     @property
     def left(self) -> str:
-        """What the left side is called."""
+        """Return the label of the left side."""
         return self.limits.labels[0]
 
     @property
     def right(self) -> str:
-        """What the right side is called."""
+        """Return the label of the right side."""
         return self.limits.labels[1]
 
     @property
     def holds(self) -> bool:
-        """Whether something was compared, and every gap vanishes."""
+        """Tell whether something was compared, and every gap vanishes."""
         return self.limits.vanishes and not self.limits.is_still
 
     @property
     def state(self) -> GapState:
-        """What becomes of the gap."""
+        """Return in a word what becomes of the gap with finer steps."""
         return self.limits.state
 
     @property
     def still(self) -> str:
-        """What is said where nothing moved."""
+        """Return the phrase for runs in which nothing moved."""
         return nothing_moved(self.limits.motion)
 
     @property
     def until_touch(self) -> TouchState:
-        """Whether the gap begins with the first touch."""
+        """Return what is left of the gap before the first touch."""
         return self.limits.until_touch
 
     @property
     def lead(self) -> GapLimit:
-        """The quantity that is told first."""
+        """Return the quantity that is named first."""
         return self.limits.lead
 
     @property
     def name(self) -> str:
-        """What the quantity that is told first is called."""
+        """Return the name of the quantity that is named first, as a page has it."""
         return name_of(self.limits.lead.name)
 
     @property
     def counts(self) -> list[str]:
-        """How many gaps have each verdict."""
-        by_verdict = grouped((limit.verdict, limit) for limit in self.limits.whole)
+        """Return each verdict, with the number of gaps that have it."""
+        by_verdict = grouped((limit.verdict, limit) for limit in self.limits.whole_run)
         return [f"{verdict} {len(limits)}" for verdict, limits in by_verdict.items()]
 
     @property
     def steps(self) -> list[str]:
-        """The engines' steps as given, each once."""
+        """Return the timesteps of both engines as they are without halving, each once."""
         return list(dict.fromkeys(milliseconds(step, 3) for step in self.limits.steps))
 
     @property
-    def called(self) -> list[Block]:
-        """How often a function is called on both sides, where that is not the same."""
+    def call_periods_note(self) -> list[Block]:
+        """Return a warning where a function is called at different intervals on the two sides."""
         return call_periods_blocks(self.call_periods)
 
     @property
     def asks_function(self) -> bool:
-        """Whether a function of the user's commands."""
+        """Tell whether a function of the user's is the controller."""
         return self.call_periods is not None
 
     @property
     def periods_differ(self) -> bool:
-        """Whether a command holds for another time on each side."""
+        """Tell whether a command holds for another time on each side."""
         return self.period_left != self.period_right
 
     @property
     def period_left(self) -> str:
-        """For how long a command holds on the left."""
+        """Return the time for which a command holds on the left, in milliseconds."""
         return milliseconds(self.limits.periods[0], 3)
 
     @property
     def period_right(self) -> str:
-        """For how long a command holds on the right."""
+        """Return the time for which a command holds on the right, in milliseconds."""
         return milliseconds(self.limits.periods[1], 3)
 
     @property
     def longest_period(self) -> float:
-        """The longer time for which a command holds [s]."""
+        """Return the longer time for which a command holds [s]."""
         return max(self.limits.periods)
 
     @property
     def before(self) -> Table:
-        """The gaps until the first touch; without rows where nothing touches."""
+        """Return a table of the gaps until the first touch; without rows where nothing touches."""
         touch = self.limits.touch
         if touch is None:
             return _limits_table((), "")
         title = f"The gap with finer steps, before the first touch at {short_time(touch)}"
-        return _limits_table(self.limits.before, title)
+        return _limits_table(self.limits.before_touch, title)
 
     @property
     def whole(self) -> Table:
-        """The gaps over the whole run."""
-        return _limits_table(self.limits.whole, "The gap with finer steps, over the whole run")
+        """Return a table of the gaps over the whole run."""
+        return _limits_table(self.limits.whole_run, "The gap with finer steps, over the whole run")
 
     @property
     def farthest(self) -> GapLimit:
-        """The quantity that is farthest apart with the steps as given, of the first's unit."""
-        limits = self.limits.whole
+        """Return the quantity that is farthest apart with the timesteps that the sides have.
+
+        Looked at are quantities with the unit of the first one.
+        """
+        limits = self.limits.whole_run
         alike = [limit for limit in limits if limit.unit == limits[0].unit]
         return max(alike, key=lambda limit: limit.as_given)
 
     @property
     def farthest_name(self) -> str:
-        """What that quantity is called."""
+        """Return the name of that quantity, as a page has it."""
         return name_of(self.farthest.name)
 
     @property
     def most_rounding(self) -> list[str]:
-        """The largest gap that is rounding, in each unit."""
+        """Return the largest gap that is rounding, in each unit."""
         largest: dict[str, float] = {}
-        for limit in self.limits.whole:
+        for limit in self.limits.whole_run:
             if limit.verdict == "rounding":
                 largest[limit.unit] = max(*limit.gaps, largest.get(limit.unit, 0.0))
         return [quantity(gap, unit) for unit, gap in largest.items()]
@@ -177,7 +180,7 @@ def page(result: ConvergeResult, details: bool = False) -> Page:
         result: What becomes of each gap.
         details: Whether every gap is shown, and those before the first touch.
     """
-    gaps = _worst_first(result.whole)
+    gaps = _worst_first(result.whole_run)
     if details:
         return _page(result, (), details=True)
     return first_screen(lambda rows: _page(result, gaps[:rows]), len(gaps))
@@ -188,7 +191,7 @@ def _page(result: ConvergeResult, worst: Sequence[GapLimit], details: bool = Fal
     run = result.request.run
     periods = run.call_periods(result.periods)
     next_step = _next_step(result, run, periods)
-    more = 0 if details else len(_worst_first(result.whole)) - len(worst)
+    more = 0 if details else len(_worst_first(result.whole_run)) - len(worst)
     content = ConvergencePage(
         experiment=run.experiment,
         limits=result,
@@ -210,7 +213,7 @@ def _worst_first(limits: Sequence[GapLimit]) -> list[GapLimit]:
     units = list(dict.fromkeys(limit.unit for limit in limits))
 
     def place(limit: GapLimit) -> tuple[int, bool, int, float]:
-        is_other = not QUANTITIES[limit.kind].own
+        is_other = not QUANTITIES[limit.kind].is_coordinate
         return (
             _WORST_FIRST.index(limit.verdict),
             is_other,
@@ -276,7 +279,7 @@ def _next_command(
     match next_step:
         case "same period":
             return typed_command(run).lines("--converge")
-        case "why" if QUANTITIES[limits.lead.kind].own:
+        case "why" if QUANTITIES[limits.lead.kind].is_coordinate:
             return typed_command(run).lines("--why", "--quantity", name_of(limits.lead.name))
         case "why":
             return typed_command(run).lines("--why")

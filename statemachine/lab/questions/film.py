@@ -60,7 +60,7 @@ class Timing:
 
     @property
     def count(self) -> int:
-        """How many pictures."""
+        """Return the number of pictures, at least 1."""
         return max(1, math.ceil(self.seconds * self.fps - 1e-6))
 
     @property
@@ -70,7 +70,7 @@ class Timing:
 
     @property
     def milliseconds(self) -> list[int]:
-        """How long each is shown: together the whole of simulated time."""
+        """Return how long each picture is shown [ms]: together the whole of simulated time."""
         ends = np.append(np.arange(self.count) / self.fps, self.seconds)
         return np.diff(np.round(1000 * ends)).astype(int).tolist()
 
@@ -165,7 +165,7 @@ def write_film(
 
 
 def timing_of(traces: Sequence[Trace]) -> Timing:
-    """The timing of a film of what all traces have.
+    """Return the timing of a film of the time that all traces have.
 
     Raises:
         BadInputError: There would be too many pictures.
@@ -210,9 +210,9 @@ def frames(
 
 
 def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
-    """The poses of a trace at times (n,), counted from its start: each of the nearest row.
+    """Return the poses of a trace at times (n,) [s] from its start, each of the nearest row.
 
-    A trace without poses has them from its qpos.
+    The poses of a trace that has none are computed from its qpos.
 
     Raises:
         TraceError: The model has other bodies than the trace, or a pose is not a number.
@@ -226,10 +226,10 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
     if "xpos" not in trace or "xquat" not in trace:
         return Motion(drawing_of(model), *poses_through(model, trace.qpos[rows]))
     xpos, xquat = trace["xpos"][rows], trace["xquat"][rows]
-    strange = ~(np.isfinite(xpos).all((1, 2)) & np.isfinite(xquat).all((1, 2)))
-    if strange.any():
+    not_finite = ~(np.isfinite(xpos).all((1, 2)) & np.isfinite(xquat).all((1, 2)))
+    if not_finite.any():
         raise TraceError(
-            f"from {times[int(np.argmax(strange))]:.3g} s on the trace has no poses of the "
+            f"from {times[int(np.argmax(not_finite))]:.3g} s on the trace has no poses of the "
             "bodies that are numbers: it cannot be drawn"
         )
     return Motion(drawing_of(model), xpos, xquat)
@@ -258,7 +258,7 @@ _CLOSE = 0.07  # metres about a body that is looked at from close by
 
 
 def webp(picture: RobotPicture) -> bytes:
-    """The picture as WebP, animated if it has several poses.
+    """Return the picture as WebP, animated if it has several poses.
 
     Raises:
         MissingEngineError: Nothing here can draw, or Pillow is not installed.
@@ -282,7 +282,7 @@ def webp(picture: RobotPicture) -> bytes:
 
 
 def drawn_picture(picture: Picture) -> tuple[bytes, str]:
-    """A picture of a page, and its kind: "svg+xml", or "webp" of a robot.
+    """Draw a picture of a page; return its bytes and kind: "svg+xml", or "webp" of a robot.
 
     Raises:
         MissingEngineError: What draws it is not installed.
@@ -302,7 +302,7 @@ def inline(picture: Picture) -> str:
 
 
 def _close(camera: Camera, sides: list[Motion], body: int) -> Camera:
-    """A camera in the same direction that sees what is about a body."""
+    """Return a camera in the same direction that sees what is about a body."""
     places: Array = np.concatenate([side.xpos[:, body] for side in sides])
     corners = _CLOSE * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
     points = (places[:, None] + corners).reshape(-1, 3)

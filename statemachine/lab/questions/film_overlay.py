@@ -120,7 +120,7 @@ class Overlay:
 
 
 def _gap_at(strip: QuantityChart, time: float) -> str:
-    """How far apart the sides are at the last moment that was compared; nothing is guessed."""
+    """Return a line with the gap at the last moment that was compared; nothing is interpolated."""
     curve = strip.curve
     row = max(0, int(np.searchsorted(curve.time, time + 1e-9, side="right")) - 1)
     gap = quantity(float(curve.difference[row]), curve.unit)

@@ -69,7 +69,7 @@ class Rounding:
 
     @property
     def may_be_all(self) -> bool:
-        """Whether the gap may be chance, as far as is known."""
+        """Tell whether the gap may be chance, as far as is known."""
         return self.verdict in ("as much", "cannot be told", "no bound")
 
 
@@ -89,12 +89,12 @@ class VerdictCounts:
 
     @property
     def total(self) -> int:
-        """How many quantities there are."""
+        """Return the number of quantities."""
         return self.differs + self.settles + self.agrees
 
     @property
     def in_turn(self) -> list[str]:
-        """Each verdict that some have, and how many."""
+        """Return each verdict that some quantity has, with the number of these."""
         counts = {"differs": self.differs, "settles": self.settles, "agrees": self.agrees}
         return [f"{verdict} {count}" for verdict, count in counts.items() if count]
 
@@ -133,8 +133,8 @@ class MissingPart:
     part: str
 
     @property
-    def giver(self) -> str:
-        """The side that has it."""
+    def other_side(self) -> str:
+        """Return the side that has the part, "left" or "right"."""
         return "right" if self.side == "left" else "left"
 
 
@@ -177,7 +177,7 @@ class Finding:
 
     @property
     def falls(self) -> Falls:
-        """Which sides fell."""
+        """Return which sides fell; "none" where no robot floats."""
         if self.fall is None:
             return "none"
         left_fell, right_fell = self.fall.left is not None, self.fall.right is not None
@@ -189,7 +189,7 @@ class Finding:
 
     @property
     def holds(self) -> bool:
-        """Whether the runs agree, in open loop too where there is one: the exit code is 0."""
+        """Tell whether the runs agree, in open loop too where there is one: the exit code is 0."""
         return self.outcome == "agrees" and self.open_loop != "differs"
 
 
@@ -218,7 +218,7 @@ def finding_of(
     divergence, rounding = _divergence(comparison), _rounding(lead, floor)
     ended = tuple(_early_ends(comparison))
     fall = next((outcome for outcome in comparison.outcomes if outcome.name == FELL), None)
-    lacking = tuple(MissingPart(side, part) for side, part in missing)
+    missing_parts = tuple(MissingPart(side, part) for side, part in missing)
     return Finding(
         outcome=comparison.outcome,
         is_same=is_same,
@@ -230,7 +230,7 @@ def finding_of(
         rounding=rounding,
         open_loop=open_loop,
         ended=ended,
-        missing=lacking,
+        missing=missing_parts,
         bases=comparison.bases,
         fall=fall,
     )
@@ -271,9 +271,9 @@ def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreemen
             beyond = clear
             break
     of_base = [a for a in beyond if QUANTITIES[a.kind].of_base]
-    own = [a for a in beyond if QUANTITIES[a.kind].own]
+    coordinates = [a for a in beyond if QUANTITIES[a.kind].is_coordinate]
     motion = [a for a in beyond if QUANTITIES[a.kind].moves]
-    for candidates in (of_base, own, motion, beyond):
+    for candidates in (of_base, coordinates, motion, beyond):
         if candidates:
             return max(candidates, key=_finite_tolerances)
     return max(comparison.agreements, key=_finite_tolerances)

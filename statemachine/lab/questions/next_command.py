@@ -96,7 +96,7 @@ def _same_on_both(
     if finding.missing:
         parts: list[str] = []
         for missing in finding.missing:
-            parts += [f"--{missing.part}", missing.giver]
+            parts += [f"--{missing.part}", missing.other_side]
         return _asking(request, "same parts", *parts)
     if periods is not None and periods.differ:
         return _same_period(request, periods)

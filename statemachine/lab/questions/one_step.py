@@ -42,66 +42,72 @@ class OneStepPage(PageContent):
 
     @property
     def first(self) -> StageGap | None:
-        """The first stage that differs."""
+        """Return the first stage that differs; None where none does."""
         return self.steps.first
 
     @property
     def of_usual(self) -> float | None:
-        """The part of its usual size by which the first stage differs; None where it has none."""
+        """Return the gap of the first stage as a part of its usual size; None where it has none."""
         return None if self.steps.first is None else self.steps.first.of_usual
 
     @property
     def agreeing(self) -> int:
-        """How many stages are compared and do not differ."""
-        return sum(gap.told and not gap.reason and not gap.beyond for gap in self.steps.stages)
+        """Return the number of stages that are compared and do not differ."""
+        return sum(
+            gap.is_available and not gap.reason and not gap.beyond for gap in self.steps.stages
+        )
 
     @property
     def not_compared(self) -> list[str]:
-        """The stages of which there are no figures, each with the reason."""
+        """Return the stages of which there are no figures, each with the reason."""
         stages: list[str] = []
         for gap in self.steps.stages:
-            if not gap.told or gap.reason:
+            if not gap.is_available or gap.reason:
                 stages.append(f"{gap.stage} ({gap.reason})")
         return stages
 
     @property
     def primed(self) -> str:
-        """What of the step before the right side was given."""
+        """Return what the right side has of the step before; "nothing" where it has nothing."""
         return self.steps.primed if self.steps.primed else "nothing"
 
     @property
     def null(self) -> StageGap | None:
-        """The stage in which the left, put back to its own states, is farthest from its own run."""
-        compared = [gap for gap in self.steps.stages if gap.told and gap.unit]
+        """Return the stage in which the left differs most from its own run.
+
+        The left is put back to its own states, too, as a check of the method. None where no stage
+        is compared.
+        """
+        compared = [gap for gap in self.steps.stages if gap.is_available and gap.unit]
         return max(compared, key=_null_tolerances, default=None)
 
     @property
     def causes_of_their_own(self) -> list[str]:
-        """The stages that are the first to differ at some moments, each with their number."""
+        """Return further stages that are the first to differ at some moments, with how many."""
         stages: list[str] = []
         for gap in self.steps.differing:
-            if gap.leads and gap != self.steps.first:
-                stages.append(f"{gap.stage} ({gap.leads})")
+            if gap.first_count and gap != self.steps.first:
+                stages.append(f"{gap.stage} ({gap.first_count})")
         return stages
 
     @property
     def stages(self) -> Table:
-        """A row for each stage."""
+        """Return a table with a row for each stage."""
         return _stages_table(self.steps)
 
     @property
     def forces(self) -> Table:
-        """The largest difference of a force in each unit."""
+        """Return a table of the largest difference of a force in each unit."""
         return _forces_table(self.steps.differing)
 
     @property
     def spikes(self) -> Table:
-        """A row for each moment that stands out."""
+        """Return a table with a row for each moment that stands out."""
         return _spikes_table(self.steps.spikes)
 
     @property
     def notes(self) -> list[str]:
-        """What a reader must know, in sentences."""
+        """Return what a reader must know, in sentences."""
         return [sentence(note) for note in self.steps.notes]
 
 
@@ -177,7 +183,7 @@ def _stages_table(steps: OneStep) -> Table:
 
 def _stage_cells(gap: StageGap) -> tuple[str, ...]:
     """Return the cells of a stage behind its name."""
-    if not gap.told or not gap.unit:
+    if not gap.is_available or not gap.unit:
         reason = gap.reason if gap.reason else NO_NUMBER
         return NO_NUMBER, NO_NUMBER, NO_NUMBER, NO_NUMBER, reason, NO_NUMBER, NO_NUMBER, NO_NUMBER
     largest, at, where = "0", NO_NUMBER, NO_NUMBER
@@ -190,7 +196,7 @@ def _stage_cells(gap: StageGap) -> tuple[str, ...]:
     null = quantity(gap.null, gap.unit)
     tolerance = quantity(gap.limit, gap.unit)
     first = moment(gap.first)
-    return str(gap.beyond), str(gap.leads), largest, at, where, first, null, tolerance
+    return str(gap.beyond), str(gap.first_count), largest, at, where, first, null, tolerance
 
 
 def _forces_table(differing: Sequence[StageGap]) -> Table:

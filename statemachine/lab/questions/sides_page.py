@@ -52,7 +52,7 @@ def commands_table(comparison: Comparison) -> Table:
 
 
 def without_actuation(traces: Sequence[Trace]) -> bool:
-    """Whether nobody commands any of some runs."""
+    """Tell whether the actuators are off in all of some runs."""
     return all(trace.header.options.get("actuation") is False for trace in traces)
 
 
@@ -95,7 +95,7 @@ def _contact_cells(contact: PairContacts) -> tuple[str, ...]:
 
 def remarks(run: SidesRun, comparison: Comparison) -> list[str]:
     """Return what a reader should know of how two sides were run, in sentences."""
-    lines = [*run.unmatched, *run.said, *comparison.notes]
+    lines = [*run.unmatched, *run.notes, *comparison.notes]
     return [sentence(line) for line in lines]
 
 
@@ -162,7 +162,7 @@ def emulated_sides(comparison: Comparison) -> list[EmulatedSide]:
 
 
 def provenance(comparison: Comparison) -> Table:
-    """What made both sides."""
+    """Return a table of what made both sides."""
     left, right = comparison.left.trace.header, comparison.right.trace.header
     rows = [("ran as", _ran_as(left), _ran_as(right))]
     versions, others = left.provenance.versions, right.provenance.versions

@@ -35,7 +35,7 @@ class VersionsPage(PageContent):
         pairs: Table of those that differ most.
         more: How many pairs it does not show.
         more_changed: How many of these differ.
-        known: Known changes, those of the pair that differs most first.
+        known_changes: Known changes, those of the pair that differs most first.
         more_changes: How many further ones there are.
         commands: What to type next for each pair that differs, the worst first.
         details: Whether everything is shown.
@@ -47,34 +47,34 @@ class VersionsPage(PageContent):
     pairs: Table
     more: int
     more_changed: int
-    known: Sequence[Block]
+    known_changes: Sequence[Block]
     more_changes: int
     commands: list[str]
     details: bool
 
     @property
     def next_command(self) -> str:
-        """What to type next; "" for nothing."""
+        """Return the command to type next; "" where there is none."""
         return self.commands[0] if self.commands else ""
 
     @property
     def further_commands(self) -> str:
-        """What to type for further pairs that differ, a line for each."""
+        """Return the commands for further pairs that differ, a line for each."""
         return "\n".join(self.commands[1:])
 
     @property
     def releases(self) -> list[str]:
-        """The versions, the oldest first."""
+        """Return the releases, the oldest first."""
         return [self.result.pairs[0].release, *(pair.next for pair in self.result.pairs)]
 
     @property
     def until(self) -> float:
-        """The last moment that is compared [s]."""
+        """Return the last moment that is compared [s]."""
         return max(pair.comparison.until for pair in self.result.pairs)
 
     @property
     def state(self) -> VersionsState:
-        """Whether the motion changes."""
+        """Return in a word whether the motion changes between any two releases."""
         outcomes = {pair.comparison.outcome for pair in self.result.pairs}
         if outcomes & {"differs", "ended"}:
             return "differs"
@@ -82,32 +82,32 @@ class VersionsPage(PageContent):
 
     @property
     def changed(self) -> list[str]:
-        """The pairs of releases between which the motion changes."""
+        """Return the pairs of releases between which the motion changes."""
         return [f"{pair.release} and {pair.next}" for pair in self.result.pairs if pair.is_changed]
 
     @property
     def several_changed(self) -> bool:
-        """Whether it changes between more than two releases."""
+        """Tell whether the motion changes between more than two releases."""
         return len(self.changed) > 1
 
     @property
     def worst(self) -> ReleasePair:
-        """The pair of releases that is farthest apart."""
+        """Return the pair of releases that is farthest apart."""
         return _worst_first(self.result.pairs)[0]
 
     @property
     def worst_gap(self) -> Agreement:
-        """The coordinate that is farthest beyond its tolerance between these."""
+        """Return the coordinate that is farthest beyond its tolerance between these."""
         return leading(self.worst.comparison)
 
     @property
     def worst_name(self) -> str:
-        """What that coordinate is called."""
+        """Return the name of that coordinate, as a page has it."""
         return name_of(self.worst_gap.name)
 
     @property
     def still(self) -> str:
-        """What is said where nothing moved on some of them; "" where something did on all."""
+        """Return the phrase for a pair in which nothing moved; "" where something did in all."""
         for pair in self.result.pairs:
             if pair.comparison.outcome == "nothing moved":
                 return nothing_moved(pair.comparison.motion)
@@ -115,7 +115,7 @@ class VersionsPage(PageContent):
 
     @property
     def bars(self) -> Bars:
-        """How far each release is from the next."""
+        """Return a chart of the gap between each release and the next."""
         pairs = self.result.pairs
         return Bars(
             "How far a release is from the next",
@@ -126,13 +126,13 @@ class VersionsPage(PageContent):
 
     @property
     def notes(self) -> list[str]:
-        """What is noted of each pair, as sentences."""
+        """Return the notes on all pairs, as sentences."""
         pairs = self.result.pairs
         return [sentence(note) for pair in pairs for note in pair.comparison.notes]
 
     @property
     def notes_hidden(self) -> bool:
-        """Whether there are notes that are not shown."""
+        """Tell whether there are notes that are not shown."""
         return bool(self.notes) and not self.details
 
 
@@ -146,10 +146,10 @@ def page(result: VersionsResult, details: bool = False) -> Page:
     changes = _changes(result)
     if details:
         return _page(result, result.pairs, changes, details=True)
-    return first_that_fits(_ever_shorter(result, changes))
+    return first_that_fits(_shorter_pages(result, changes))
 
 
-def _ever_shorter(result: VersionsResult, changes: Sequence[ShownChange]) -> Iterator[Page]:
+def _shorter_pages(result: VersionsResult, changes: Sequence[ShownChange]) -> Iterator[Page]:
     """Yield the page with ever fewer pairs, and then with ever fewer known changes."""
     worst = _worst_first(result.pairs)
     most = min(len(worst), MOST_ROWS)
@@ -177,7 +177,7 @@ def _page(
         pairs=_pairs_table(pairs),
         more=len(hidden),
         more_changed=more_changed,
-        known=known_changes_blocks(changes),
+        known_changes=known_changes_blocks(changes),
         more_changes=more_changes,
         commands=commands,
         details=details,

@@ -55,12 +55,12 @@ class WorstQuantities:
 
     @property
     def full_table(self) -> Table:
-        """The table with the names as they are."""
+        """Return the table with the names as they are."""
         return self.table([name_of(agreement.name) for agreement in self.agreements])
 
     @property
     def narrow_table(self) -> Table:
-        """The table for 80 columns: the middle of a longer name is left out."""
+        """Return the table for 80 columns: the middle of a longer name is left out."""
         width = _NARROW_NAME if self.floors else _NAME
         return self.table(shortened([name_of(a.name) for a in self.agreements], width))
 

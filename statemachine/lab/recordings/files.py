@@ -181,7 +181,7 @@ def export_csv(trace: Trace, path: AnyPath) -> list[Path]:
     contacts = target.with_name(f"{target.stem}.contacts.csv")
     targets = [target, contacts] if "contact_row" in trace else [target]
     with beside(*targets) as names:
-        for name, fill in zip(names, (_write_columns, _write_contacts), strict=False):
+        for name, fill in zip(names, (_write_columns, write_contacts), strict=False):
             fill(name, trace)
     return targets
 
@@ -193,7 +193,7 @@ def _write_columns(file: str, trace: Trace) -> None:
     _write_rows(file, labels, flat.tolist())
 
 
-def _write_contacts(file: str, trace: Trace) -> None:
+def write_contacts(file: str, trace: Trace) -> None:
     header = trace.header
     labels = [
         *("time", "geom_1", "geom_2", "body_1", "body_2", "dist", "pos.x", "pos.y", "pos.z"),

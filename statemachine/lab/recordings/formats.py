@@ -31,7 +31,7 @@ _DIGEST_LENGTH = hashlib.sha256().digest_size * 2
 def write_npz(trace: Trace, out: BinaryIO) -> None:
     """Write it; in single precision, but for the inputs, if its header says so."""
     columns: dict[str, Any] = dict(trace.columns)
-    if trace.header.single:
+    if trace.header.single_precision:
         columns = {
             name: array if name in (*INPUTS, *MOCAP, *INTEGER_COLUMNS) else array.astype(np.float32)
             for name, array in columns.items()
@@ -130,7 +130,7 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
         header = Header.from_json(text)
         check_size(_uncompressed_size(file.metadata, header), path)
         columns = _columns(file.read(), header)
-    if digest != _digest(text, columns):
+    if digest != content_digest(text, columns):
         raise TraceError("is damaged: its numbers are not those that were written")
     return header, columns
 
@@ -145,7 +145,7 @@ def _pyarrow() -> tuple[Any, Any]:
     return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
 
 
-def _digest(text: str, columns: dict[str, Any]) -> str:
+def content_digest(text: str, columns: dict[str, Any]) -> str:
     """Return the SHA-256 of a header and of the numbers that a file stores, as hex digits."""
     digest = hashlib.sha256(text.encode())
     for name in sorted(columns):
@@ -186,7 +186,7 @@ def _arrow_table(trace: Trace, arrow: Any) -> Any:
             columns[name] = arrow.ListArray.from_arrays(offsets, values) if is_contact else values
     text = trace.header.as_json()
     numbers = {name: as_column(name, array) for name, array in trace.columns.items()}
-    value = (_digest(text, numbers) + text).encode()
+    value = (content_digest(text, numbers) + text).encode()
     return arrow.table(columns).replace_schema_metadata({_DIGEST_KEY: value})
 
 

@@ -17,7 +17,7 @@ from ...release_names import engine_of
 from ..runs.provenance import Provenance
 from .header_fields import KINDS, PROVENANCE_KINDS
 
-SCHEMA = 1
+SCHEMA = 2
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.
 COLUMNS: dict[str, tuple[str | int, ...]] = {
     "time": (),
@@ -54,9 +54,9 @@ class Header:
     """What a trace is of, and what made it.
 
     Attributes:
-        schema: Version of the columns.
+        schema: Version of the header and the columns.
         experiment: Name of what was done.
-        says: What happens in it, in a sentence.
+        description: What happens in it, in a sentence.
         command: The command that makes it again, or "".
         provenance: Engine, versions, the model's file and digest, seed.
         defaults: "model", or "engine" for the engine as its own users meet it.
@@ -75,12 +75,12 @@ class Header:
         rewritten: Rows whose state is not what the step before left: the controller wrote it
             (or the engine does not give the same bits twice).
         ended: Why the run ended before its time, or "".
-        single: Whether an npz file of it keeps all but the inputs in single precision.
+        single_precision: Whether an npz file of it keeps all but the inputs in single precision.
         recorded: Whether this was read from a file: nothing ran here.
     """
 
     experiment: str
-    says: str
+    description: str
     command: str
     provenance: Provenance
     defaults: str
@@ -107,7 +107,7 @@ class Header:
     energy_by: str = ""
     rewritten: int = 0
     ended: str = ""
-    single: bool = False
+    single_precision: bool = False
     recorded: bool = False
     nmocap: int = 0
     jnt_bodyid: tuple[int, ...] = ()  # traces before it have none

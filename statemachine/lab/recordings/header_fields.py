@@ -105,7 +105,7 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "substeps": _is_count,
     "timestep": _is_timestep,
     "experiment": _is_text,
-    "says": _is_text,
+    "description": _is_text,
     "command": _is_text,
     "energy_by": _is_text,
     "ended": _is_text,
@@ -129,7 +129,7 @@ KINDS: dict[str, Callable[[Any], bool]] = {
     "actuator_jntid": _are_integers,
     "ctrlrange": _are_intervals,
     "rewritten": _is_integer,
-    "single": _is_switch,
+    "single_precision": _is_switch,
 }
 PROVENANCE_KINDS: dict[str, Callable[[Any], bool]] = {
     "backend": _is_text,

@@ -79,7 +79,7 @@ class RunMetadata:
 
     Attributes:
         experiment: Its name; "" for that of the controller.
-        says: What happens, in a sentence.
+        description: What happens, in a sentence.
         command: What makes it again.
         defaults: What `load` was given.
         options: What `Model.replace` was given.
@@ -87,7 +87,7 @@ class RunMetadata:
     """
 
     experiment: str = ""
-    says: str = ""
+    description: str = ""
     command: str = ""
     defaults: Defaults = "model"
     options: Mapping[str, OptionValue] = field(default_factory=dict)
@@ -170,7 +170,7 @@ def _header(
     options |= {name: _as_json_value(value) for name, value in metadata.options.items()}
     return Header(
         experiment=_experiment(metadata, controller),
-        says=metadata.says,
+        description=metadata.description,
         command=metadata.command,
         provenance=provenance(model, metadata.seed),
         defaults=metadata.defaults,

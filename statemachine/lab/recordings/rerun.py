@@ -45,7 +45,7 @@ class Rerun:
         keyframe: Where it starts; qpos, qvel: written over that.
         defaults: What `load` was given, for the header of the trace.
         options: What `Model.replace` was given, likewise.
-        experiment, says, seed: Name, sentence and seed of what is done, likewise.
+        experiment, description, seed: Name, sentence and seed of what is done, likewise.
         writes_state: Whether the controller may write more than ctrl.
     """
 
@@ -58,7 +58,7 @@ class Rerun:
     defaults: Defaults = "model"
     options: dict[str, OptionValue] = field(default_factory=dict)
     experiment: str = ""
-    says: str = ""
+    description: str = ""
     seed: int | None = None
     writes_state: bool = True
 
@@ -89,7 +89,7 @@ class Rerun:
         )
         metadata = RunMetadata(
             experiment=self.experiment,
-            says=self.says,
+            description=self.description,
             command=command,
             defaults=self.defaults,
             options=self.options,
@@ -138,9 +138,9 @@ def rerun_of(
         defaults=defaults,
         options=chosen,
         experiment=scenario.name,
-        says=scenario.says,
+        description=scenario.description,
         seed=seed if scenario.seeded else None,
-        writes_state=scenario.own,  # ours write nothing but ctrl
+        writes_state=scenario.is_user_function,  # ours write nothing but ctrl
     )
 
 
@@ -161,7 +161,7 @@ def rerun_of_trace(
         defaults=defaults,
         options={} if options is None else options,
         experiment=header.experiment,
-        says=header.says,
+        description=header.description,
         seed=header.provenance.seed,
         writes_state=False,
     )

@@ -159,14 +159,14 @@ def function_scenario(
     says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
     return Scenario(
         name=called,
-        says=says,
+        description=says,
         model="",
         seconds=2.0,
         controller=controller_of,
-        elsewhere=says,
+        general_description=says,
         needs=lambda _model: None,
         keyframe=keyframe,
-        own=True,
+        is_user_function=True,
     )
 
 

@@ -67,8 +67,8 @@ class Bases:
         left: "free" or "fixed"; None where the model has no joints, or several robots that differ
             in that.
         right: The same of the right.
-        taken_by: The side whose file leaves it open, and that floats since the other does; "" for
-            none.
+        inherited_by: The side whose file does not say whether the base floats, and which has the
+            free base of the other side; "" for none.
         floating_loader: The side that nobody told its base, whose base is fixed, and whose engine's
             own loader would let it float; "" for none.
         frame: The frame of the right's base in that of the left's, where both float and the files
@@ -78,16 +78,16 @@ class Bases:
 
     left: Base | None
     right: Base | None
-    taken_by: Literal["left", "right", ""] = ""
+    inherited_by: Literal["left", "right", ""] = ""
     floating_loader: Literal["left", "right", ""] = ""
     frame: BaseFrame | None = None
 
     @property
-    def given_by(self) -> Literal["left", "right", ""]:
+    def inherited_from(self) -> Literal["left", "right", ""]:
         """The side whose base the other takes over; "" for none."""
-        if not self.taken_by:
+        if not self.inherited_by:
             return ""
-        return "right" if self.taken_by == "left" else "left"
+        return "right" if self.inherited_by == "left" else "left"
 
     @property
     def differ(self) -> bool:
@@ -101,10 +101,11 @@ class Bases:
                 f"the base of the left is {self.left}, that of the right is {self.right}: "
                 "base=free or base=fixed behind a side makes them alike"
             )
-        if self.taken_by:
+        if self.inherited_by:
             yield (
-                f"the base of the {self.taken_by} is free, as that of the {self.given_by}: its "
-                "file does not say it (base=fixed behind it says otherwise)"
+                f"the base of the {self.inherited_by} is free, as that of the "
+                f"{self.inherited_from}: its file does not say it (base=fixed behind it says "
+                "otherwise)"
             )
         if self.floating_loader:
             yield (

@@ -29,29 +29,30 @@ class Scenario:
 
     Attributes:
         name: What it is called.
-        says: What happens, in one sentence.
+        description: What happens, in one sentence.
         model: The model that it is meant for.
         seconds: How long it takes [s].
         controller: Makes the controller, from the Model and a seed.
-        elsewhere: The sentence for any robot.
+        general_description: The sentence for any robot.
         needs: Raises BadInputError for a Model on which it makes no sense.
         keyframe: Where it starts; None for the model's default state.
         options: What `Model.replace` is given.
         seeded: Whether the seed changes anything.
-        own: Whether it is the user's: the same on every robot, and it may look at the state.
+        is_user_function: Whether its controller is a function of the user's, which is the same on
+            every robot, and may look at the state.
     """
 
     name: str
-    says: str
+    description: str
     model: str
     seconds: float
     controller: Callable[[Model, int], Controller]
-    elsewhere: str
+    general_description: str
     needs: Callable[[Model], None]
     keyframe: str | None = None
     options: Mapping[str, OptionValue] = field(default_factory=dict)
     seeded: bool = False
-    own: bool = False
+    is_user_function: bool = False
 
     def on(self, model: Model) -> Scenario:
         """Return this scenario adapted to a Model: its start, and a description that is true of it.
@@ -62,7 +63,9 @@ class Scenario:
         Raises:
             BadInputError: It makes no sense on the Model; with the names of those that do.
         """
-        if self.own or (is_so101(model) and (has_floor(model) or not self.says.count("floor"))):
+        if self.is_user_function or (
+            is_so101(model) and (has_floor(model) or not self.description.count("floor"))
+        ):
             return self
         try:
             self.needs(model)
@@ -71,10 +74,10 @@ class Scenario:
             known = f"; what makes sense on it: {', '.join(others)}" if others else ""
             raise BadInputError(f"{error}{known}") from None
         if is_so101(model):
-            return replace(self, says=self.elsewhere)
+            return replace(self, description=self.general_description)
         key = self.keyframe or home_keyframe(model)
         begins = "" if key is None else f" It starts in the keyframe {key!r}."
-        return replace(self, says=self.elsewhere + begins, keyframe=key)
+        return replace(self, description=self.general_description + begins, keyframe=key)
 
 
 def suitable_scenarios(model: Model) -> tuple[str, ...]:

@@ -77,8 +77,8 @@ _BATCH_SECONDS, _MAX_BATCH_CELLS = (
     500,
 )  # a task takes about so many seconds, and has at most so many cells
 _TASKS_PER_JOB = 4  # at least so many for each job, so that none is idle at the end
-_SCHEDULER_TIMEOUT = 10.0  # seconds for a scheduler to answer
-_RUN_BATCH_IN_CHILD = partial(run_batch, own=True)
+SCHEDULER_TIMEOUT = 10.0  # seconds for a scheduler to answer
+_RUN_BATCH_IN_CHILD = partial(run_batch, is_dedicated=True)
 
 
 def run_sweep(
@@ -121,7 +121,7 @@ def run_sweep(
         if retry_failed:
             remove_failed(folder)
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
-        ran, cost, whole = 0, 0.0, _cost_of_missing(ready, known)
+        ran, cost, total_cost = 0, 0.0, _cost_of_missing(ready, known)
         kinds = Counter(known.values())
         writer = RowWriter(folder, ready.design.factors, ready.provenance())
         workers = max(1, sum(client.nthreads().values())) if client else jobs
@@ -138,7 +138,7 @@ def run_sweep(
                         kinds.update(outcome_of(row) for row in rows)
                         ran += len(rows)
                         cost += sum(_cost_of_cell(ready, row["backend"]) for row in rows)
-                        progress(cost / whole)
+                        progress(cost / total_cost)
             finally:
                 writer.flush()
     return _summary(ready, folder, kinds, ran, time.monotonic() - began)
@@ -188,7 +188,7 @@ def _summary(
         failed=dict(failed.most_common()),
         ran=ran,
         seconds=seconds,
-        said=ready.said,
+        notes=ready.notes,
         read=f'pyarrow.dataset.dataset("{place}", partitioning="hive").to_table()',
         missing=len(ready) - kinds.total(),
         what=ready.sweep.what.rpartition("/")[2],
@@ -243,8 +243,8 @@ def _run_apart(
     `look` is called between any two waits, and may raise.
     """
     with worker_processes(jobs) as workers:
-        here = [partial(submit, _RUN_BATCH_IN_CHILD) for submit in workers]
-        yield from _results(ready, batches, here, here, look)
+        submitters = [partial(submit, _RUN_BATCH_IN_CHILD) for submit in workers]
+        yield from _results(ready, batches, submitters, submitters, look)
 
 
 def _run_on_dask(
@@ -259,7 +259,7 @@ def _run_on_dask(
     Raises:
         BadInputError: The scheduler went away.
     """
-    submit = partial(client.get_executor(pure=False).submit, partial(run_batch, own=False))
+    submit = partial(client.get_executor(pure=False).submit, partial(run_batch, is_dedicated=False))
     with worker_processes(1) as (worker,):
 
         def submit_here(ready: PreparedSweep, batch: Batch) -> Future[list[Row]]:
@@ -292,19 +292,19 @@ def _results(
     ready: PreparedSweep,
     batches: Iterable[Batch],
     workers: list[Submit],
-    here: list[Submit],
+    retry_workers: list[Submit],
     look: Callable[[], None],
 ) -> Results:
     """Yield the rows of each batch, as they are ready.
 
     The cells of a batch that was lost with a process are run again one by one, each by a worker
-    of `here`; one that ends that process, too, fails.
+    of `retry_workers`; one that ends that process, too, fails.
 
     Args:
         ready: The sweep.
         batches: What is to run.
         workers: Each submits one batch at a time; those that are idle.
-        here: The same for cells that are run again; it may be the same list.
+        retry_workers: The same for cells that are run again; it may be the same list.
         look: Called between any two waits.
     """
     coming, again, ended = iter(batches), deque[SweepCell](), list[list[Row]]()
@@ -315,8 +315,8 @@ def _results(
         waiting[submit(ready, batch)] = _Submitted(batch, is_again, idle, submit)
 
     while True:
-        while again and here:
-            begin([again.popleft()], True, here)
+        while again and retry_workers:
+            begin([again.popleft()], True, retry_workers)
         for batch in itertools.islice(coming, len(workers)):
             begin(batch, False, workers)
         yield from ended  # while every worker has something to do: rows may be written now
@@ -350,14 +350,14 @@ def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            client = distributed.Client(address, timeout=_SCHEDULER_TIMEOUT, set_as_default=False)
+            client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise BadInputError(
                 f"no Dask scheduler answers at {address} ({type(error).__name__})"
             ) from None
     try:
         with suppress(TimeoutError):
-            client.wait_for_workers(1, timeout=_SCHEDULER_TIMEOUT)
+            client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT)
         answers = client.run(environment_difference, ready, __version__, on_error="return")
         if not answers:
             raise BadInputError(f"the scheduler at {address} has no workers")

@@ -62,13 +62,13 @@ class MainEffect:
     @property
     @only_on_pages
     def lowest(self) -> LevelMean | None:
-        """The value at which the mean is smallest; None where there are too few samples."""
+        """Return the value at which the mean is smallest; None where there are too few samples."""
         return min(self.levels, key=_mean_of, default=None)
 
     @property
     @only_on_pages
     def highest(self) -> LevelMean | None:
-        """The value at which the mean is largest; None where there are too few samples."""
+        """Return the value at which the mean is largest; None where there are too few samples."""
         return max(self.levels, key=_mean_of, default=None)
 
 
@@ -154,43 +154,43 @@ class SweepEffects:
     @property
     @only_on_pages
     def is_of_a_gap(self) -> bool:
-        """Whether the quantity is the gap between two engines."""
+        """Tell whether the quantity is the gap between two engines."""
         return len(self.backends) > 1
 
     @property
     @only_on_pages
     def has_shares(self) -> bool:
-        """Whether parameters have shares of the variance."""
+        """Tell whether parameters have shares of the variance."""
         return not self.why_none
 
     @property
     @only_on_pages
     def has_no_errors(self) -> bool:
-        """Whether there are shares, and no share has a standard error."""
+        """Tell whether there are shares, and no share has a standard error."""
         return self.has_shares and all(effect.error is None for effect in self.effects)
 
     @property
     @only_on_pages
     def is_sampled(self) -> bool:
-        """Whether a range is varied, whose samples are divided into classes."""
+        """Tell whether a range is varied, whose samples are divided into classes."""
         return self.samples > 0
 
     @property
     @only_on_pages
     def where_largest(self) -> Mapping[str, Value]:
-        """The value of each parameter in the cell with the largest value."""
+        """Return the value of each parameter in the cell with the largest value."""
         return dict(zip(self.parameters, self.largest.settings, strict=True))
 
     @property
     @only_on_pages
     def known_effects(self) -> tuple[MainEffect, ...]:
-        """The effects that have a share, the largest first."""
+        """Return the effects that have a share, the largest first."""
         return tuple(effect for effect in self.effects if effect.share is not None)
 
     @property
     @only_on_pages
     def together(self) -> float | None:
-        """The share that no parameter explains alone [1]; None where no parameter has a share.
+        """Return the share that no parameter explains alone [1]; None where none has a share.
 
         Parameters do it together; of samples it is also what the quantity does within a class.
         """
@@ -200,7 +200,7 @@ class SweepEffects:
     @property
     @only_on_pages
     def verdict(self) -> SweepVerdict:
-        """Which parameter moves the quantity.
+        """Return in a word which parameter moves the quantity.
 
         Returns:
             "none": No parameter has a share.
@@ -344,8 +344,8 @@ def _typed_report(
     manifest: SweepManifest, folder: str | Path, quantity: SweepQuantity, backends: Sequence[str]
 ) -> str:
     """Return the command that runs a sweep and reports on a quantity of it."""
-    here = f"{Path.cwd()}{os.sep}"
-    run = manifest["command"].replace(here, "")
+    working_folder = f"{Path.cwd()}{os.sep}"
+    run = manifest["command"].replace(working_folder, "")
     run = run.replace(" --out DIR", f" --out {quoted(str(folder))}")
     engines = [f"--backend {name}" for name in backends]
     if set(backends) == set(manifest["design"]["backends"]):

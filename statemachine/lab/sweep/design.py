@@ -88,7 +88,7 @@ class Vary:
 
     @property
     def column(self) -> str:
-        """Its column in the dataset."""
+        """Return the name of its column in the dataset."""
         return f"vary.{self.label}"
 
     def unit_on(self, joints: Collection[int] = (JointType.HINGE, JointType.SLIDE)) -> str:
@@ -102,24 +102,24 @@ class Vary:
 
     @property
     def type(self) -> str:
-        """Of its column."""
+        """Return the type of its column: "double", "bool" or "string"."""
         if self.numeric:
             return "double"
         return "bool" if isinstance(self.values[0], bool) else "string"
 
     @property
     def meaning(self) -> str:
-        """What its column says."""
+        """Return the description of its column."""
         return (_MULTIPLE_OF_MODEL if self.times else _MEANINGS[self.kind]).format(self.label)
 
     @property
     def numeric(self) -> bool:
-        """Whether its values are numbers."""
+        """Tell whether its values are numbers."""
         return self.bounds is not None or is_number(self.values[0])
 
     @property
     def extremes(self) -> tuple[Value, ...]:
-        """The values that a check has to look at."""
+        """Return the values that a check has to look at."""
         return self.values if self.bounds is None else self.bounds
 
 
@@ -253,12 +253,12 @@ class Design:
 
     @property
     def sampled(self) -> tuple[Vary, ...]:
-        """The factors with a range."""
+        """Return the factors with a range."""
         return tuple(vary for vary in self.factors if vary.bounds is not None)
 
     @property
     def listed(self) -> tuple[Vary, ...]:
-        """The factors with a list or a grid."""
+        """Return the factors with a list or a grid."""
         return tuple(vary for vary in self.factors if vary.bounds is None)
 
     @property

@@ -177,54 +177,54 @@ def write_or_check_manifest(folder: Path, manifest: SweepManifest, extend: bool)
     Raises:
         BadInputError: The folder is of another request; it says what differs.
     """
-    wanted: SweepManifest = json.loads(json.dumps(manifest))  # lists, as they are read
+    new_manifest: SweepManifest = json.loads(json.dumps(manifest))  # lists, as they are read
     if (folder / MANIFEST).exists():
-        there = read_manifest(folder)
+        stored = read_manifest(folder)
         others: list[str] = []
         for old, new in (
-            (there["request"], wanted["request"]),
-            (there["files"], wanted["files"]),
-            (there["versions"], wanted["versions"]),
+            (stored["request"], new_manifest["request"]),
+            (stored["files"], new_manifest["files"]),
+            (stored["versions"], new_manifest["versions"]),
         ):
             others += _differences(old, new, grows=extend)
         if others:
             raise BadInputError(
                 f"{folder} is of another sweep: {listed(others)}. Name another folder with --out"
             )
-        changes = _differences(there["design"], wanted["design"])
+        changes = _differences(stored["design"], new_manifest["design"])
         if changes and not extend:
             raise BadInputError(
                 f"{folder} is of another design: {listed(changes)}. Name another folder with "
                 "--out, or let this one grow with --extend"
             )
-        varied = [factor["label"] for factor in there["factors"]]
-        if sorted(varied) != sorted(factor["label"] for factor in wanted["factors"]):
+        varied = [factor["label"] for factor in stored["factors"]]
+        if sorted(varied) != sorted(factor["label"] for factor in new_manifest["factors"]):
             raise BadInputError(
                 f"{folder} varies {listed(varied) or 'nothing'}, and a sweep grows in values, "
                 "seeds and backends alone: name another folder with --out"
             )
         if not changes:
             return
-    write_manifest(folder, wanted)
+    write_manifest(folder, new_manifest)
 
 
 def _differences(
-    there: Mapping[str, object], wanted: Mapping[str, object], grows: bool = False
+    stored: Mapping[str, object], requested: Mapping[str, object], grows: bool = False
 ) -> list[str]:
     """Return what differs in a part of two manifests, as "seconds 2 there, 4 here".
 
     Args:
-        there: The part of the dataset.
-        wanted: The part of the request.
+        stored: The part of the dataset.
+        requested: The part of the request.
         grows: Whether only what both have counts.
     """
-    names = list(dict.fromkeys((*there, *wanted)))
+    names = list(dict.fromkeys((*stored, *requested)))
     if grows:
-        names = [name for name in names if name in there and name in wanted]
+        names = [name for name in names if name in stored and name in requested]
     return [
-        f"{name} {_short_text(there.get(name))} there, {_short_text(wanted.get(name))} here"
+        f"{name} {_short_text(stored.get(name))} there, {_short_text(requested.get(name))} here"
         for name in names
-        if there.get(name) != wanted.get(name)
+        if stored.get(name) != requested.get(name)
     ]
 
 

@@ -47,7 +47,7 @@ class VariableNames:
 
     @property
     def all_names(self) -> tuple[str, ...]:
-        """Every name that can be varied."""
+        """Return every name that can be varied."""
         return (*self.parameters, *self.options, MODEL, *STATES)
 
     def __str__(self) -> str:

@@ -169,16 +169,16 @@ def _complete_design(design: Design, values: Array) -> _CompleteDesign:
     # The samples change slowest; see `Design.points`.
     lengths = [len(vary.values) for vary in design.listed]
     cube = values.reshape(samples, *lengths, values.shape[-1])
-    kept = _complete_indices(np.asarray(np.isnan(cube).all(axis=-1)))
+    indices = _complete_indices(np.asarray(np.isnan(cube).all(axis=-1)))
     left_out: dict[str, tuple[Value, ...]] = {}
     values_left: list[tuple[Value, ...]] = []
-    for vary, levels in zip(design.listed, kept[1:], strict=True):
+    for vary, levels in zip(design.listed, indices[1:], strict=True):
         values_left.append(tuple(vary.values[k] for k in levels))
         gone = tuple(value for k, value in enumerate(vary.values) if k not in levels)
         if gone:
             left_out[vary.label] = gone
-    sampled = design.sample_values()[kept[0]]
-    return _CompleteDesign(design, cube[np.ix_(*kept)], sampled, values_left, left_out)
+    sampled = design.sample_values()[indices[0]]
+    return _CompleteDesign(design, cube[np.ix_(*indices)], sampled, values_left, left_out)
 
 
 def _complete_indices(holes: Flags) -> list[list[int]]:
@@ -187,8 +187,8 @@ def _complete_indices(holes: Flags) -> list[list[int]]:
     Args:
         holes: (n, n1, …, nk) whether there is no figure; somewhere there is one.
     """
-    kept = [list(range(length)) for length in holes.shape]
-    while (left := holes[np.ix_(*kept)]).any():
+    indices = [list(range(length)) for length in holes.shape]
+    while (left := holes[np.ix_(*indices)]).any():
         worst_axis, worst = 0, np.zeros(0)
         for axis in range(left.ndim):
             shares = left.mean(axis=_other_axes(left.ndim, axis))
@@ -197,8 +197,8 @@ def _complete_indices(holes: Flags) -> list[list[int]]:
                 worst_axis, worst = axis, shares
         gone = np.flatnonzero(worst == 1.0).tolist() or [int(worst.argmax())]
         for place in reversed(gone):
-            del kept[worst_axis][place]
-    return kept
+            del indices[worst_axis][place]
+    return indices
 
 
 def _other_axes(count: int, axis: int) -> tuple[int, ...]:

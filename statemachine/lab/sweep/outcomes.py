@@ -48,8 +48,8 @@ class _Tracking:
     def look(self, data: Data) -> None:
         """Look at the state after a step."""
         # Of a servo ctrl is the target of its joint times the gear.
-        apart = data.ctrl[self.servos] / self._gears - data.qpos[self._places]
-        self._squares += float(apart @ apart) / len(apart)
+        errors = data.ctrl[self.servos] / self._gears - data.qpos[self._places]
+        self._squares += float(errors @ errors) / len(errors)
         self._steps += 1
 
     @property
@@ -118,8 +118,8 @@ class Outcomes:
         """Return how far, level, the base at `qpos` is from its start [m]; None of a fixed one."""
         if self._address is None:
             return None
-        here = qpos[self._address : self._address + 2]
-        return float(np.linalg.norm(here - self._start[:2]))
+        position = qpos[self._address : self._address + 2]
+        return float(np.linalg.norm(position - self._start[:2]))
 
     @property
     def fell(self) -> float | None:

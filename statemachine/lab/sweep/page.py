@@ -43,43 +43,46 @@ class SweepReportPage(PageContent):
 
     @property
     def leader(self) -> str:
-        """The parameter with the largest share; "" where none has one."""
+        """Return the parameter with the largest share; "" where none has one."""
         return _label(self.effects, 0)
 
     @property
     def second(self) -> str:
-        """The parameter with the second largest share; "" where there is none."""
+        """Return the parameter with the second largest share; "" where there is none."""
         return _label(self.effects, 1)
 
     @property
     def leader_share(self) -> str:
-        """The largest share."""
+        """Return the largest share, in per cent."""
         return _percent(self.effects, 0)
 
     @property
     def second_share(self) -> str:
-        """The second largest share."""
+        """Return the second largest share, in per cent."""
         return _percent(self.effects, 1)
 
     @property
     def leads_alone(self) -> bool:
-        """Whether the largest share is more than nothing."""
+        """Tell whether the largest share is more than nothing, as it is printed."""
         shares = [effect.share for effect in self.effects.effects if effect.share is not None]
         return round(max(shares, default=0.0), _DECIMALS) > 0
 
     @property
     def smallest(self) -> str:
-        """The smallest value of all runs."""
+        """Return the smallest value of all runs, with its unit."""
         return quantity(self.effects.smallest.value, self.effects.unit)
 
     @property
     def largest(self) -> str:
-        """The largest value of all runs."""
+        """Return the largest value of all runs, with its unit."""
         return quantity(self.effects.largest.value, self.effects.unit)
 
     @property
     def next_step(self) -> _NextStep:
-        """What to do next: run more where the shares have no errors, else look at the details."""
+        """Return what to do next.
+
+        That is to run more where the shares have no errors, else to look at the details.
+        """
         if self.effects.more_runs:
             return "more runs" if self._fits(self.effects.more_runs) else "more runs in words"
         if self.details:
@@ -88,7 +91,7 @@ class SweepReportPage(PageContent):
 
     @property
     def next_command(self) -> str:
-        """The command to type next; "" where there is none, or it is too long for a screen."""
+        """Return the command to type next; "" where there is none, or it is too wide."""
         behind = {"more runs": self.effects.more_runs, "details": "--details"}.get(self.next_step)
         return f"{self.effects.command} {behind}" if behind else ""
 
@@ -98,18 +101,18 @@ class SweepReportPage(PageContent):
 
     @property
     def not_shown(self) -> int:
-        """How many parameters are left out of the table."""
+        """Return the number of parameters that are left out of the table."""
         shown = sum(1 for row in self.shares.rows if row[0] != _INTERACTIONS_ROW)
         return len(self.effects.effects) - shown
 
     @property
     def lost_count(self) -> int:
-        """How many cells are without a result."""
+        """Return the number of cells without a result."""
         return sum(self.effects.failed.values()) + self.effects.missing
 
     @property
     def lost_cells(self) -> list[str]:
-        """How many cells are without a result, by the reason."""
+        """Return the number of cells without a result, by the reason."""
         lost = [f"{kind}: {number}" for kind, number in self.effects.failed.items()]
         if self.effects.missing:
             lost.append(f"not run: {self.effects.missing}")

@@ -68,12 +68,12 @@ def prepare_sweep(sweep: Sweep) -> PreparedSweep:
     files = {name: model_digest(resolve(name, sweep.menagerie)) for name in names}
     places = {name: os.path.abspath(name) if Path(name).is_file() else name for name in names}
     parameters = parameters_of(sweep.what) if function else ()
-    models, backends, said = _load_models(
+    models, backends, notes = _load_models(
         sweep, [*places.values()], _options_of_check(sweep, typed)
     )
-    called = file_and_name_of(sweep.what)[1] if function else ""
+    function_name = file_and_name_of(sweep.what)[1] if function else ""
     can_vary = [name for name in parameters if name != "seed"]
-    factors = resolve_kinds(typed, variable_names(models, called, can_vary))
+    factors = resolve_kinds(typed, variable_names(models, function_name, can_vary))
     design = Design(factors, sweep.samples, sweep.design_seed)
     cells = design.size * sweep.seeds * len(backends)
     if cells > _MAX_CELLS:
@@ -84,16 +84,16 @@ def prepare_sweep(sweep: Sweep) -> PreparedSweep:
     if design.sampled:
         require_qmc()
     if sweep.samples & (sweep.samples - 1):
-        said.append(f"{sweep.samples} samples are not a power of two: a Sobol sequence wants one")
+        notes.append(f"{sweep.samples} samples are not a power of two: a Sobol sequence wants one")
     if cells > _ANNOUNCED_CELLS:
-        said.append(f"{cells:,} cells")
+        notes.append(f"{cells:,} cells")
     for vary in factors:
-        said += _check_values(vary, models)
+        notes += _check_values(vary, models)
     chosen: dict[str, Value] = {"seed": 0} if "seed" in parameters else {}
     chosen |= {vary.name: vary.extremes[0] for vary in factors if vary.kind == "parameter"}
     asked = sweep.scenario(chosen)
     _report_refusals(models, lambda model: _check_run(asked, factors, model))
-    said += _overlaps_at_start(asked, models)
+    notes += _overlaps_at_start(asked, models)
     spread = EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(","))
     return PreparedSweep(
         sweep=sweep,
@@ -106,7 +106,7 @@ def prepare_sweep(sweep: Sweep) -> PreparedSweep:
         parameters=parameters,
         spread=spread,
         cost={model.backend: _cell_time(model, asked.seconds) for model in models},
-        said=tuple(said),
+        notes=tuple(notes),
         unavailable=unavailable_columns(models),
     )
 
@@ -153,8 +153,8 @@ def _load_models(
         if name != "all":
             parse_backend(name)
     models: list[Model] = []
-    said: list[str] = []
-    here: list[str] = []
+    notes: list[str] = []
+    available: list[str] = []
     failure: StateMachineError | None = None
     for backend in backend_names() if "all" in asked else asked:
         for place in places:
@@ -164,16 +164,16 @@ def _load_models(
                 if "all" not in asked:
                     raise
                 failure = error
-                said.append(f"{error}; it is left out")
+                notes.append(f"{error}; it is left out")
                 break
             except StateMachineError as error:
                 failure = error
-                said.append(f"{place} on {backend}: {error}; its cells will say so")
+                notes.append(f"{place} on {backend}: {error}; its cells will say so")
         else:
-            here.append(backend)
+            available.append(backend)
     if failure and not models:
         raise failure
-    return models, tuple(here), said
+    return models, tuple(available), notes
 
 
 def _report_refusals(models: Sequence[Model], check: Callable[[Model], object]) -> list[str]:
@@ -204,8 +204,8 @@ def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
             elif vary.kind == "state":
                 start_at(model, [(vary, value)])
 
-    said = _report_refusals(models, check)
-    return said + (beyond_ranges(models[0], vary) if vary.kind == "state" else [])
+    notes = _report_refusals(models, check)
+    return notes + (beyond_ranges(models[0], vary) if vary.kind == "state" else [])
 
 
 def _check_run(scenario: Scenario, factors: Sequence[Vary], model: Model) -> None:

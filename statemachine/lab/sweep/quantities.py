@@ -66,7 +66,7 @@ class SweepQuantity:
 
     @property
     def unit(self) -> str:
-        """The SI unit of its column."""
+        """Return the SI unit of its column."""
         return _UNITS[self.column]
 
 

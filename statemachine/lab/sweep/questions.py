@@ -171,7 +171,7 @@ def _run(
     ready: PreparedSweep, request: SweepRequest, folder: Path, reporter: Reporter
 ) -> SweepSummary:
     """Run what is missing of a sweep in a folder."""
-    for line in ready.said:
+    for line in ready.notes:
         reporter.note(line)
     with reporter.stage(f"{len(ready)} cells", checked_jobs(request.jobs)) as progress:
         return run_sweep(

@@ -178,7 +178,7 @@ class PreparedSweep:
         parameters: What the user's function takes by keyword.
         spread: How far from its start a seed puts a run.
         cost: Roughly what a cell takes on each backend [s].
-        said: What a reader should know before it runs, in lines.
+        notes: What a reader should know before it runs, in lines.
         unavailable: Columns that no robot of the sweep has.
     """
 
@@ -192,7 +192,7 @@ class PreparedSweep:
     parameters: tuple[str, ...] = ()
     spread: Uncertainty = field(default_factory=Uncertainty)
     cost: Mapping[str, float] = field(default_factory=dict)
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     unavailable: tuple[str, ...] = ()
 
     def settings(self, cell: SweepCell, kind: Kind) -> list[tuple[Vary, Value]]:
@@ -283,17 +283,17 @@ def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str
             is_a_count = vary.name == "substeps" and isinstance(value, float) and value.is_integer()
             options[vary.name] = int(value) if is_a_count else value
             continue
-        own, place = _model_value(model, vary)
+        model_value, place = _model_value(model, vary)
         if place is None:
             assert isinstance(value, float), "what is times the model's own is a number"
-            options[vary.name] = own * value
+            options[vary.name] = model_value * value
             continue
-        assert isinstance(own, np.ndarray), "what has a place has several numbers"
+        assert isinstance(model_value, np.ndarray), "what has a place has several numbers"
         changed = options.get(vary.name)
         if not isinstance(changed, np.ndarray):
-            changed = own.copy()
+            changed = model_value.copy()
             options[vary.name] = changed
-        changed[place] = own[place] * value if vary.times else value
+        changed[place] = model_value[place] * value if vary.times else value
     return options
 
 
@@ -304,13 +304,13 @@ def _model_value(model: Model, vary: Vary) -> tuple[Array | float, int | None]:
         BadInputError: The model has no value of its own.
     """
     for owner in ("", "dof", "body", "geom", "actuator"):
-        own = getattr(model, f"{owner}_{vary.name}" if owner else vary.name, None)
-        if isinstance(own, np.ndarray):
+        value = getattr(model, f"{owner}_{vary.name}" if owner else vary.name, None)
+        if isinstance(value, np.ndarray):
             # Of several numbers of each, as the three frictions of a geom, the first is meant.
-            values = np.array(own[:, 0] if own.ndim == 2 else own, dtype=np.float64)
+            values = np.array(value[:, 0] if value.ndim == 2 else value, dtype=np.float64)
             return values, _entry_index(model, vary, owner, len(values)) if vary.place else None
-        if isinstance(own, (int, float)) and not (isinstance(own, bool) or vary.place):
-            return float(own), None
+        if isinstance(value, (int, float)) and not (isinstance(value, bool) or vary.place):
+            return float(value), None
     missing = f"{vary.label} cannot be varied like this: a model has no {vary.name} of its own"
     if vary.place:
         missing += " for each of its parts"
@@ -383,6 +383,8 @@ def spread_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> A
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     limited = scalar & np.array(model.jnt_limited, dtype=bool)
     places, (low, high) = model.jnt_qposadr[limited], model.jnt_range[limited].T
-    begun = qpos[places]  # which may be beyond the range
-    moved[places] = np.clip(moved[places], np.minimum(low, begun), np.maximum(high, begun))
+    start_values = qpos[places]  # which may be beyond the range
+    moved[places] = np.clip(
+        moved[places], np.minimum(low, start_values), np.maximum(high, start_values)
+    )
     return moved

@@ -102,7 +102,7 @@ COLUMNS = (
     Column("engine_version", "string", "", "version of the engine"),
     Column("library_version", "string", "", "version of this library"),
 )
-_MIN_PAUSE, _MAX_PAUSE, _PAUSE_SHARE = (
+MIN_PAUSE, _MAX_PAUSE, _PAUSE_SHARE = (
     5.0,
     60.0,
     0.02,
@@ -172,7 +172,7 @@ class RowWriter:
             self._waiting.setdefault(row["backend"], []).append(row)
         now = time.monotonic()
         # Seldom in a long sweep, so that its files stay few: what a kill loses is so much work.
-        pause = min(_MAX_PAUSE, max(_MIN_PAUSE, _PAUSE_SHARE * (now - self._began)))
+        pause = min(_MAX_PAUSE, max(MIN_PAUSE, _PAUSE_SHARE * (now - self._began)))
         most = max(map(len, self._waiting.values()), default=0)
         if most >= _MAX_ROWS or now - self._flushed > pause:
             self.flush()

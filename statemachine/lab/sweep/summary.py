@@ -20,7 +20,7 @@ class SweepSummary:
         failed: How many have none, by the class of the error.
         ran: How many were run this time.
         seconds: What this time took on the clock [s].
-        said: What a reader should know, in lines.
+        notes: What a reader should know, in lines.
         read: Python that opens the dataset.
         missing: How many cells have not run.
         what: The experiment, or the file and function without its folder.
@@ -37,7 +37,7 @@ class SweepSummary:
     failed: Mapping[str, int]
     ran: int
     seconds: float
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
     read: str
     missing: int
     what: str = field(metadata={"json": False})
@@ -49,11 +49,11 @@ class SweepSummary:
     @property
     @only_on_pages
     def failed_cells(self) -> int:
-        """How many cells have no result."""
+        """Return the number of cells that have no result."""
         return sum(self.failed.values())
 
     @property
     @only_on_pages
     def cells_before(self) -> int:
-        """How many cells were there before, or have not run."""
+        """Return the number of cells that were there before, or have not run."""
         return self.cells - self.ran

@@ -54,19 +54,20 @@ _CLOCK_STEPS = 64  # steps after which the clock is looked at
 _ENGINE_LOCK = threading.Lock()  # a Dask worker may have several threads, and an engine must not
 
 
-def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> list[Row]:
+def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], is_dedicated: bool) -> list[Row]:
     """Run cells; every one gives a row, whatever happens in it.
 
     Args:
         ready: The sweep.
         cells: To run, in this order.
-        own: Whether this process is there for nothing else: it may then be kept silent, and ended.
+        is_dedicated: Whether this process is there for nothing else: it may then be kept silent,
+            and ended.
     """
-    if own:
+    if is_dedicated:
         _prepare_process()
     with _ENGINE_LOCK, warnings.catch_warnings(), silence():
         warnings.simplefilter("ignore")  # the driver has loaded the same models, and passed them on
-        return [_row(ready, cell, own) for cell in cells]
+        return [_row(ready, cell, is_dedicated) for cell in cells]
 
 
 @functools.cache
@@ -95,14 +96,14 @@ def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = 
     return row
 
 
-def _row(ready: PreparedSweep, cell: SweepCell, own: bool) -> Row:
+def _row(ready: PreparedSweep, cell: SweepCell, is_dedicated: bool) -> Row:
     began, limit = time.perf_counter(), ready.sweep.timeout
     row: Row = {}
     failure: BaseException | None = None
     try:
-        with _time_limit(max(limit, _LOADING_SECONDS), own):
+        with _time_limit(max(limit, _LOADING_SECONDS), is_dedicated):
             model, options, scenario = _model(ready, cell, row)
-        with _time_limit(limit, own):
+        with _time_limit(limit, is_dedicated):
             _run(ready, cell, model, options, scenario, row)
     except _OutOfTimeError:
         failure = _timeout_error(limit)
@@ -116,13 +117,13 @@ class _OutOfTimeError(BaseException):
 
 
 @contextmanager
-def _time_limit(seconds: float, own: bool) -> Iterator[None]:
+def _time_limit(seconds: float, is_dedicated: bool) -> Iterator[None]:
     """Raise `_OutOfTimeError` in what takes too long; end a process that does not even raise it.
 
     A run looks at the clock itself. This is for what does not come back from the user's function
     or from the engine; it needs a process of its own, whose signals are nobody else's.
     """
-    if not own:
+    if not is_dedicated:
         yield
         return
     timer = hasattr(signal, "setitimer")  # not on Windows: there a process only ends
@@ -181,7 +182,7 @@ def _model(
     base, on_robot = _cached(key, loaded)
     row["engine_version"] = base.engine_version
     # The user's own is the same on every robot, and has the parameters of this cell.
-    scenario = scenario if scenario.own else on_robot
+    scenario = scenario if scenario.is_user_function else on_robot
     if not (options := options_at(base, rest)):
         return base, first, scenario
     key += repr([(v.label, v.times, value) for v, value in rest])

@@ -56,7 +56,7 @@ class CauseSentence(PageContent):
 
     @property
     def interacts(self) -> bool:
-        """Whether it takes away alone much more, or much less, than last."""
+        """Tell whether it takes away much more, or much less, alone than last."""
         if self.alone is None or self.last is None:
             return False
         return abs(self.alone - self.last) > _INTERACTS
@@ -94,7 +94,7 @@ class AnswerSentence(PageContent):
     Attributes:
         result: The explanation.
         nothing_moved: What is said where nothing moves; "" where something does.
-        gap, floor, brought: Of the explanation, with their unit.
+        gap, floor, equalized_gap: Of the explanation, with their unit.
         cause_words: The sentence on the largest cause; "" where the verdict is another.
         place_words: That on what was left out; "" where the verdict is another.
     """
@@ -104,7 +104,7 @@ class AnswerSentence(PageContent):
     nothing_moved: str
     gap: str
     floor: str
-    brought: str
+    equalized_gap: str
     cause_words: str
     place_words: str
 
@@ -117,20 +117,26 @@ class AnswerSentence(PageContent):
         return ""
 
     @property
-    def leads(self) -> Effect | None:
-        """The cause that takes away most, alone and last; None where either could not be run."""
+    def leading_cause(self) -> Effect | None:
+        """Return the cause that takes away most, alone and last.
+
+        None where no cause could be run both ways.
+        """
         known = [each for each in self.result.ranking if None not in (each.alone, each.last)]
         return known[0] if known else None
 
     @property
     def candidate(self) -> Effect | None:
-        """The cause that takes away most alone, of those that were tried; None of none."""
+        """Return the cause that takes away most alone, of those that were tried.
+
+        None where none was tried.
+        """
         tried = [each for each in self.result.ranking if each.alone is not None]
         return tried[0] if tried else None
 
     @property
     def has_gap(self) -> bool:
-        """Whether there is any gap."""
+        """Tell whether there is any gap."""
         return self.result.gap > 0
 
 
@@ -172,7 +178,7 @@ class PartsSentence(PageContent):
     Attributes:
         is_wider: Whether the gap is wider with all causes equalized: of that one are the parts.
         gap: As the sides come, in `unit`.
-        brought: With all causes equalized, in `unit`.
+        equalized_gap: With all causes equalized, in `unit`.
         unit: Of the quantity.
         explained, located, unexplained: Parts of the gap.
     """
@@ -180,7 +186,7 @@ class PartsSentence(PageContent):
     template = "why_parts.md.j2"
     is_wider: bool
     gap: float
-    brought: float
+    equalized_gap: float
     unit: str
     explained: float
     located: float
@@ -218,7 +224,7 @@ def answer(result: Explanation) -> str:
             nothing_moved=still,
             gap=amount(result, result.gap),
             floor=amount(result, result.floor),
-            brought=amount(result, result.brought or 0.0),
+            equalized_gap=amount(result, result.equalized_gap or 0.0),
             cause_words=cause,
             place_words=place,
         )
@@ -303,14 +309,14 @@ def proofs(result: Explanation) -> tuple[str, ...]:
 
 def parts(result: Explanation) -> str:
     """Say the three parts of a gap, in a sentence without its end."""
-    brought = 0.0 if result.brought is None else result.brought
-    is_wider = result.verdict.answer == "hidden" and brought > 0
-    wider = result.gap / brought if is_wider else 1.0  # parts of the wider gap
+    equalized_gap = 0.0 if result.equalized_gap is None else result.equalized_gap
+    is_wider = result.verdict.answer == "hidden" and equalized_gap > 0
+    wider = result.gap / equalized_gap if is_wider else 1.0  # parts of the wider gap
     return sentence_of(
         PartsSentence(
             is_wider=is_wider,
             gap=result.gap,
-            brought=brought,
+            equalized_gap=equalized_gap,
             unit=result.unit,
             explained=result.explained,
             located=wider * result.located,

@@ -24,28 +24,28 @@ class ApartSentence(PageContent):
 
     @property
     def what(self) -> str:
-        """What is up to so far apart."""
+        """Return a phrase that names what is apart."""
         return what_is_apart(self.result)
 
     @property
     def gap(self) -> Deviation | None:
-        """The gap of the quantity that is explained; None where it is rounding."""
+        """Return the gap of the quantity that is explained; None where it is rounding."""
         result = self.result
         return result.first[result.quantity] if result.gap > result.negligible else None
 
     @property
     def divides(self) -> bool:
-        """Whether it is known what of the gap stays with all causes equalized."""
+        """Tell whether it is known what of the gap stays with all causes equalized."""
         verdict = self.result.verdict
         return verdict.divides and verdict.answer != "stopped"
 
     @property
     def nothing_differs(self) -> bool:
-        """Whether nothing differs that is compared."""
+        """Tell whether nothing differs that is compared."""
         return nothing_differs(self.result)
 
 
-def apart(result: Explanation) -> str:
+def apart_sentence(result: Explanation) -> str:
     """Say how far the sides are apart, in a sentence; "" where there is nothing to say."""
     content = ApartSentence(result)
     if content.gap is None and not content.nothing_differs:

@@ -49,13 +49,17 @@ def explanation_of(search: Search) -> Explanation:
     assert gap is not None
     assert search.attribution is not None
     left, right, matched = request.left, request.right, trials.setup.matched
-    division, brought, found = search.attribution.division(), search.brought, search.located
+    division, equalized_gap, localisations = (
+        search.attribution.division(),
+        search.equalized_gap,
+        search.located,
+    )
     motion = _motion(trials, matched)
     shares, impossible = _shares(search, division)
-    explained, located, unexplained = _parts(gap, brought, found)
+    explained, located, unexplained = _parts(gap, equalized_gap, localisations)
     return Explanation(
         experiment=request.scenario.name,
-        says=request.scenario.says,
+        description=request.scenario.description,
         seconds=request.duration,
         labels=request.side_labels,
         quantity=gap.quantity,
@@ -67,8 +71,8 @@ def explanation_of(search: Search) -> Explanation:
         ended_by=search.ended_by,
         method=division.method,
         orders=division.orders,
-        brought=brought,
-        found_in=tuple(part for part in found if not part.side),
+        equalized_gap=equalized_gap,
+        found_in=tuple(part for part in localisations if not part.side),
         explained=explained,
         located=located,
         unexplained=unexplained,
@@ -198,17 +202,17 @@ def _share_of_integrator(part: Localisation) -> Share:
 
 
 def _parts(
-    gap: ExplainedGap, brought: float | None, found: Sequence[Localisation]
+    gap: ExplainedGap, equalized_gap: float | None, localisations: Sequence[Localisation]
 ) -> tuple[float, float, float]:
     """Return what is explained, located and unexplained, as parts of the gap."""
     if not gap.is_divided:
         return 0.0, 0.0, 0.0
-    if brought is None:
+    if equalized_gap is None:
         return 0.0, 0.0, 1.0
-    by_settings = sum(part.share for part in found if part.side)
-    explained = (gap.size - brought) / gap.size + by_settings
-    located = sum(part.share for part in found if not part.side)
-    stays = found[-1].gap if found else brought
+    by_settings = sum(part.share for part in localisations if part.side)
+    explained = (gap.size - equalized_gap) / gap.size + by_settings
+    located = sum(part.share for part in localisations if not part.side)
+    stays = localisations[-1].gap if localisations else equalized_gap
     return explained, located, stays / gap.size
 
 
@@ -252,7 +256,7 @@ def _unread(matched: Matched, request: WhyRequest, gap: ExplainedGap) -> tuple[s
     """Return names of differences that only a function would read, where none does."""
     if not request.are_compiled:
         return ()
-    is_read = request.scenario.own
+    is_read = request.scenario.is_user_function
     rows: list[ModelDifference] = []
     if not (is_read and gap.is_divided):
         rows += readable_of(matched)

@@ -44,12 +44,12 @@ class Cause:
 
     @property
     def kind(self) -> str:
-        """The kind of the elements: "body", "joint", "option", "run", "engine", …"""
+        """Return the kind of the elements: "body", "joint", "option", "run", "engine", …"""
         return self.differences[0].kind
 
     @property
     def only_read(self) -> bool:
-        """Whether nothing depends on it but a function of the user's that reads it."""
+        """Tell whether only a function of the user's that reads it can depend on it."""
         return all(row.only_read for row in self.differences)
 
     @property
@@ -90,15 +90,15 @@ def differences_of(
         finer: By single entries, where they can be brought over one by one.
         readable: Whether that counts on which nothing but a function of the user's depends.
     """
-    own = raw_engine_of(DEFAULT)
+    engine = raw_engine_of(DEFAULT)
     rows = [
         _specified(row, left, right)
-        for row in own.differences(left.compiled, right.compiled, matched, world=world)
+        for row in engine.differences(left.compiled, right.compiled, matched, world=world)
     ]
     if readable:
         rows += readable_of(matched)
     if finer:
-        rows = [part for row in rows for part in own.entries(right.compiled, row)]
+        rows = [part for row in rows for part in engine.entries(right.compiled, row)]
     only_left, only_right = matched.only
     base = Bases(base_of(left), base_of(right))
     if base.differ:
@@ -116,10 +116,10 @@ def _specified(row: ModelDifference, left: Model, right: Model) -> ModelDifferen
     """
     if not (row.spec_edits or row.spec_edits_one):
         return row
-    own = raw_engine_of(DEFAULT)
-    if row.spec_edits and own.can_be_respecified(right.path):
+    engine = raw_engine_of(DEFAULT)
+    if row.spec_edits and engine.can_be_respecified(right.path):
         return replace(row, spec_edits_one=())
-    if row.spec_edits_one and own.can_be_respecified(left.path):
+    if row.spec_edits_one and engine.can_be_respecified(left.path):
         return replace(row, spec_edits=())
     return replace(row, spec_edits=(), spec_edits_one=(), refused=_NOT_COMPILED_ANEW)
 
@@ -174,13 +174,13 @@ def built(model: Model, edits: tuple[Edit, ...], spec_edits: tuple[SpecEdit, ...
     Raises:
         UnsupportedError, ModelError: As `Model.with_compiled`, and as `respecified` of a room.
     """
-    own, compiled = raw_engine_of(DEFAULT), model.compiled
+    engine, compiled = raw_engine_of(DEFAULT), model.compiled
     if spec_edits:
-        compiled = own.respecified(model.path, compiled, spec_edits)
-        edits = own.in_places_of(model.compiled, compiled, edits)
+        compiled = engine.respecified(model.path, compiled, spec_edits)
+        edits = engine.in_places_of(model.compiled, compiled, edits)
     if not (edits or spec_edits):
         return model
-    return model.with_compiled(own.edited(compiled, edits))
+    return model.with_compiled(engine.edited(compiled, edits))
 
 
 def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
@@ -203,13 +203,13 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
 
 def _merged(rows: Sequence[ModelDifference], finer: bool) -> tuple[Cause, ...]:
     """Return differences as causes, of which several may have one name."""
-    able = [row for row in rows if not row.refused]
+    equalizable = [row for row in rows if not row.refused]
     refused = _grouped([row for row in rows if row.refused], _title)
     if finer:
-        return (*_grouped(able, _title), *refused)
+        return (*_grouped(equalizable, _title), *refused)
     changed_masses = {
         (row.where, row.subject)
-        for row in able
+        for row in equalizable
         if row.kind == "body" and row.subject in MASS_SUBJECTS
     }
 
@@ -223,7 +223,7 @@ def _merged(rows: Sequence[ModelDifference], finer: bool) -> tuple[Cause, ...]:
             return row.kind, row.where
         return _change(row)
 
-    return (*_grouped(able, change), *refused)
+    return (*_grouped(equalizable, change), *refused)
 
 
 def _title(row: ModelDifference) -> Hashable:

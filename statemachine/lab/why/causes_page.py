@@ -14,7 +14,7 @@ from .answer_page import amount, refused
 from .explanation import Explanation, FailedSet, Share
 from .locate import Localisation
 from .shares import ADDS_UP
-from .table_page import able, is_beyond, is_noisy, tables, without_effect
+from .table_page import equalizable_shares, is_beyond, is_noisy, tables, without_effect
 
 _SINGULAR = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
 
@@ -49,17 +49,17 @@ class CausesPart(PageContent):
 
     @property
     def what(self) -> str:
-        """What is up to so far apart."""
+        """Return a phrase that names what is apart."""
         return what_is_apart(self.result)
 
     @property
     def gap(self) -> Deviation:
-        """The gap of the quantity that is explained."""
+        """Return the gap of the quantity that is explained."""
         return self.result.first[self.result.quantity]
 
     @property
     def elsewhere(self) -> tuple[OtherGap, ...]:
-        """The gaps in other quantities."""
+        """Return the gaps in the other quantities."""
         result = self.result
         return tuple(
             OtherGap(name.replace(",", ""), gap)
@@ -69,68 +69,70 @@ class CausesPart(PageContent):
 
     @property
     def is_negligible(self) -> bool:
-        """Whether the gap is taken for rounding."""
+        """Tell whether the gap is taken for rounding."""
         return self.result.gap <= self.result.negligible
 
     @property
     def is_chance(self) -> bool:
-        """Whether the gap may be chance."""
+        """Tell whether the gap may be chance."""
         return not (self.is_negligible or self.result.verdict.divides)
 
     @property
     def floor(self) -> str:
-        """The chaos floor, with its unit."""
+        """Return the chaos floor, with its unit."""
         return amount(self.result, self.result.floor)
 
     @property
     def floor_part(self) -> float:
-        """The chaos floor, as a part of the gap; 0 where that was not divided."""
+        """Return the chaos floor as a part of the gap; 0 where that was not divided."""
         result = self.result
         return result.floor / result.gap if result.verdict.divides else 0.0
 
     @property
     def has_floor(self) -> bool:
-        """Whether there is a chaos floor to be told."""
+        """Tell whether a chaos floor limits the parts of the gap."""
         return self.result.verdict.divides and self.result.floor > 0
 
     @property
     def is_noisy(self) -> bool:
-        """Whether parts of the gap may be chance."""
+        """Tell whether parts of the gap may be chance."""
         return is_noisy(self.result)
 
     @property
     def clear(self) -> float:
-        """How many times its chaos floor a gap must be to be more than chance."""
+        """Return how many times its chaos floor a gap must be to be more than chance."""
         return CLEAR
 
     @property
     def nothing_differs(self) -> bool:
-        """Whether nothing differs that is compared."""
+        """Tell whether nothing differs that is compared."""
         return nothing_differs(self.result)
 
     @property
     def without_effect(self) -> tuple[str, ...]:
-        """Names of the differences without an effect."""
-        return tuple(row.name for row in without_effect(self.result, able(self.result)))
+        """Return the names of the differences without an effect."""
+        return tuple(
+            row.name for row in without_effect(self.result, equalizable_shares(self.result))
+        )
 
     @property
     def adds_up(self) -> float:
-        """The part of the gap to within which the parts add up."""
+        """Return the part of the gap to within which the parts add up."""
         return ADDS_UP
 
     @property
     def is_beyond(self) -> bool:
-        """Whether a cause takes away more than all of the gap."""
-        return any(is_beyond(row) for row in able(self.result))
+        """Tell whether a cause takes away more than all of the gap."""
+        return any(is_beyond(row) for row in equalizable_shares(self.result))
 
     @property
     def refused(self) -> tuple[Share, ...]:
-        """What cannot be made the same."""
+        """Return the causes that cannot be equalized."""
         return tuple(refused(self.result))
 
     @property
     def first_impossible(self) -> FailedSet | None:
-        """The smallest set of causes that could not be run; None where all could."""
+        """Return the smallest set of causes that could not be run; None where all could."""
         return self.result.impossible[0] if self.result.impossible else None
 
 

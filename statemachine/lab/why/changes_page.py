@@ -43,7 +43,7 @@ class WhyChanges(PageContent):
 
     @property
     def engine(self) -> str:
-        """The engine of which the settings are that come with it; "" of none."""
+        """Return the engine whose settings are those that it comes with; "" where there is none."""
         return engine_as_it_comes(self.result) if self._acting else ""
 
     @property
@@ -56,7 +56,7 @@ class WhyChanges(PageContent):
 
     @property
     def settings(self) -> tuple[SettingChange, ...]:
-        """What else is to be changed."""
+        """Return the settings to change besides attributes of the file."""
         changes: list[SettingChange] = []
         for row in self._acting:
             if not row.changes:
@@ -65,36 +65,36 @@ class WhyChanges(PageContent):
 
     @property
     def has_changes(self) -> bool:
-        """Whether anything is to be changed."""
+        """Tell whether anything is to be changed."""
         return bool(self._acting)
 
     @property
-    def brought(self) -> float | None:
-        """The gap with all of these changed; None where that is not known."""
-        return self.result.brought if self._acting else None
+    def equalized_gap(self) -> float | None:
+        """Return the gap with all of these changed; None where that is not known."""
+        return self.result.equalized_gap if self._acting else None
 
     @property
     def others_may_be_missing(self) -> bool:
-        """Whether differences are left out that have no effect here, and may have one elsewhere."""
-        return 0 < len(self._acting) < len(self._able) and len(self.result.first) > 1
+        """Tell whether differences are left out that act only elsewhere than in what was asked."""
+        return 0 < len(self._acting) < len(self._equalizable) and len(self.result.first) > 1
 
     @property
     def side(self) -> str:
-        """The side that alone has integrators to choose from; "" of none."""
+        """Return the only side that has integrators to choose from; "" where there is none."""
         return next((row.chosen[0] for row in self.result.shares if row.chosen), "")
 
     @property
     def integrator(self) -> str:
-        """The integrator that is to be chosen there; "" of none."""
+        """Return the integrator to choose on that side; "" where there is none."""
         return next((row.chosen[1] for row in self.result.shares if row.chosen), "")
 
     @property
-    def _able(self) -> list[Share]:
+    def _equalizable(self) -> list[Share]:
         return [row for row in self.result.shares if not (row.note or row.chosen)]
 
     @property
     def _acting(self) -> list[Share]:
-        return [row for row in self._able if has_effect(row)]
+        return [row for row in self._equalizable if has_effect(row)]
 
 
 def steps(result: Explanation) -> list[Block]:
@@ -123,8 +123,8 @@ def engine_as_it_comes(result: Explanation) -> str:
     """Return an engine with its own settings, where such settings are causes; else ""."""
     if not any(row.kind == "engine" for row in result.shares):
         return ""
-    for label, made in zip(result.labels, result.provenance, strict=True):
+    for label, provenance in zip(result.labels, result.provenance, strict=True):
         comes_with_its_own = ":engine" in label or "engine defaults" in label
-        if comes_with_its_own and made.backend != DEFAULT:
-            return made.backend
+        if comes_with_its_own and provenance.backend != DEFAULT:
+            return provenance.backend
     return ""

@@ -38,12 +38,12 @@ class Deadline:
 
     @property
     def elapsed(self) -> float:
-        """The time since the beginning [s]."""
+        """Return the time since the beginning [s]."""
         return self._clock() - self.began
 
     @property
     def left(self) -> float:
-        """The time that is left [s]; infinite where there is no end."""
+        """Return the time that is left [s]; infinite where there is no end."""
         return math.inf if self.seconds is None else self.seconds - self.elapsed
 
     def check(self, _fraction: float = 1.0) -> None:

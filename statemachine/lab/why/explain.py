@@ -90,16 +90,16 @@ def _match(request: WhyRequest) -> Matched:
     return match_alike(request.left, request.right)
 
 
-def _ended(trials: Trials, able: list[str]) -> EndedEarlyError:
+def _ended(trials: Trials, equalizable: list[str]) -> EndedEarlyError:
     """Return the error that a side does not reach the end, and by which causes alone it would."""
-    reason, cures = trials.ended, list[str]()
+    reason, sufficient = trials.ended, list[str]()
     try:
-        for name in able:
+        for name in equalizable:
             if trials.gaps(frozenset({name})):
-                cures.append(name)
+                sufficient.append(name)
     except TimeIsUp:  # those that are known by then
         pass
     text = f"as they come, a side does not reach the end: {reason}"
-    if cures:
-        text += f"; both reach it if one of these is brought to the same: {', '.join(cures)}"
+    if sufficient:
+        text += f"; both reach it if one of these is brought to the same: {', '.join(sufficient)}"
     return EndedEarlyError(text, ended=reason)

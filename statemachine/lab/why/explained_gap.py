@@ -40,7 +40,7 @@ class ExplainedGap:
 
     @property
     def is_divided(self) -> bool:
-        """Whether there is a gap to divide among causes."""
+        """Tell whether there is a gap to divide among causes."""
         state = gap_state(self.size, self.negligible, self.tolerance, self.floor)
         return state == "beyond"
 
@@ -57,8 +57,8 @@ def named_quantity(trials: Trials, words: str | None) -> str | None:
     if quantity not in trials.ruler.units:
         further = trials.ruler.further_quantities
         known = (*trials.ruler.units, *further, *trials.traces[0].header.joint_labels)
-        called = dict.fromkeys(name.replace(",", "") for name in known)
-        raise unknown_name("quantity", quantity, called)
+        choices = dict.fromkeys(name.replace(",", "") for name in known)
+        raise unknown_name("quantity", quantity, choices)
     return quantity
 
 
@@ -128,8 +128,8 @@ def _quantity(
     of_base = {name: beyond[name] for name in ruler.of_base if beyond.get(name, 0.0) > 1}
     if of_base:
         return max(of_base, key=of_base.__getitem__)
-    own = {name: beyond[name] for name in ruler.coordinates if beyond.get(name, 0.0) > 1}
-    most = max(own or beyond, key=beyond.__getitem__, default=preferred)
+    coordinates = {name: beyond[name] for name in ruler.coordinates if beyond.get(name, 0.0) > 1}
+    most = max(coordinates or beyond, key=beyond.__getitem__, default=preferred)
     if preferred in beyond and beyond[most] <= 1:
         return preferred
     return most

@@ -112,7 +112,7 @@ class Effect:
 
     @property
     def range(self) -> Range | None:
-        """The least and the largest of both; None where neither is known."""
+        """Return the least and the largest effect, alone or last; None where neither is known."""
         effects = self._known()
         return (min(effects), max(effects)) if effects else None
 
@@ -131,7 +131,7 @@ class Explanation:
 
     Attributes:
         experiment: What was run.
-        says: What happens in it, in a sentence.
+        description: What happens in it, in a sentence.
         seconds: Simulated time [s].
         labels: What the sides are called; differences are brought from the right to the left.
         quantity: What the gap is measured in.
@@ -149,8 +149,8 @@ class Explanation:
         method: How the shares were computed; "alone and last" where each cause was equalized alone,
             and last, and no share is known yet; "not ranked" where the search was ended before.
         orders: How many orders were drawn for that.
-        brought: The gap with all causes equalized that can be, in `unit`; None if that could not
-            be run, or was not run yet.
+        equalized_gap: The gap with all causes equalized that can be, in `unit`; None if that could
+            not be run, or was not run yet.
         found_in: What the rest is found in by leaving features out on both sides.
         explained: The part of the gap that goes where settings are equalized.
         located: The part that goes only where something is left out on both sides: it says
@@ -193,7 +193,7 @@ class Explanation:
     """
 
     experiment: str
-    says: str
+    description: str
     seconds: float
     labels: tuple[str, str]
     quantity: str
@@ -205,7 +205,7 @@ class Explanation:
     ended_by: EndedBy
     method: Method
     orders: int
-    brought: float | None
+    equalized_gap: float | None
     found_in: tuple[Localisation, ...]
     explained: float
     located: float
@@ -240,19 +240,19 @@ class Explanation:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the search came to its end."""
+        """Tell whether the search came to its end."""
         return not (self.ended_by or self.method in ("not ranked", "alone and last"))
 
     @property
     def ranking(self) -> tuple[Effect, ...]:
-        """What each cause takes away alone and last, as far as is known, the largest first."""
+        """Return the known effects of each cause, alone and last, the largest first."""
         effects = [Effect(row.name, row.alone, row.last) for row in self.shares]
         known = [effect for effect in effects if effect.range is not None]
         return tuple(sorted(known, key=Effect.size, reverse=True))
 
     @property
     def verdict(self) -> GapVerdict:
-        """What the gap comes from, and whether that answers the question."""
+        """Return what the gap comes from, and whether that answers the question."""
         state = gap_state(self.gap, self.negligible, self.tolerance, self.floor)
         refused = any(row.note for row in self.shares)
         facts = Facts(

@@ -51,9 +51,9 @@ class Game:
         """Tell whether all that the causes of a set need is in it."""
         return all(self.needs[c] in equalized for c in equalized if c in self.needs)
 
-    def expect(self, wanted: Iterable[Subset]) -> None:
+    def expect(self, subsets: Iterable[Subset]) -> None:
         """Say which sets are evaluated next."""
-        possible = dict.fromkeys(subset for subset in wanted if self.can_be(subset))
+        possible = dict.fromkeys(subset for subset in subsets if self.can_be(subset))
         missing = [subset for subset in possible if subset not in self.parts]
         self._expected |= dict.fromkeys(missing)
         self._ahead(missing)
@@ -77,13 +77,13 @@ class Game:
         sets = [subset for subset, part in self.parts.items() if math.isnan(part)]
         return tuple(sorted(sets, key=lambda subset: (len(subset), sorted(subset))))
 
-    def takes(self, cause: str, before: Subset) -> float:
+    def effect(self, cause: str, before: Subset) -> float:
         """Return what a cause takes away after others; NaN where that cannot be, or be run."""
         if not self.can_be(before) or not self.can_be(before | {cause}):
             return math.nan
         return self(before) - self(before | {cause})
 
-    def took(self, cause: str, before: Subset) -> float:
+    def evaluated_effect(self, cause: str, before: Subset) -> float:
         """Return the same of sets that are evaluated; NaN of others."""
         left = self.parts.get(before, math.nan)
         return left - self.parts.get(before | {cause}, math.nan)
@@ -128,6 +128,6 @@ def _fails_always(game: Game, cause: str) -> bool:
 def _completed(game: Game, causes: Subset) -> Subset:
     """Return the causes without those that need one that is missing."""
     while not game.can_be(causes):
-        lacking = [c for c in causes if c in game.needs and game.needs[c] not in causes]
-        causes = causes - frozenset(lacking)
+        incomplete = [c for c in causes if c in game.needs and game.needs[c] not in causes]
+        causes = causes - frozenset(incomplete)
     return causes

@@ -270,14 +270,14 @@ class Ruler:
 
     @property
     def coordinates(self) -> list[str]:
-        """The quantities that follow from no others, as those that `compare` names first."""
+        """Return the quantities that follow from no others, which `compare` names first, too."""
         places = {self._tip, *map(self._relative_to_tip, self._names)}
         coordinates = [name for name in self.units if name not in places]
         return [name for name in coordinates if name not in ASKED]
 
     @property
     def of_base(self) -> list[str]:
-        """The quantities that are the pose of the floating base; none where it is fixed."""
+        """Return the quantities of the pose of the floating base; none where it is fixed."""
         return [name for name in self.coordinates if QUANTITIES[self._kinds[name]].of_base]
 
     def tolerance(self, quantity: str) -> float:
@@ -318,11 +318,11 @@ class Ruler:
                 that ended early.
             measure: Which figure of a Deviation; the largest of a perturbed run counts.
         """
-        stood = [curves for curves in perturbed if curves is not None]
-        bound = 0.0 if len(stood) == len(perturbed) else np.inf
+        completed = [curves for curves in perturbed if curves is not None]
+        bound = 0.0 if len(completed) == len(perturbed) else np.inf
         floors: dict[str, float] = {}
         for name in self.units:
-            sizes = [size_of(self.gap(name, run, curves), measure) for curves in stood]
+            sizes = [size_of(self.gap(name, run, curves), measure) for curves in completed]
             floors[name] = max([bound, *sizes])
         return floors
 
@@ -359,13 +359,13 @@ def touched_at_start(trace: Trace, robot: frozenset[str]) -> frozenset[str]:
     return frozenset(touched) - robot
 
 
-def first_touch(traces: Sequence[Trace], time: Array, apart: Array) -> FirstTouch | None:
+def first_touch(traces: Sequence[Trace], time: Array, gap: Array) -> FirstTouch | None:
     """Find the first contact of some runs; None where nothing touches, or no engine tells of it.
 
     Args:
         traces: The runs.
         time: (n,) moments since the start [s].
-        apart: (n,) how far apart the runs are there.
+        gap: (n,) how far apart the runs are there.
     """
     met = [
         (float(trace.time[rows.argmax()] - trace.time[0]), pair)
@@ -378,5 +378,5 @@ def first_touch(traces: Sequence[Trace], time: Array, apart: Array) -> FirstTouc
     when, what = min(met, key=lambda touch: touch[0])
     # A contact found at a moment acts from that moment on: the moment itself is before it. Where
     # something touches at the start no moment shows the rest alone.
-    before = apart[(time <= when + 1e-9) & (when > 0)]
+    before = gap[(time <= when + 1e-9) & (when > 0)]
     return FirstTouch(when, what, float(before.max(initial=0.0)), len(before))

@@ -166,7 +166,7 @@ def _by_integrator(
 ) -> Localisation:
     """Return the part of a gap that goes when both sides run with one integrator."""
     setup = remainder.trials.setup
-    alone = remainder.size(frozenset(), frozenset(), integrator)
+    gap_alone = remainder.size(frozenset(), frozenset(), integrator)
     side: Literal["left", "right", ""] = ""
     if is_setting:
         side = "right" if setup.selects[0] else "left"
@@ -175,7 +175,7 @@ def _by_integrator(
         without=integrator,
         values=(setup.integrator_of(0), setup.integrator_of(1)),
         share=share,
-        alone=None if alone is None else 1.0 - alone / remainder.gap,
+        alone=None if gap_alone is None else 1.0 - gap_alone / remainder.gap,
         gap=rest,
         is_still=remainder.is_still(without),
         side=side,

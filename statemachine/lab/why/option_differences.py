@@ -43,9 +43,9 @@ def differences_by_option(
             continue
         values: list[DifferingQuantity] = []
         for option, attribute in options.items():
-            ours, theirs = getattr(left, attribute), getattr(right, attribute)
-            if not np.array_equal(ours, theirs):
-                values.append(_quantity_of_option(option, ours, theirs))
+            left_value, right_value = getattr(left, attribute), getattr(right, attribute)
+            if not np.array_equal(left_value, right_value):
+                values.append(_quantity_of_option(option, left_value, right_value))
         if values and options.keys() <= set(right.capabilities.options):
             subject = TIMESTEP_AND_PERIOD if name == "timestep" and periods_differ else name
             yield ModelDifference(subject, "option", "", tuple(values))

@@ -31,15 +31,15 @@ def slots_of_ctrl(matched: Matched, *, ordered: bool, completed: bool) -> list[t
         completed: Whether the list has the places of the left, with those of actuators that the
             right has not; else those of the right.
     """
-    theirs = [b for _, b in sorted(matched.actuators)]
+    right_slots = [b for _, b in sorted(matched.actuators)]
     if completed:
         places = sorted(a for a, _ in matched.actuators)
-        alone: list[tuple[int, int]] = []
+        unmatched: list[tuple[int, int]] = []
     else:
-        places = sorted(theirs)
-        alone = [(b, b) for b in range(matched.right.nu) if b not in places]
-    common = zip(places, theirs if ordered else sorted(theirs), strict=True)
-    return sorted([*common, *alone])
+        places = sorted(right_slots)
+        unmatched = [(b, b) for b in range(matched.right.nu) if b not in places]
+    common = zip(places, right_slots if ordered else sorted(right_slots), strict=True)
+    return sorted([*common, *unmatched])
 
 
 def in_order_of_left(left: Model, right: Model, matched: Matched) -> Model:
@@ -52,7 +52,7 @@ def in_order_of_left(left: Model, right: Model, matched: Matched) -> Model:
         right: The Model of the right, as it is run.
         matched: What of the left is what of the right.
     """
-    own = raw_engine_of(DEFAULT)
+    engine = raw_engine_of(DEFAULT)
     solids = [
         BodyPair(pair.right, pair.left, _inverse(pair.align), pair.moved) for pair in matched.solids
     ]
@@ -63,14 +63,14 @@ def in_order_of_left(left: Model, right: Model, matched: Matched) -> Model:
         solids=tuple(solids),
     )
     rows = [
-        *own.differences(right.compiled, left.compiled, swapped),
-        *own.readable(right.compiled, left.compiled, swapped),
+        *engine.differences(right.compiled, left.compiled, swapped),
+        *engine.readable(right.compiled, left.compiled, swapped),
     ]
     edits = [edit for row in rows if not row.refused for edit in row.edits]
-    shown = on_default(left).with_compiled(own.edited(left.compiled, edits))
-    if (shown.timestep, shown.substeps) != (right.timestep, right.substeps):
-        shown = shown.replace(timestep=right.timestep, substeps=right.substeps)
-    return shown
+    view = on_default(left).with_compiled(engine.edited(left.compiled, edits))
+    if (view.timestep, view.substeps) != (right.timestep, right.substeps):
+        view = view.replace(timestep=right.timestep, substeps=right.substeps)
+    return view
 
 
 def _inverse(align: Placement) -> Placement:
@@ -84,7 +84,7 @@ def _turned(pairs: Pairs) -> Pairs:
 
 def seen_in_order_of_left(
     controller_of: Callable[[Model], Controller],
-    shown: Model,
+    view: Model,
     matched: Matched,
     slots: list[tuple[int, int]],
     starts: tuple[Array, Array],
@@ -95,25 +95,25 @@ def seen_in_order_of_left(
 
     Args:
         controller_of: Makes the controller that reads and writes in the order of a Model.
-        shown: That of `in_order_of_left`.
+        view: That of `in_order_of_left`.
         matched: What of the left is what of the right.
         slots: Which of its commands is for which number of the right's ctrl.
         starts: Ctrl (nu,) of the left, and of the right, which what nobody commands keeps.
         mocap_in_order: Whether mocap bodies, too, are in the order of the left.
     """
-    controller = controller_of(shown)
+    controller = controller_of(view)
     data = raw_engine_of(DEFAULT).data_in_other_order(
-        shown, _elements(shown, matched, mocap_in_order)
+        view, _elements(view, matched, mocap_in_order)
     )
     data.ctrl[:] = starts[0]
 
     def translate(_right: Model, source: Data) -> Array | None:
         data.show(source)
         before = np.array(data.ctrl)
-        wanted = controller(shown, data)
+        ctrl = controller(view, data)
         data.give_back()
-        if wanted is not None:
-            data.ctrl[:] = np.asarray(wanted, np.float64)
+        if ctrl is not None:
+            data.ctrl[:] = np.asarray(ctrl, np.float64)
         elif np.array_equal(before, data.ctrl):  # nor did it write into data.ctrl
             return None
         return _by_number(data.ctrl, slots, starts[1])

@@ -19,9 +19,9 @@ from ..compare.base_frame_page import base_frame_blocks
 from ..compare.call_periods_page import call_periods_blocks
 from ..compare.chaos import CLEAR
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
-from ..compare.labels import lacking
+from ..compare.labels import lines_on_unmatched
 from .answer_page import amount, answer, missing, parts, proofs, refused
-from .apart_page import apart
+from .apart_page import apart_sentence
 from .causes_page import causes
 from .changes_page import engine_as_it_comes, steps
 from .explanation import Explanation
@@ -53,17 +53,17 @@ class WhyPage(PageContent):
 
     @property
     def base_frame(self) -> Sequence[Block]:
-        """That the base has another frame on either side."""
+        """Return a note where the base has another frame on either side."""
         bases = self.result.bases
         return [] if bases is None else base_frame_blocks(bases.frame)
 
     @property
-    def called(self) -> Sequence[Block]:
-        """How often a function is called on both sides, where that is not the same."""
+    def call_periods_note(self) -> Sequence[Block]:
+        """Return a warning where a function is called at different intervals on the two sides."""
         return call_periods_blocks(self.result.call_periods)
 
     @property
-    def known(self) -> Sequence[Block]:
+    def known_changes(self) -> Sequence[Block]:
         """Known changes between two releases that concern the runs."""
         versions = [side.versions[side.backend] for side in self.result.provenance]
         changes = [ShownChange(versions[0], versions[1], change) for change in self.result.changes]
@@ -71,47 +71,47 @@ class WhyPage(PageContent):
 
     @property
     def causes(self) -> Table:
-        """The causes, the largest share first."""
+        """Return a table of the causes, the largest share first."""
         return summary_table(self.result, self.most_rows)
 
     @property
     def conclusion(self) -> Conclusion:
-        """Which sentence ends the verdict."""
+        """Return the name of the sentence that ends the verdict."""
         return _conclusion(self.result)
 
     @property
     def parts(self) -> str:
-        """The parts of a gap, in a sentence without its end."""
+        """Return the parts of the gap, as a sentence without its end."""
         return parts(self.result)
 
     @property
     def floor(self) -> str:
-        """The chaos floor, with its unit."""
+        """Return the chaos floor, with its unit; "not looked for" where no run was perturbed."""
         return amount(self.result, self.result.floor) if self.result.draws else "not looked for"
 
     @property
     def refused_names(self) -> tuple[str, ...]:
-        """Names of what cannot be made the same."""
+        """Return the names of the causes that cannot be equalized."""
         return tuple(row.name for row in refused(self.result))
 
     @property
     def clear(self) -> float:
-        """How many times its chaos floor a gap must be to be more than chance."""
+        """Return how many times its chaos floor a gap must be to be more than chance."""
         return CLEAR
 
     @property
-    def lacking(self) -> tuple[str, ...]:
-        """What one side has nothing of, as sentences without their end."""
+    def missing_parts(self) -> tuple[str, ...]:
+        """Return what one side has nothing of, as sentences without their end."""
         return tuple(missing(self.result.missing))
 
     @property
     def engine(self) -> str:
-        """The engine of which the settings are that come with it; "" of none."""
+        """Return the engine whose settings are those that it comes with; "" where there is none."""
         return engine_as_it_comes(self.result)
 
     @property
     def rewritten(self) -> Sequence[Block]:
-        """What was written of the right's file, if that was asked."""
+        """Return what was written of the right's file; empty where that was not asked."""
         if self.result.rewritten is None:
             return []
         if self.further:
@@ -120,12 +120,12 @@ class WhyPage(PageContent):
 
     @property
     def advice(self) -> Advice:
-        """Which sentence leads to the next command."""
+        """Return the name of the sentence before the next command."""
         return _advice(self.result)
 
     @property
     def next_command(self) -> str:
-        """What to type next, in lines; "" where that is not known."""
+        """Return the command to type next, in lines; "" where it is not known."""
         return _next_command(self.result, self.advice)
 
 
@@ -142,50 +142,50 @@ class WhyDetails(PageContent):
 
     @property
     def left(self) -> str:
-        """What the left is called."""
+        """Return the label of the left side."""
         return self.result.labels[0]
 
     @property
     def right(self) -> str:
-        """What the right is called."""
+        """Return the label of the right side."""
         return self.result.labels[1]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader should know, in sentences."""
-        only = lacking(self.result.unmatched, ("the left", "the right"))
+        """Return what a reader should know, in sentences."""
+        only = lines_on_unmatched(self.result.unmatched, ("the left", "the right"))
         return (*only, *self.result.notes)
 
     @property
     def renamed(self) -> Table:
-        """What was taken for one although the names differ."""
+        """Return a table of the pairs whose names differ."""
         rows = [(pair.kind, pair.left, pair.right, pair.shared) for pair in self.result.renamed]
         heads = ("kind", "left", "right", "what both share")
         return Table(heads, rows, words=frozenset({0, 1, 2, 3}))
 
     @property
     def proofs(self) -> tuple[str, ...]:
-        """What the run itself shows of the cause, in sentences."""
+        """Return what the run itself shows of the cause, in sentences."""
         return proofs(self.result)
 
     @property
     def causes(self) -> Sequence[Block]:
-        """How far apart the sides are, and how much of it each difference explains."""
+        """Return the gap between the sides, and how much of it each difference explains."""
         return causes(self.result)
 
     @property
     def changes(self) -> Sequence[Block]:
-        """What to change on the right."""
+        """Return what to change on the right."""
         return steps(self.result)
 
     @property
     def parts(self) -> Sequence[Block]:
-        """The three parts of the gap."""
+        """Return the three parts of the gap."""
         return three_parts(self.result)
 
     @property
     def is_soft(self) -> bool:
-        """Whether what stays is contact, and MuJoCo is one of the engines."""
+        """Tell whether the rest of the gap is in contacts, and MuJoCo is one of the engines."""
         result = self.result
         if not (result.verdict.divides and _is_found(result) and _engines_differ(result)):
             return False
@@ -194,7 +194,7 @@ class WhyDetails(PageContent):
 
     @property
     def both_differ(self) -> bool:
-        """Whether both the file and the engine differ."""
+        """Tell whether both the file and the engine differ."""
         return _engines_differ(self.result) and _files_differ(self.result)
 
 
@@ -218,7 +218,7 @@ def page(result: Explanation, details: bool = False) -> Page:
 def _page(content: WhyPage) -> Page:
     """Return the page of a content, below its verdict."""
     result = content.result
-    headline = Headline(answer(result), end=apart(result), holds=result.verdict.holds)
+    headline = Headline(answer(result), end=apart_sentence(result), holds=result.verdict.holds)
     title = f"{result.experiment}: why {' and '.join(result.labels)} differ"
     return Page(title, "", render_blocks(content), headline)
 

@@ -73,12 +73,12 @@ class WhyRequest:
 
     @property
     def duration(self) -> float:
-        """The simulated time [s]."""
+        """Return the simulated time [s]."""
         return self.scenario.seconds if self.seconds is None else self.seconds
 
     @property
     def side_labels(self) -> tuple[str, str]:
-        """What the sides are called: by default their files and engines.
+        """Return the labels of the sides: by default their files and engines.
 
         Two files of one name have the folders by which they differ.
         """
@@ -89,7 +89,7 @@ class WhyRequest:
 
     @property
     def are_compiled(self) -> bool:
-        """Whether both sides have a compiled model, by which they can be matched and edited."""
+        """Tell whether both sides have a compiled model, by which they are matched and edited."""
         return self.left.compiled is not None and self.right.compiled is not None
 
 

@@ -223,18 +223,18 @@ class _Rewriter:
             return self._loaded(part, self._texts())
         except StateMachineError:
             pass
-        kept: list[AttributeText] = []
+        accepted_texts: list[AttributeText] = []
         for name, accepted in [*self._accepted.items()]:
             try:
-                self._loaded(part, [*kept, *accepted.texts])
+                self._loaded(part, [*accepted_texts, *accepted.texts])
             except StateMachineError as error:
                 self._reasons[name] = one_line(error).replace(
                     os.fspath(part), self._request.target.name
                 )
                 del self._accepted[name]
             else:
-                kept += accepted.texts
-        return self._loaded(part, kept)
+                accepted_texts += accepted.texts
+        return self._loaded(part, accepted_texts)
 
     def _loaded(self, part: Path, texts: Sequence[AttributeText]) -> Model:
         """Write the file with some attributes, and load it."""
@@ -304,7 +304,7 @@ def geoms_of_left(matched: Matched) -> dict[int, int]:
     """Return for each geom of the right its counterpart on the left."""
     left, right = matched.left.compiled, matched.right.compiled
     pairs = raw_engine_of(DEFAULT).shown_elements(left, right, matched)["geom"]
-    return {theirs: ours for ours, theirs in pairs}
+    return {right_geom: left_geom for left_geom, right_geom in pairs}
 
 
 def form_of_right(left: Model, right: Model, matched: Matched, source: XmlSource) -> FileForm:

@@ -27,32 +27,32 @@ class RewrittenPart(PageContent):
 
     @property
     def is_run(self) -> bool:
-        """Whether the file was run."""
+        """Tell whether the file was run."""
         return bool(self.rewritten.quantity)
 
     @property
     def is_measured(self) -> bool:
-        """Whether its run reached the end."""
+        """Tell whether the run of the file reached its end."""
         return self.rewritten.gap is not None
 
     @property
     def all_written(self) -> bool:
-        """Whether nothing stays that differs."""
+        """Tell whether no difference is left in the file."""
         return not self.rewritten.not_written
 
     @property
     def changes(self) -> tuple[AttributeChange, ...]:
-        """The attributes that have a row."""
+        """Return the attributes that have a row in the table."""
         return self.rewritten.written if self.has_changes else ()
 
     @property
     def refusals(self) -> tuple[UnwrittenChange, ...]:
-        """What was not written, as far as it has a row."""
+        """Return the changes that were not written, as far as they have a row in the table."""
         return self.rewritten.not_written[: self.most]
 
     @property
     def more_refusals(self) -> int:
-        """How much of what was not written has no row, where some has one."""
+        """Return the number of unwritten changes without a row; 0 where the table has no limit."""
         if not self.most:
             return 0
         return len(self.rewritten.not_written) - len(self.refusals)

@@ -48,15 +48,18 @@ def _of_positions(
 ) -> Iterator[ModelDifference]:
     """Yield the coordinate of the start that is farthest off, as the right numbers it."""
     left, right = starts
-    apart: dict[float, DifferingQuantity] = {}
-    for name, ours, theirs in (("qpos", left.qpos, right.qpos), ("qvel", left.qvel, right.qvel)):
-        moved = matched.moved(name, ours, theirs)
-        pairs = zip(moved.tolist(), theirs.tolist(), strict=True)
+    by_gap: dict[float, DifferingQuantity] = {}
+    for name, left_array, right_array in (
+        ("qpos", left.qpos, right.qpos),
+        ("qvel", left.qvel, right.qvel),
+    ):
+        left_on_right = matched.to_right(name, left_array, right_array)
+        pairs = zip(left_on_right.tolist(), right_array.tolist(), strict=True)
         for k, (a, b) in enumerate(pairs):
             if abs(a - b) > _SAME:
-                apart[abs(a - b)] = DifferingQuantity(f"{name}[{k}]", a, b)
-    if apart:
-        farthest = apart[max(apart)]
+                by_gap[abs(a - b)] = DifferingQuantity(f"{name}[{k}]", a, b)
+    if by_gap:
+        farthest = by_gap[max(by_gap)]
         yield ModelDifference(START, "run", "", (farthest,))
 
 
@@ -71,18 +74,18 @@ def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
         time = DifferingQuantity("time", left_time, right_time, "s")
         yield ModelDifference("time of the start", "run", "", (time,), edits)
     for subject, field, part in _OF_A_KEYFRAME:
-        ours, theirs = getattr(left, field)[left_key], getattr(right, field)[right_key]
+        left_array, right_array = getattr(left, field)[left_key], getattr(right, field)[right_key]
         pairs = zip(*matched.places[part], strict=True)
-        off = [(a, b) for a, b in pairs if abs(ours[a] - theirs[b]) > _SAME]
+        off = [(a, b) for a, b in pairs if abs(left_array[a] - right_array[b]) > _SAME]
         if off:
-            left_values = tuple(float(ours[a]) for a, _ in off)
-            right_values = tuple(float(theirs[b]) for _, b in off)
+            left_values = tuple(float(left_array[a]) for a, _ in off)
+            right_values = tuple(float(right_array[b]) for _, b in off)
             yield ModelDifference(
                 subject=f"{subject} of the start",
                 kind="run",
                 where="",
                 values=(DifferingQuantity(subject, left_values, right_values),),
-                edits=tuple((field, (right_key, b), float(ours[a])) for a, b in off),
+                edits=tuple((field, (right_key, b), float(left_array[a])) for a, b in off),
             )
 
 

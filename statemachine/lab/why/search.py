@@ -26,7 +26,7 @@ from .trials import Trials
 
 _SETS_MOST = 4096  # of all sets, where a time limit says how many can be run
 _HALF = 0.5  # of the time that is left: if all sets take less, all are run
-_LONG = 5.0  # [s] that the shares take: for less nobody is told the ranking before
+LONG_SEARCH = 5.0  # [s] that the shares take: for less nobody is told the ranking before
 
 
 class Search:
@@ -99,13 +99,13 @@ class Search:
             raise
 
     @property
-    def able(self) -> list[str]:
-        """Names of the causes that can be equalized."""
+    def equalizable(self) -> list[str]:
+        """Return the names of the causes that can be equalized."""
         return [cause.name for cause in self.causes if not cause.refused]
 
     @property
-    def brought(self) -> float | None:
-        """The gap with all causes equalized that can be; None if that is not known."""
+    def equalized_gap(self) -> float | None:
+        """Return the gap with all causes equalized that can be; None if that is not known."""
         if self.gap is None or self.attribution is None or self.attribution.core is None:
             return None
         return self._value(self.attribution.core)
@@ -117,7 +117,7 @@ class Search:
             BadInputError: It does not.
         """
         scenario = self.request.scenario
-        if scenario.own and not self.trials.repeats():
+        if scenario.is_user_function and not self.trials.repeats():
             raise BadInputError(
                 f"two runs of {self.request.side_labels[0]} from the same start differ: "
                 f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
@@ -136,9 +136,11 @@ class Search:
         self.gap = explained_gap(self.trials, self.request, self._quantity, self.first)
         if not self.gap.is_divided:
             self.causes = tuple(cause for cause in self.causes if not cause.only_read)
-        able = self.able if self.gap.is_divided else []
-        game = Game(self._value, self.gap.size or 1.0, self.trials.ahead, self.trials.setup.needs)
-        self.attribution = Attribution(able, game, self.request.seed)
+        equalizable = self.equalizable if self.gap.is_divided else []
+        game = Game(
+            self._value, self.gap.size or 1.0, self.trials.run_ahead, self.trials.setup.needs
+        )
+        self.attribution = Attribution(equalizable, game, self.request.seed)
 
     def _value(self, equalized: Subset) -> float | None:
         """Return the gap with some causes equalized; None where that cannot be run."""
@@ -162,8 +164,8 @@ class Search:
         assert self.gap is not None
         assert self.attribution is not None
         assert self.attribution.core is not None
-        brought = self.brought
-        if brought is None or not self.gap.is_divided:
+        equalized_gap = self.equalized_gap
+        if equalized_gap is None or not self.gap.is_divided:
             return
         remainder = Remainder(
             trials=self.trials,
@@ -171,7 +173,7 @@ class Search:
             quantity=self.gap.quantity,
             measure=self.gap.measure,
             gap=self.gap.size,
-            left=brought,
+            left=equalized_gap,
             bound=max(self.gap.negligible, self.gap.floor),
         )
         with self._reporter.stage("why: where the rest comes from"):
@@ -212,7 +214,7 @@ class Search:
 
     def _tell_if_long(self, sets: int, ranked: Callable[[], None]) -> None:
         """Say that the causes are ranked, if what follows takes long."""
-        if min(sets * self._seconds_of_a_set, self.deadline.left) > _LONG:
+        if min(sets * self._seconds_of_a_set, self.deadline.left) > LONG_SEARCH:
             ranked()
 
     def _take_what_is_known(self) -> None:
@@ -232,13 +234,13 @@ class Search:
             runs: How many runs it makes.
         """
         with self._reporter.stage(f"why: {what}", self.trials.at_once(runs)) as progress:
-            made, began, left = 0, self.deadline.elapsed, self.deadline.left
+            run_count, began, left = 0, self.deadline.elapsed, self.deadline.left
 
             def ran() -> None:
-                nonlocal made
-                made += 1
+                nonlocal run_count
+                run_count += 1
                 of_time = (self.deadline.elapsed - began) / left
-                progress(min(1.0, max(made / max(runs, 1.0), of_time)))
+                progress(min(1.0, max(run_count / max(runs, 1.0), of_time)))
 
             self.trials.ran = ran
             try:

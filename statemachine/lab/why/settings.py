@@ -122,8 +122,8 @@ class OwnSettings:
         """Return the settings as differences; `side` is that of the engine as it comes, 0 or 1."""
         rows: list[ModelDifference] = []
         for name in self.names:
-            own, model = self._own_word(name), self._model_word(name)
-            left, right = (model, own) if side else (own, model)
+            engine_word, model_word = self._own_word(name), self._model_word(name)
+            left, right = (model_word, engine_word) if side else (engine_word, model_word)
             title = TITLES[name]
             value = DifferingQuantity(title, left, right)
             rows.append(ModelDifference(title, "engine", "", (value,)))

@@ -104,19 +104,23 @@ class Setup:
         Args:
             finer: Differences of files by their single entries, each by itself.
         """
-        own = any(self._own_settings)
-        by_option = [] if own else list(differences_by_option(*self.models, self._periods_differ))
+        has_own_settings = any(self._own_settings)
+        by_option = (
+            []
+            if has_own_settings
+            else list(differences_by_option(*self.models, self._periods_differ))
+        )
         self._by_option = frozenset(row.subject for row in by_option)
         rows = [*self._differences_of_files(finer), *self._difference_of_commands()]
         for side, settings in enumerate(self._own_settings):
             if settings:
                 rows += settings.differences(side)
         rows += by_option
-        if self.scenario.own and not self._recordings:
+        if self.scenario.is_user_function and not self._recordings:
             rows += orders_of(self.matched)
-        found = causes(rows, finer)
-        self._causes = {cause.name: cause for cause in found}
-        return found
+        all_causes = causes(rows, finer)
+        self._causes = {cause.name: cause for cause in all_causes}
+        return all_causes
 
     def _differences_of_files(self, finer: bool) -> list[ModelDifference]:
         """Return what compiled models differ in, and where the runs start."""
@@ -133,7 +137,7 @@ class Setup:
             self.matched,
             world=not any(self._own_settings),
             finer=finer,
-            readable=self.scenario.own,
+            readable=self.scenario.is_user_function,
         )
         return [
             *(row for row in rows if row.subject not in elsewhere),
@@ -151,7 +155,7 @@ class Setup:
 
     @property
     def needs(self) -> dict[str, str]:
-        """Of a cause the one that has to be equalized before it."""
+        """Return for a cause the one that has to be equalized before it."""
         if not any(self._own_settings):
             integrators = self.integrator_of(0), self.integrator_of(1)
             return needs_of_limits(self._causes.values(), self.models[1], integrators)
@@ -160,12 +164,12 @@ class Setup:
 
     @property
     def selects(self) -> tuple[int, ...]:
-        """The sides, 0 and 1, that have integrators to choose from."""
+        """Return the sides, 0 and 1, that have integrators to choose from."""
         return tuple(k for k in (0, 1) if self.models[k].capabilities.integrators)
 
     @property
     def integrators(self) -> list[str]:
-        """The integrators that all sides with several have."""
+        """Return the integrators that are on every side which has several, sorted."""
         choices = [set(self.models[side].capabilities.integrators) for side in self.selects]
         return sorted(set[str].intersection(*choices)) if choices else []
 
@@ -183,10 +187,10 @@ class Setup:
         """
         if feature.option in self.scenario.options:
             return False
-        for own, model in zip(self._own_settings, self.models, strict=True):
-            if own and feature.name not in ENGINE_CAN_BE_WITHOUT:
+        for settings, model in zip(self._own_settings, self.models, strict=True):
+            if settings and feature.name not in ENGINE_CAN_BE_WITHOUT:
                 return False
-            if not own and feature.option not in model.capabilities.options:
+            if not settings and feature.option not in model.capabilities.options:
                 return False
         return True
 
@@ -227,7 +231,7 @@ class Setup:
 
     def _is_in_ctrl(self, cause: Cause) -> bool:
         """Tell whether a cause moves the numbers of ctrl that a function of the user's writes."""
-        return self.scenario.own and _has_extra_actuator(cause)
+        return self.scenario.is_user_function and _has_extra_actuator(cause)
 
     def model(self, run: RunKey) -> Model:
         """Return the Model of a run.
@@ -235,22 +239,22 @@ class Setup:
         Raises:
             UnsupportedError, ModelError, EngineError: It cannot be made.
         """
-        own = self._own_settings[run.side]
+        own_settings = self._own_settings[run.side]
         edits: list[Edit] = []
         spec_edits: list[SpecEdit] = []
         for name in sorted(run.equalized):
             edits += self._causes[name].edits(run.side)
             spec_edits += self._causes[name].spec_edits(run.side)
         model = built(self.models[run.side], tuple(edits), tuple(spec_edits))
-        if run.side and not own:
+        if run.side and not own_settings:
             options = options_that_equalize(run.equalized & self._by_option, self.models[0])
             model = model.replace(**options) if options else model
         if run.integrator:
             model = model.replace(integrator=run.integrator)
         settings = self._settings_in(run.equalized)
-        if own and (settings or run.without):
-            emulated = built(own.emulated, tuple(edits), tuple(spec_edits))
-            return own.build(model, emulated, settings, run.without)
+        if own_settings and (settings or run.without):
+            emulated = built(own_settings.emulated, tuple(edits), tuple(spec_edits))
+            return own_settings.build(model, emulated, settings, run.without)
         return leave_out(model, run.without)
 
     def _settings_in(self, equalized: frozenset[str]) -> frozenset[str]:
@@ -267,8 +271,8 @@ class Setup:
         qpos, qvel = start.qpos, start.qvel
         if START in run.equalized:
             left_start = self._starts[0]
-            qpos = self.matched.moved("qpos", left_start.qpos, qpos)
-            qvel = self.matched.moved("qvel", left_start.qvel, qvel)
+            qpos = self.matched.to_right("qpos", left_start.qpos, qpos)
+            qvel = self.matched.to_right("qvel", left_start.qvel, qvel)
         return Rerun(
             model,
             lambda model: self._controller(run.side, model, run.equalized),
@@ -284,8 +288,8 @@ class Setup:
         A function of the user's answers each side. What an experiment commands is the left's: that
         of the left as it comes, whatever is edited.
         """
-        own = self.scenario.own
-        if own and side and not self._recordings:
+        is_user_function = self.scenario.is_user_function
+        if is_user_function and side and not self._recordings:
             return self._own_controller(model, equalized)
         if self._recordings:
             if side and COMMANDS not in equalized:
@@ -294,7 +298,9 @@ class Setup:
                 self._recordings[0]
             )  # in the order of the left's actuators
         else:
-            controller = self.scenario.controller(model if own else self.models[0], self.seed)
+            controller = self.scenario.controller(
+                model if is_user_function else self.models[0], self.seed
+            )
         if side == 0:
             return controller
         start = self._starts[1].ctrl

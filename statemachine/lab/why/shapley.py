@@ -30,7 +30,7 @@ from .shares import (
     adds_up,
     all_sets,
     exact_shares,
-    known,
+    none_for_nan,
     pair_mean,
     range_of,
     scaled,
@@ -156,13 +156,13 @@ class Attribution:
         game, everything = self.game, frozenset(self.causes)
         game.expect(self.first_sets())
         for cause in self.causes:
-            game.takes(cause, frozenset())
-            game.takes(cause, everything - {cause})
+            game.effect(cause, frozenset())
+            game.effect(cause, everything - {cause})
         core = runnable(game, self.causes)
         game.expect(core - {cause} for cause in core)
         for cause in self.causes:
             if cause in core:
-                game.takes(cause, core - {cause})
+                game.effect(cause, core - {cause})
         self.core, self._method = core, "alone and last"
 
     def first_sets(self) -> list[Subset]:
@@ -170,8 +170,8 @@ class Attribution:
         if not self.causes:
             return []
         everything = frozenset(self.causes)
-        ones = [frozenset({cause}) for cause in self.causes]
-        return [everything, *ones, *(everything - one for one in ones)]
+        singletons = [frozenset({cause}) for cause in self.causes]
+        return [everything, *singletons, *(everything - one for one in singletons)]
 
     def choose(self, sets: int) -> Method:
         """Choose how shares are computed, and compute those that need no further set.
@@ -188,8 +188,8 @@ class Attribution:
         if not active:
             self._method = "nothing"
             return self._method
-        whole = 1.0 - self.game(frozenset(core))
-        if adds_up(whole, [alone[c] for c in active], [last[c] for c in active]):
+        total = 1.0 - self.game(frozenset(core))
+        if adds_up(total, [alone[c] for c in active], [last[c] for c in active]):
             means = {c: (alone[c] + last[c]) / 2 for c in active}
             self._exact |= scaled(means, 1.0 - self.game(frozenset(active)))
             self._method = "one at a time"
@@ -255,8 +255,8 @@ class Attribution:
         if not pairs or self._is_precise():
             return 0
         # A standard error goes with the root of the number of pairs.
-        wanted = evaluated * (self._largest_error() / _PRECISE) ** 2
-        return int((wanted if sets is None else min(wanted, sets)) - evaluated)
+        needed = evaluated * (self._largest_error() / _PRECISE) ** 2
+        return int((needed if sets is None else min(needed, sets)) - evaluated)
 
     def _draw(self) -> bool:
         """Draw and evaluate one more pair of orders; False where no more can be had."""
@@ -330,31 +330,31 @@ class Attribution:
             error |= dict(zip(self._active, standard_errors(means).tolist(), strict=True))
         ranges: dict[str, Range | None] = {}
         for cause in causes:
-            seen = [alone[cause], last[cause]]
+            known_effects = [alone[cause], last[cause]]
             if cause in self._active:
-                seen += means[:, self._active.index(cause)].tolist()
-            ranges[cause] = range_of(share[cause], error[cause], seen)
+                known_effects += means[:, self._active.index(cause)].tolist()
+            ranges[cause] = range_of(share[cause], error[cause], known_effects)
         return Division(
             method=method,
-            share=known(share),
+            share=none_for_nan(share),
             error=error,
             range=ranges | dict.fromkeys(unavailable),
-            alone=known(alone),
-            last=known(last),
+            alone=none_for_nan(alone),
+            last=none_for_nan(last),
             orders=2 * len(means),
             unavailable=unavailable,
             failures=self.game.failures(),
         )
 
     def _alone(self, causes: Sequence[str]) -> dict[str, float]:
-        return {cause: self.game.took(cause, frozenset()) for cause in causes}
+        return {cause: self.game.evaluated_effect(cause, frozenset()) for cause in causes}
 
     def _last(self, causes: Sequence[str], together: Subset) -> dict[str, float]:
         """Return what each takes away after all others; NaN of one that is not among these."""
         last = dict.fromkeys(causes, math.nan)
         for cause in causes:
             if cause in together:
-                last[cause] = self.game.took(cause, together - {cause})
+                last[cause] = self.game.evaluated_effect(cause, together - {cause})
         return last
 
     def _others(self) -> list[str]:

@@ -37,9 +37,9 @@ def with_changes(
         return result
     matched = match_models(left, right, names)
     rows = differences_of(left, right, matched, finer=finer)
-    found = causes(rows, finer)
-    written = as_written(left.path, right.path, found)
-    by_name = {text.name: cause for text, cause in zip(written, found, strict=True)}
+    all_causes = causes(rows, finer)
+    written = as_written(left.path, right.path, all_causes)
+    by_name = {text.name: cause for text, cause in zip(written, all_causes, strict=True)}
     try:
         form = form_of_right(left, right, matched, XmlSource(right.path))
     except StateMachineError:  # it is a binary file

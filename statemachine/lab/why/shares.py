@@ -32,31 +32,31 @@ def active_causes(
         if cause in game.needs.values()
         or not (abs(alone[cause]) <= _DUMMY and abs(last[cause]) <= _DUMMY)
     ]
-    whole = game(frozenset(causes))
-    if not (math.isnan(whole) or abs(game(frozenset(active)) - whole) <= _DUMMY):
+    total = game(frozenset(causes))
+    if not (math.isnan(total) or abs(game(frozenset(active)) - total) <= _DUMMY):
         return list(causes)
     return active
 
 
-def known(parts: Mapping[str, float]) -> dict[str, float | None]:
+def none_for_nan(parts: Mapping[str, float]) -> dict[str, float | None]:
     """Return parts by cause, None where one is not known."""
     return {cause: None if math.isnan(part) else part for cause, part in parts.items()}
 
 
-def adds_up(whole: float, alone: Sequence[float], last: Sequence[float]) -> bool:
+def adds_up(total: float, alone: Sequence[float], last: Sequence[float]) -> bool:
     """Tell whether causes take away as much first as last.
 
     Together they have to take away as much as all of them do.
     """
-    apart = (abs(first - then) <= ADDS_UP for first, then in zip(alone, last, strict=True))
-    return abs(sum(alone) - whole) <= ADDS_UP and all(apart) and any(alone)
+    are_additive = (abs(first - then) <= ADDS_UP for first, then in zip(alone, last, strict=True))
+    return abs(sum(alone) - total) <= ADDS_UP and all(are_additive) and any(alone)
 
 
-def scaled(shares: dict[str, float], whole: float) -> dict[str, float]:
+def scaled(shares: dict[str, float], total: float) -> dict[str, float]:
     """Return shares that nearly add up, with what they lack spread over them by their size."""
-    lacking = whole - sum(shares.values())
+    missing = total - sum(shares.values())
     size = sum(abs(share) for share in shares.values())
-    return {c: share + lacking * (abs(share) / size) for c, share in shares.items()}
+    return {c: share + missing * (abs(share) / size) for c, share in shares.items()}
 
 
 def all_sets(game: Game, active: Sequence[str], most: int) -> list[Subset]:
@@ -103,7 +103,7 @@ def exact_shares(game: Game, active: Sequence[str], sets: Sequence[Subset]) -> d
             after = before | {cause}
             if cause not in before and before in begins and after in ends:
                 weight = begins[before] * ends[after] / orders
-                shares[cause] += weight * game.takes(cause, before)
+                shares[cause] += weight * game.effect(cause, before)
     return shares
 
 
@@ -126,7 +126,7 @@ def pair_mean(game: Game, active: Sequence[str], pair: tuple[Order, Order]) -> l
     sums = dict.fromkeys(active, 0.0)
     for order in pair:
         for number, cause in enumerate(order):
-            sums[cause] += game.took(cause, frozenset(order[:number]))
+            sums[cause] += game.evaluated_effect(cause, frozenset(order[:number]))
     return [sums[cause] / 2 for cause in active]
 
 

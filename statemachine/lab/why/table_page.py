@@ -43,7 +43,9 @@ def summary_table(result: Explanation, most: int) -> Table:
         result: The explanation.
         most: How many rows it has before the one that counts the rest.
     """
-    acting = [row for row in able(result) if has_effect(row) or not result.verdict.divides]
+    acting = [
+        row for row in equalizable_shares(result) if has_effect(row) or not result.verdict.divides
+    ]
     parts: list[tuple[Row, float]] = []
     for row in acting:
         parts.append((_summary_of_cause(result, row), row.share if row.share else row.weight()))
@@ -51,7 +53,7 @@ def summary_table(result: Explanation, most: int) -> Table:
         parts.append((_summary_of_place(place), place.share))
     parts.sort(key=lambda pair: -abs(pair[1]))
     shown = [row for row, _ in parts[:most]]
-    more = len(able(result)) + len(result.found_in) - len(shown)
+    more = len(equalizable_shares(result)) + len(result.found_in) - len(shown)
     if more:
         share = None
         if result.verdict.divides and result.is_complete:
@@ -91,16 +93,16 @@ def _row_of_rest(count: int, share: float | None) -> Row:
     return f"{count} more", NO_NUMBER, NO_NUMBER, percent(share), NO_NUMBER
 
 
-def able(result: Explanation) -> list[Share]:
+def equalizable_shares(result: Explanation) -> list[Share]:
     """Return the causes that can be equalized."""
     return [row for row in result.shares if not row.note]
 
 
 def tables(result: Explanation) -> list[Block]:
     """Return the differences, the largest share first; those without an effect are one row."""
-    small = without_effect(result, able(result))
+    small = without_effect(result, equalizable_shares(result))
     rows: list[Row] = []
-    for row in able(result):
+    for row in equalizable_shares(result):
         if row not in small:
             rows += _rows_of_cause(result, row)
     rows += [_row_of_place(place) for place in result.found_in]

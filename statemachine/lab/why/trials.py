@@ -110,12 +110,12 @@ class Trials:
 
     @property
     def count(self) -> int:
-        """How many runs were made, but for those of the floor."""
+        """Return the number of runs, without those of the chaos floor."""
         return self._repeated + sum(trial.was_begun for trial in self._trials.values())
 
     @cached_property
     def known_changes(self) -> tuple[KnownChange, ...]:
-        """The known changes between the releases of both sides that concern them as they come."""
+        """Return the known changes between the releases of both sides that concern them."""
         return changes_between(self.setup.models, self.traces)
 
     def touch(self, quantity: str) -> FirstTouch | None:
@@ -129,8 +129,8 @@ class Trials:
         left, right = (self._trials[run].curves for run in _AS_THEY_COME)
         if left is None or right is None:
             return None
-        apart = self.ruler.distances(quantity, left, right)
-        return first_touch(self.traces, self.ruler.time, apart)
+        gaps = self.ruler.distances(quantity, left, right)
+        return first_touch(self.traces, self.ruler.time, gaps)
 
     def gaps(
         self, equalized: frozenset[str], without: frozenset[str] = NONE, integrator: str = ""
@@ -180,13 +180,13 @@ class Trials:
         start = {name: curve[:1] for name, curve in curves.items()}
         return float(self.ruler.distances(quantity, curves, start).max())
 
-    def ahead(self, wanted: Iterable[frozenset[str]]) -> None:
+    def run_ahead(self, subsets: Iterable[frozenset[str]]) -> None:
         """Make the runs now that `gaps` of some sets of causes will want, several at once.
 
         Raises:
             TimeIsUp: No time is left; what was run by then is known.
         """
-        runs = dict.fromkeys(run for subset in wanted for run in self.setup.runs_of(subset))
+        runs = dict.fromkeys(run for subset in subsets for run in self.setup.runs_of(subset))
         new = [run for run in runs if run not in self._trials]
         jobs = self._forks_for(len(new))
         if jobs > 1:
@@ -195,7 +195,7 @@ class Trials:
                 self._trials[new[number]] = trial
                 self.ran()
 
-            work = [partial(self._trial, run) for run in new]
+            work = [partial(self.trial_of, run) for run in new]
             in_forks(work, jobs, ended, self._took, self._deadline.check)
             for run in new:
                 self._trials.setdefault(run, Trial(None, _LOST))
@@ -205,7 +205,7 @@ class Trials:
 
         A function that commands may keep something between runs: it has one, unless asked for.
         """
-        if self._jobs is None and self.setup.scenario.own:
+        if self._jobs is None and self.setup.scenario.is_user_function:
             return 1
         return forks_for(number, self._took, self._jobs)
 
@@ -213,14 +213,14 @@ class Trials:
         """Return a run; None, with a reason in `ended`, if it did not reach the end."""
         if run not in self._trials:
             self._deadline.check()
-            self._trials[run] = self._trial(run)
+            self._trials[run] = self.trial_of(run)
             self.ran()
         trial = self._trials[run]
         if trial.curves is None:
             self.ended = trial.reason or self.ended
         return trial.curves
 
-    def _trial(self, run: RunKey) -> Trial:
+    def trial_of(self, run: RunKey) -> Trial:
         """Make a run."""
         was_begun = False
         try:
@@ -255,7 +255,7 @@ class Trials:
 
         Only then a gap can have causes.
         """
-        first, again = self._trials[RunKey(0)].curves, self._trial(RunKey(0)).curves
+        first, again = self._trials[RunKey(0)].curves, self.trial_of(RunKey(0)).curves
         self._repeated = 1
         self.ran()
         if first is None or again is None:
@@ -282,7 +282,7 @@ class Trials:
             self.ran()
 
         work = [
-            partial(self._run_perturbed, side, k, reruns[side], posed[side], uncertain)
+            partial(self.perturbed_curves, side, k, reruns[side], posed[side], uncertain)
             for side, k in numbers
         ]
         jobs = self._forks_for(len(work))
@@ -297,12 +297,12 @@ class Trials:
 
     @property
     def perturbed_runs(self) -> int:
-        """How many perturbed runs a chaos floor takes, of both sides."""
+        """Return the number of perturbed runs that a chaos floor takes, of both sides together."""
         return 2 * perturbed.RUNS
 
     @property
     def draws(self) -> int:
-        """How many perturbed runs were made of each side."""
+        """Return the number of perturbed runs that were made of each side."""
         sides = [side for side, _ in self._perturbed]
         return min(sides.count(0), sides.count(1))
 
@@ -320,7 +320,7 @@ class Trials:
             floors.append(self.ruler.floor(curves, draws, measure))
         return {name: max(floors[0][name], floors[1][name]) for name in self.ruler.units}
 
-    def _run_perturbed(
+    def perturbed_curves(
         self, side: int, k: int, rerun: Rerun, posed: Model, uncertain: Uncertainty
     ) -> tuple[Curves | None]:
         """Make one perturbed run; in a tuple, since what comes from a fork is not None."""

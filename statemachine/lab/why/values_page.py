@@ -61,7 +61,7 @@ def sides_of(row: Share, most: int = _SHOWN) -> tuple[str, str]:
     if not row.values:
         return NO_NUMBER, NO_NUMBER
     values = _largest_first(distinct(row.values), most)
-    pairs = [_named(value, alone=len(values) == 1) for value in values[:most]]
+    pairs = [_named(value, is_only=len(values) == 1) for value in values[:most]]
     left, right = zip(*pairs, strict=True)
     more = len(values) - most
     sides: list[str] = []
@@ -85,13 +85,13 @@ def _largest_first(values: Sequence[DifferingQuantity], most: int) -> list[Diffe
     return sorted(values, key=relative_difference, reverse=True)
 
 
-def _named(value: DifferingQuantity, alone: bool) -> tuple[str, str]:
+def _named(value: DifferingQuantity, is_only: bool) -> tuple[str, str]:
     """Return the texts of a quantity with its name, which one that is alone does not need.
 
     A side without it among others has "".
     """
     left, right = texts_of(value)
-    if alone:
+    if is_only:
         return left, right
     texts = ["" if text == NO_NUMBER else f"{value.quantity} {text}" for text in (left, right)]
     return texts[0], texts[1]

@@ -110,7 +110,7 @@ class Facts:
 
     @property
     def place(self) -> LocatedPart | None:
-        """What takes away most when it is left out; None if nothing was."""
+        """Return the part that takes away most where it is left out; None if none was left out."""
         return max(self.places, key=lambda place: place.share, default=None)
 
 

@@ -97,27 +97,31 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Wri
         right: The right's.
         causes: What to look for.
     """
-    ours, theirs = _elements_of_mjcf(left), _elements_of_mjcf(right)
+    left_elements, right_elements = _elements_of_mjcf(left), _elements_of_mjcf(right)
     for cause in causes:
-        yield _written(cause, ours, theirs)
+        yield _written(cause, left_elements, right_elements)
 
 
 def _elements_of_mjcf(path: Path) -> list[_Element]:
     return list(_elements(path)) if path.suffix in (".xml", ".mjcf") else []
 
 
-def _written(cause: Cause, ours: Sequence[_Element], theirs: Sequence[_Element]) -> WrittenCause:
+def _written(
+    cause: Cause, left_elements: Sequence[_Element], right_elements: Sequence[_Element]
+) -> WrittenCause:
     """Return one cause as the right's file has it."""
     rows = cause.differences
-    places = {element.place for element in theirs if _says(element, cause)}
+    places = {element.place for element in right_elements if _says(element, cause)}
     if _is_moved_mass(cause):
         masses = [row for row in rows if row.subject == "mass"]
-        return _of_rows(cause.name, masses, places or _places_of_new_weights(ours, theirs))
+        return _of_rows(
+            cause.name, masses, places or _places_of_new_weights(left_elements, right_elements)
+        )
     scale = scale_of(rows[0])
     if not scale:
         return _of_rows(cause.name, rows, places)
     if len(rows) > 1:
-        scalings = _scalings(ours, theirs, float(scale))
+        scalings = _scalings(left_elements, right_elements, float(scale))
         if len(scalings) == 1:
             return _of_scaling(cause.name, scalings[0])
         if len({row.where for row in rows}) > 1:
@@ -149,23 +153,27 @@ def _only(places: set[SourceLine]) -> SourceLine | None:
     return next(iter(places)) if len(places) == 1 else None
 
 
-def _places_of_new_weights(ours: Sequence[_Element], theirs: Sequence[_Element]) -> set[SourceLine]:
+def _places_of_new_weights(
+    left_elements: Sequence[_Element], right_elements: Sequence[_Element]
+) -> set[SourceLine]:
     """Return where the right's file says a density or a mass that the left's says nowhere."""
-    known = {weight.key() for weight in _weights(ours)}
-    return {weight.place for weight in _weights(theirs) if weight.key() not in known}
+    known = {weight.key() for weight in _weights(left_elements)}
+    return {weight.place for weight in _weights(right_elements) if weight.key() not in known}
 
 
-def _scalings(ours: Sequence[_Element], theirs: Sequence[_Element], scale: float) -> list[_Scaling]:
+def _scalings(
+    left_elements: Sequence[_Element], right_elements: Sequence[_Element], scale: float
+) -> list[_Scaling]:
     """Return densities and masses that are multiplied so in the right's file."""
-    known = {("density", _DENSITY), *(weight.key() for weight in _weights(ours))}
-    found: list[_Scaling] = []
-    for weight in _weights(theirs):
+    known = {("density", _DENSITY), *(weight.key() for weight in _weights(left_elements))}
+    scalings: list[_Scaling] = []
+    for weight in _weights(right_elements):
         if weight.key() in known:
             continue
         for attribute, value in known:
             if attribute == weight.attribute and np.isclose(scale * value, weight.value, 1e-6):
-                found.append(_Scaling(attribute, value, weight.value, weight.place))
-    return found
+                scalings.append(_Scaling(attribute, value, weight.value, weight.place))
+    return scalings
 
 
 def _weights(elements: Sequence[_Element]) -> list[_Weight]:
@@ -181,8 +189,8 @@ def _weights(elements: Sequence[_Element]) -> list[_Weight]:
 def _says(element: _Element, cause: Cause) -> bool:
     """Tell whether an element says what a side has of a cause."""
     names = {row.where for row in cause.differences}
-    owned = element.in_default if len(names) > 1 else bool(names & element.owners)
-    if not owned and cause.kind != "option":
+    is_owned = element.in_default if len(names) > 1 else bool(names & element.owners)
+    if not is_owned and cause.kind != "option":
         return False
     fields = {edit[0] for edit in cause.edits(1)}
     words = {field.rpartition(".")[2].partition("_")[2] or field[4:] for field in fields}
@@ -194,10 +202,12 @@ def _says(element: _Element, cause: Cause) -> bool:
 def _same(text: str, value: QuantityValue) -> bool:
     """Tell whether the numbers, or the word, of an attribute are those of a value."""
     try:
-        numbers, wanted = np.array(text.split(), dtype=float), np.ravel(np.array(value, float))
+        numbers, expected = np.array(text.split(), dtype=float), np.ravel(np.array(value, float))
     except (TypeError, ValueError):
         return text.lower() == value
-    return 0 < len(numbers) <= len(wanted) and np.allclose(numbers, wanted[: len(numbers)], 1e-6)
+    return 0 < len(numbers) <= len(expected) and np.allclose(
+        numbers, expected[: len(numbers)], 1e-6
+    )
 
 
 def _elements(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[_Element]:
@@ -210,8 +220,8 @@ def _elements(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[_Elem
     parser = expat.ParserCreate()
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
-        own = attributes.get("name", "")
-        owner = around[-1][1] if around and not own else own
+        name = attributes.get("name", "")
+        owner = around[-1][1] if around and not name else name
         element = _Element(
             tag=tag,
             attributes=attributes,
@@ -220,7 +230,7 @@ def _elements(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[_Elem
             place=SourceLine(path.name, parser.CurrentLineNumber),
         )
         elements.append(element)
-        around.append((tag, own))
+        around.append((tag, name))
 
     def end(_tag: str) -> None:
         around.pop()

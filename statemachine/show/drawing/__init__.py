@@ -6,6 +6,6 @@ Whoever draws (a viewer, a page, a picture) puts each part where its body is, wi
 
 from __future__ import annotations
 
-from ._drawing import Drawing, Part, Surface, drawing_of, lathe
+from .shapes import Drawing, Part, Surface, drawing_of, lathe
 
 __all__ = ["Drawing", "Part", "Surface", "drawing_of", "lathe"]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...backends import on_default
 from ...interface import Array, Data, Model, forward, make_data
 from ...rotations import matrix_from_quat
-from ._drawing import Drawing
+from .shapes import Drawing
 
 FOVY = 30.0  # [°] a long lens: near and far parts of an arm are drawn alike in size
 _MARGIN = 0.90  # of half the picture that what is framed may take

@@ -28,6 +28,7 @@ from .markup import Html, joined, prose, tag
 DrawInteractive = Callable[[Interactive], Html]
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
+_MARKS = {"✓": "right", "✗": "wrong"}  # the style of a cell that has this sign and nothing else
 _DIGEST = 64  # characters of a SHA-256
 
 
@@ -128,7 +129,7 @@ def table(block: Table) -> Html:
     for number, row in enumerate(block.rows):
         cells = [tag("th", _content(row[0], 0 in signed), scope="row")]
         for k in range(1, len(row)):
-            cells.append(tag("td", _content(row[k], k in signed), class_=looks[k]))
+            cells.append(tag("td", _content(row[k], k in signed), class_=_look(row[k], looks[k])))
         rows.append(tag("tr", *cells, class_="most" if number in block.emphasis else None))
     inside = tag("caption", block.title), tag("thead", top), tag("tbody", *rows)
     return tag(
@@ -139,6 +140,14 @@ def table(block: Table) -> Html:
         role="region",
         aria_label=block.title,
     )
+
+
+def _look(text: str, look: str | None) -> str | None:
+    """Return the style of a cell: that of its column, and colour where it is a mark alone."""
+    mark = _MARKS.get(text)
+    if mark is None:
+        return look
+    return mark if look is None else f"{look} {mark}"
 
 
 def _signed_columns(block: Table) -> set[int]:

@@ -34,7 +34,7 @@ class FaultTrial:
 
     @property
     def caught(self) -> bool:
-        """Whether any test caught the fault."""
+        """Tell whether any test caught the fault."""
         return bool(self.caught_by)
 
 
@@ -60,7 +60,7 @@ class Examination:
 
     @property
     def caught(self) -> int:
-        """How many faults were caught."""
+        """Return the number of faults that were caught."""
         return len(self.trials) - len(self.missed)
 
     @property
@@ -78,5 +78,5 @@ class Examination:
 
     @property
     def holds(self) -> bool:
-        """Whether the tests pass on the healthy arm and catch all faults."""
+        """Tell whether the tests pass on the healthy arm and catch all faults."""
         return not self.failures and not self.missed

@@ -31,7 +31,7 @@ Instead = Callable[..., Any]
 
 
 def _adapters() -> list[ModuleType]:
-    """The modules of the backends whose engine is here."""
+    """Return the modules of the backends whose engine is installed."""
     adapters = []
     for name in raw_engines_with("backend"):
         with suppress(MissingEngineError):
@@ -41,7 +41,7 @@ def _adapters() -> list[ModuleType]:
 
 
 def reading(name: str, function: Callable[[Data, Array], Array]) -> Patch:
-    """A fault in a derived array as it is read."""
+    """Return a fault in a derived array as it is read."""
 
     def fault(patch: Patcher) -> None:
         right = vars(Data)[name].fget
@@ -51,7 +51,7 @@ def reading(name: str, function: Callable[[Data, Array], Array]) -> Patch:
 
 
 def hook(name: str, instead: Instead) -> Patch:
-    """A fault in what the backends do for a verb."""
+    """Return a fault in what the backends do for a verb."""
 
     def replacement(right: Callable[..., Any]) -> Callable[..., Any]:
         return lambda data, *arguments: instead(data, partial(right, data), *arguments)
@@ -65,7 +65,7 @@ def hook(name: str, instead: Instead) -> Patch:
 
 
 def advancing(instead: Instead) -> Patch:
-    """A fault in the engine's step, called with a number of steps."""
+    """Return a fault in the engine's step, which is called with a number of steps."""
 
     def fault(patch: Patcher) -> None:
         right = Data.__init__
@@ -82,7 +82,7 @@ def advancing(instead: Instead) -> Patch:
 
 
 def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Patch:
-    """Inputs that the engine takes for other numbers: changed before each verb, and back after.
+    """Return a fault by which the engine takes the inputs for other numbers.
 
     Rounding must not give it away: each step goes there and back, and forward gives back bits.
     """
@@ -113,7 +113,7 @@ def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Pa
 
 
 def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Patch:
-    """A fault in the compiled model, and in all that `replace` makes of it.
+    """Return a fault in the compiled model, and in all that `replace` makes of it.
 
     It is taken out while the facts of the Model are read, so that these do not give it away.
     """
@@ -151,7 +151,7 @@ def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Patc
 
 
 def scaled(factor: float, *arrays: Callable[[Any], Array]) -> Patch:
-    """A fault in some arrays of the compiled model, which are multiplied.
+    """Return a fault that multiplies some arrays of the compiled model.
 
     By -1 or a power of two, so that undoing it gives back the same bits.
     """
@@ -165,13 +165,13 @@ def scaled(factor: float, *arrays: Callable[[Any], Array]) -> Patch:
 
 @partial(reading, "xquat")
 def xyzw(_data: Data, right: Array) -> Array:
-    """The order of another engine."""
+    """Return quaternions in the order x, y, z, w, as another engine has them."""
     return xyzw_from_wxyz(right)
 
 
 @partial(reading, "xpos")
 def com_for_frame(data: Data, right: Array) -> Array:
-    """The place that another engine reports for a link."""
+    """Return the centres of mass in place of the origins of the body frames."""
     offsets = data.model.compiled.body_ipos
     return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), offsets)
 
@@ -189,7 +189,7 @@ def forward_steps(data: Data, _right: Callable[[], None]) -> None:
 
 @partial(hook, "_reset")
 def reset_keeps_ctrl(data: Data, right: Callable[[int | None], None], key: int | None) -> None:
-    """A default ctrl is a command too, and is forgotten."""
+    """Reset all but ctrl: forget that the default ctrl is a command, too."""
     ctrl = data.ctrl.copy()
     right(key)
     data.ctrl[:] = ctrl
@@ -197,14 +197,14 @@ def reset_keeps_ctrl(data: Data, right: Callable[[int | None], None], key: int |
 
 @advancing
 def step_and_forward(data: Data, right: Callable[[int], None], nstep: int) -> None:
-    """Derived values that are never those of the state before."""
+    """Step and recompute, so that derived values are never those of the state before."""
     right(nstep)
     data._recompute()
 
 
 @advancing
 def one_step_short(data: Data, right: Callable[[int], None], nstep: int) -> None:
-    """A loop with the wrong end, and a clock that is set by multiplication."""
+    """End the loop one step early, and set the clock by multiplication."""
     time = data.time
     right(max(1, nstep - 1))
     data._set_time(time + nstep * data.model.timestep)

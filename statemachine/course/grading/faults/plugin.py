@@ -33,7 +33,7 @@ SCENE = "so101/scene_box"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options with which `run` starts it."""
+    """Add the options with which `run` starts pytest."""
     group = parser.getgroup("statemachine")
     group.addoption(
         "--engine", choices=raw_engines_with("backend"), default=DEFAULT, help="backend of `model`"
@@ -60,26 +60,26 @@ def pytest_configure(config: pytest.Config) -> None:
             tests.parent,
             Path(path).parent,
             lambda _kind, _text: None,
-            alone=bool(config.getoption("watched")),
+            is_only_guard=bool(config.getoption("watched")),
             faults=True,
         )
 
 
 @pytest.fixture(scope="session")
 def backend(request: pytest.FixtureRequest) -> str:
-    """The backend under test."""
+    """Return the name of the backend under test."""
     return str(request.config.getoption("engine"))
 
 
 @pytest.fixture(scope="session")
 def model(backend: str) -> Model:
-    """The arm on a floor, with a box."""
+    """Return the Model of the arm on a floor, with a box."""
     return sm.load(SCENE, backend=backend)
 
 
 @pytest.fixture
 def data(model: Model) -> Iterator[Data]:
-    """A new Data of `model`: zero pose, nothing derived."""
+    """Yield a new Data of `model`: zero pose, nothing derived."""
     with closing(sm.make_data(model)) as data:
         yield data
 
@@ -116,5 +116,5 @@ class PytestRecorder:
 
 
 def _name(nodeid: str) -> str:
-    """A test's name within its file."""
+    """Return the name of a test within its file."""
     return nodeid.partition("::")[2]

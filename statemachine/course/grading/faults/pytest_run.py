@@ -64,8 +64,8 @@ def run_pytest(
         stop: Ends it.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        here = Path(folder)
-        settings, record = here / "pytest.ini", here / "record"
+        root = Path(folder)
+        settings, record = root / "pytest.ini", root / "record"
         settings.write_text("[pytest]\n", encoding="utf-8")
         record.touch()
         env = _environment(backend)

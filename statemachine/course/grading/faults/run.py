@@ -34,7 +34,7 @@ from .pytest_run import PytestRun, run_pytest
 _SECONDS = 60.0  # of computing, for the tests on the healthy arm
 _CLOCK = 300.0  # on the clock: the machine may be busy with others
 # Under a fault they may take longer: so many times as long, and so many seconds more.
-_TIMES, _AND, _CLOCK_AND = 5.0, 15.0, 120.0
+CPU_FACTOR, MORE_CPU, MORE_CLOCK = 5.0, 15.0, 120.0
 
 
 def examine(
@@ -44,7 +44,7 @@ def examine(
     seconds: float = _SECONDS,
     clock: float = _CLOCK,
     progress: Progress = no_progress,
-    own: Mapping[str, Path] | None = None,
+    submitted_files: Mapping[str, Path] | None = None,
 ) -> Examination:
     """Run a student's tests on the healthy arm and on one with each of the faults.
 
@@ -55,8 +55,8 @@ def examine(
         seconds: What the tests may compute on the healthy arm [s].
         clock: What they may take there on the clock, from when the arm is ready [s].
         progress: Told the fraction that is done.
-        own: All files that belong to it, by their names in its folder; without, what it names
-            beside it. No other file is there for the tests.
+        submitted_files: All files that belong to it, by their names in its folder; without, what
+            it names beside it. No other file is there for the tests.
 
     Raises:
         ModelFileError: There is no such file.
@@ -76,7 +76,7 @@ def examine(
         folder = stack.enter_context(
             tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True)
         )
-        files = own if own else named_by(path, _has_tests)
+        files = submitted_files if submitted_files else named_by(path, _has_tests)
         copied = copied_to(Path(folder).resolve(), path, files)
         healthy = run_pytest(copied, backend, None, seconds, clock)
         for failure in healthy.failures:
@@ -106,8 +106,8 @@ def _try_faults(
         healthy: How the run on the healthy arm ended, by which it is limited how long these take.
         progress: Told the fraction that is done, the run on the healthy arm included.
     """
-    seconds = _TIMES * healthy.cpu + _AND
-    clock = _TIMES * healthy.wall + _CLOCK_AND
+    seconds = CPU_FACTOR * healthy.cpu + MORE_CPU
+    clock = CPU_FACTOR * healthy.wall + MORE_CLOCK
     stop, total = threading.Event(), len(faults) + 1
     work: dict[str, Callable[[], PytestRun]] = {}
     for fault in faults:

@@ -55,10 +55,10 @@ def main(job_file: str) -> None:
     # What `Guard` tells is told at once: it stays, whatever the student's code does next.
     Guard(
         path,
-        Path(job["own"]),
+        Path(job["student_folder"]),
         Path(job["answers"]).parent,
         lambda kind, text: say(kind, text=text),
-        alone=job["alone"],
+        is_only_guard=job["alone"],
     )
     _forget_the_judge()
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now

@@ -95,38 +95,41 @@ class Guard:
     def __init__(
         self,
         file: Path,
-        own: Path,
-        here: Path,
-        tell: Callable[[str, str], None],
-        alone: bool,
+        student_folder: Path,
+        work_folder: Path,
+        report: Callable[[str, str], None],
+        is_only_guard: bool,
         faults: bool = False,
     ) -> None:
         """Begin.
 
         Args:
             file: The student's; its lines are named.
-            own: The folder of all files that belong to it.
-            here: The folder in which this process may read and write.
-            tell: Gets "forbidden" and what was refused; or "reads" and the name of a file that
-                is neither here, nor own, nor Python's or the package's; or of one that would
-                be own and is not there. Each once.
-            alone: Whether nothing else keeps the student's code from the files of this machine.
+            student_folder: The folder of all files that belong to it.
+            work_folder: The folder in which this process may read and write.
+            report: Gets "forbidden" and what was refused; or "reads" and the name of a file that
+                is in neither of these folders, nor Python's or the package's; or of one that would
+                be in the student's, and is not there. Each once.
+            is_only_guard: Whether nothing else keeps the student's code from the files of this
+                machine.
             faults: Whether tests run here, which may import what makes the faults.
         """
         places = (
-            own, here, models_dir(), sys.base_prefix, *_SYSTEM,
+            student_folder, work_folder, models_dir(), sys.base_prefix, *_SYSTEM,
             *sysconfig.get_paths().values(), *site.getsitepackages(), site.getusersitepackages(),
-            os.environ.get("SYSTEMROOT", own),
+            os.environ.get("SYSTEMROOT", student_folder),
         )  # fmt: skip
         self._open = tuple(_PATH.realpath(place) + os.sep for place in places)
-        self._file, self._tell, self._alone = file, tell, alone
-        self._own, self._here = (_PATH.realpath(place) + os.sep for place in (own, here))
+        self._file, self._report, self._is_only_guard = file, report, is_only_guard
+        self._student_folder, self._work_folder = (
+            _PATH.realpath(place) + os.sep for place in (student_folder, work_folder)
+        )
         # As files of code are named: past links or not.
         standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
         self._standard = (*standard, *map(_PATH.realpath, standard))
         self._package = str(_PACKAGE) + os.sep
         self._inside = str(Path(__file__).parent) + os.sep
-        self._ours = (self._package, str(Path(__file__).parents[4]) + os.sep)
+        self._course_folders = (self._package, str(Path(__file__).parents[4]) + os.sep)
         rooms = [*ROOMS, "course/__init__", "course/__pycache__", "course/grading/inside"]
         if faults:
             rooms.append("course/grading/faults")
@@ -134,7 +137,7 @@ class Guard:
         self._checks_imports = not faults
         self._reported: set[tuple[str, str]] = set()
         self._refuse_programs()
-        sys.addaudithook(self._hear)
+        sys.addaudithook(self._on_event)
 
     def _refuse_programs(self) -> None:
         """Refuse the one way to start a program that tells no audit hook of it."""
@@ -151,7 +154,7 @@ class Guard:
                 if hasattr(module, name):
                     setattr(module, name, fork_exec)
 
-    def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
+    def _on_event(self, event: str, arguments: tuple[Any, ...]) -> None:
         if event in _REFUSED:
             raise self._refusal(_REFUSED[event], event)
         if event == "open":
@@ -163,7 +166,7 @@ class Guard:
             self._hear_link(event, *arguments)
         elif event == "import":
             self._hear_import(str(arguments[0]), arguments[1])
-        elif self._alone and event in _C_CODE and self._who() == "student":
+        elif self._is_only_guard and event in _C_CODE and self._who() == "student":
             raise self._refusal("it calls C code", event)
 
     def _hear_open(self, name: Any, mode: str | None, flags: int) -> None:
@@ -179,7 +182,9 @@ class Guard:
                 raise self._refusal(f"it opens {text}", "/proc")
             if mode is None:  # os.open, which may go out from any folder that is open
                 real = _PATH.realpath(text) + os.sep
-                outside = _PATH.isdir(text) and not real.startswith((self._own, self._here))
+                outside = _PATH.isdir(text) and not real.startswith(
+                    (self._student_folder, self._work_folder)
+                )
                 upwards = not _PATH.isabs(text) and os.pardir in Path(text).parts
                 if outside or upwards or flags & getattr(os, "O_PATH", 0):
                     raise self._refusal(f"it opens the folder or file {text!r}", "os.open")
@@ -192,7 +197,9 @@ class Guard:
         if self._who() == "student":
             if event == "os.symlink":
                 goal = _PATH.join(_PATH.dirname(_PATH.abspath(names[1])), names[0])
-                if not (_PATH.realpath(goal) + os.sep).startswith((self._own, self._here)):
+                if not (_PATH.realpath(goal) + os.sep).startswith(
+                    (self._student_folder, self._work_folder)
+                ):
                     raise self._refusal(f"it makes a link to {names[0]}", event)
             if folder != -1 or other != -1:
                 raise self._refusal("it makes a link by an open folder", event)
@@ -210,12 +217,12 @@ class Guard:
             if name == "_posixsubprocess":
                 raise self._refusal(f"it imports {name}", "import", ImportError)
             compiled = isinstance(file, str) and (_PATH.realpath(file)).startswith(
-                (self._own, self._here)
+                (self._student_folder, self._work_folder)
             )
-            if self._alone and compiled:
+            if self._is_only_guard and compiled:
                 raise self._refusal(f"it loads the compiled code {file}", "import", ImportError)
         if name not in sys.stdlib_module_names:
-            self._look_at(f"{self._own}{name}.py")
+            self._look_at(f"{self._student_folder}{name}.py")
 
     def _look_at(self, name: str) -> None:
         """Tell of a file that is not the student's; where nobody else refuses it, refuse it.
@@ -226,7 +233,7 @@ class Guard:
         with suppress(ValueError):  # no name at all
             path = _PATH.realpath(name)
             inside = path + os.sep
-            if inside.startswith(self._own):
+            if inside.startswith(self._student_folder):
                 if not _PATH.exists(path) and "__pycache__" not in path:
                     self._once("reads", path)
                 return
@@ -241,7 +248,7 @@ class Guard:
             there = _PATH.exists(path)
             if student or there:
                 self._once("reads", path)
-            if self._alone and (student or there):  # a package may open it for the student
+            if self._is_only_guard and (student or there):  # a package may open it for the student
                 raise PermissionError(f"{path} is not its own: not here")
 
     def _refusal(self, what: str, event: str, kind: type[Exception] = PermissionError) -> Exception:
@@ -254,7 +261,7 @@ class Guard:
     def _once(self, kind: str, text: str) -> None:
         if (kind, text) not in self._reported and len(self._reported) < _MOST_TOLD:
             self._reported.add((kind, text))
-            self._tell(kind, text)
+            self._report(kind, text)
 
     def _who(self) -> Who:
         """Return whose code asks, past that of Python's own library."""
@@ -266,7 +273,7 @@ class Guard:
                 continue
             module = sys.modules.get(str(frame.f_globals.get("__name__")))
             genuine = module is not None and vars(module) is frame.f_globals
-            if name.startswith(self._ours):
+            if name.startswith(self._course_folders):
                 # Its own modules are there no more by name; see `child`.
                 return "ours" if genuine or name.startswith(self._inside) else "student"
             if genuine and not _FOLDERS.isdisjoint(name.split(os.sep)):

@@ -44,14 +44,15 @@ class EngineRun:
     """One run, from its first step on.
 
     Attributes:
-        own: Whether it is on a Data of the Model that the function got, or of a variant of it.
+        on_given_model: Whether it is on a Data of the Model that the function got, or of a variant
+            of it.
         start: Where it began.
         end: Where it is after the last step.
         nstep: How many steps it took.
         ctrl_changed: After how many steps ctrl was another; None if it never was.
     """
 
-    own: bool
+    on_given_model: bool
     start: Inputs
     end: Inputs
     nstep: int = 0
@@ -80,7 +81,7 @@ class Nudge:
 
 
 def inputs_of(number: int, data: Any) -> Inputs:
-    """What they are now of a Data, or of the engine's own, of this number."""
+    """Return a copy of the inputs of a Data, or of the engine's own, with its number."""
     qpos, qvel, ctrl = (np.array(getattr(data, name)) for name in INPUTS)
     time = math.nan
     with suppress(ClosedDataError):  # of which the inputs alone are told
@@ -122,7 +123,7 @@ class StudentWatch:
         self._current: dict[int, EngineRun] = {}
 
     def meet(self, data: Any) -> int:
-        """The number of a Data; the engine's own object behind a known one is no other.
+        """Return the number of a Data; the engine's own object behind a known one is no other.
 
         Raises:
             RuntimeError: There are too many.
@@ -160,7 +161,7 @@ class StudentWatch:
         return result
 
     def _origin_of(self, model: Any) -> object:
-        """What a Model and its variants have in common, and the engine's own with its copies."""
+        """Return what a Model shares with its variants, or the engine's own with its copies."""
         if isinstance(model, Model) or not self._room.can("origin"):
             return model.path
         return self._room.origin(model)
@@ -182,22 +183,24 @@ def watching(model: Model, nudge: Nudge | None = None) -> Iterator[StudentWatch]
 
 @contextmanager
 def engine_watched(backend: str) -> Iterator[None]:
-    """Every Data made from now on is seen, and the engine's own functions that its room names.
+    """Watch every Data made from now on, and the engine's own functions that its room names.
 
-    Before a student's file can import them.
+    To be entered before a student's file can import these.
     """
     with ExitStack() as stack:
-        own = raw_engine_of(backend)
-        for name in own.steps:
+        engine = raw_engine_of(backend)
+        for name in engine.steps:
             stack.enter_context(_replaced(require(backend), name, _seen_step))
-        for name in own.forwards:
+        for name in engine.forwards:
             stack.enter_context(_replaced(require(backend), name, _seen_forward))
-        watched = own.watched_data()
+        watched = engine.watched_data()
         for kind in Data.__subclasses__():
             if kind is not watched:
                 stack.enter_context(_replaced(kind, "_recompute", _seen_forward))
-        telling = backend if watched else None
-        stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, telling)))
+        reporting_backend = backend if watched else None
+        stack.enter_context(
+            _replaced(Data, "__init__", functools.partial(_seen_data, reporting_backend))
+        )
         yield
 
 
@@ -205,12 +208,15 @@ def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> AbstractCont
     return mock.patch.object(owner, name, seen(vars(owner)[name]))
 
 
-def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[..., None]:
-    """`Data.__init__`; of the steps on a backend that is `telling` its own functions tell."""
+def _seen_data(reporting_backend: str | None, original: Callable[..., None]) -> Callable[..., None]:
+    """Return a `Data.__init__` that tells the watch of the Data and of its steps.
+
+    Of the steps on `reporting_backend` the engine's own functions tell.
+    """
 
     @functools.wraps(original)
     def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
-        if model.backend != telling:
+        if model.backend != reporting_backend:
             advance = _seen_step(advance, (model, data))
         original(data, model, advance, *more)
         if _watch is not None:
@@ -222,7 +228,12 @@ def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[.
 def _seen_step(
     original: Callable[..., Any], of: tuple[Any, Any] | None = None
 ) -> Callable[..., Any]:
-    """What steps the engine's own model and data, or with these a Model and a Data: `of`."""
+    """Return a function that tells the watch of a step, and steps as `original` does.
+
+    Args:
+        original: Steps the engine's own model and data.
+        of: A Model and a Data whose step it is; by default the engine's own.
+    """
 
     @functools.wraps(original)
     def seen(m: Any, d: Any, nstep: int = 1) -> Any:
@@ -236,7 +247,10 @@ def _seen_step(
 
 
 def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
-    """What recomputes what is derived of a Data, or of the engine's own, its last argument."""
+    """Return a function that recomputes as `original` does, and tells the watch of it.
+
+    What it recomputes is a Data or the engine's own, its last argument.
+    """
 
     @functools.wraps(original)
     def seen(*arguments: Any, **named: Any) -> Any:

@@ -105,11 +105,11 @@ class Scenes:
         self._models: dict[str, Model] = {}
 
     def ordinary(self, name: str) -> Model:
-        """The course's own scene, without what is only seen."""
+        """Return the course's own scene, without what is only seen."""
         return self._load(name, "ordinary", lambda _: None)
 
     def crowded(self, name: str) -> Model:
-        """The scene with a free body before the arm, another fingertip and another time."""
+        """Return the scene with a free body before the arm, another fingertip and another time."""
         try:
             return self._load(name, "crowded", lambda root: _crowd(root, [_BALL, _DRAWER]))
         except UnsupportedError:  # a ball joint

@@ -136,7 +136,7 @@ def judged(
         return None
     (remark,) = passed[0].remarks
     others = count(len(worlds) - 1, "hidden call")
-    return Judgement(function, True, True, (OfResult.PASSED.says(remark=remark, others=others),))
+    return Judgement(function, True, True, (OfResult.PASSED.filled(remark=remark, others=others),))
 
 
 T = TypeVar("T")
@@ -158,7 +158,7 @@ def parts(value: Any, number: int, what: str) -> list[Any]:
     if isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape):
         items = list(value)
     if items is None or len(items) != number:
-        raise FaultError(OfResult.WRONG_KIND.says(kind=kind(value), what=what))
+        raise FaultError(OfResult.WRONG_KIND.filled(kind=kind(value), what=what))
     return items
 
 
@@ -171,9 +171,9 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise FaultError(OfResult.NO_NUMBERS.says(what=what, kind=kind(value))) from None
+        raise FaultError(OfResult.NO_NUMBERS.filled(what=what, kind=kind(value))) from None
     if array.shape != shape:
-        raise FaultError(OfResult.WRONG_SHAPE.says(what=what, expected=shape, shape=array.shape))
+        raise FaultError(OfResult.WRONG_SHAPE.filled(what=what, expected=shape, shape=array.shape))
     return array
 
 
@@ -190,7 +190,7 @@ def short_float(value: Any) -> str:
     return ""
 
 
-def grain(values: Array) -> float:
+def rounding_error(values: Array) -> float:
     """Return half of the last decimal, if all values are rounded to two to eight; otherwise 0."""
     with np.errstate(all="ignore"):
         for decimals in range(2, 9):

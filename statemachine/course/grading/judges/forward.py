@@ -18,11 +18,11 @@ from ..inside.worlds import LIFT, NoArgumentsWorld, address
 from . import (
     TIP,
     WorldJudgement,
-    grain,
     near,
     numbers,
     owner,
     parts,
+    rounding_error,
     short_float,
     told_apart,
     verified,
@@ -85,15 +85,15 @@ def judge(
     remarks: list[str] = []
     if answer.runs:
         run = answer.runs[0]
-        remarks.append(OfForward.STEPPED.says(time=run.end.time - run.start.time))
+        remarks.append(OfForward.STEPPED.filled(time=run.end.time - run.start.time))
     if mistake := _mistake_in_all(readings, answer, right, tolerance):
         return wrong(*remarks, mistake)
     for k in range(4):
         if not near(readings[k], right.tip[k], tolerance):
             why = _why(k, readings[k], world, right, course, answer)
-            remark = OfForward.READING.says(reading=_READINGS[k], why=why)
+            remark = OfForward.READING.filled(reading=_READINGS[k], why=why)
             if short:
-                remark = OfForward.FEW_DIGITS.says(remark=remark, dtype=short)
+                remark = OfForward.FEW_DIGITS.filled(remark=remark, dtype=short)
             remarks.append(remark)
             break  # a first fault explains what comes after it, more often than not
     if remarks:
@@ -101,7 +101,7 @@ def judge(
     moved = float(np.linalg.norm(right.tip[3] - right.tip[2]))
     is_commanded = any(end.ctrl.any() for end in answer.ends)
     passed = OfForward.PASSED_WITH_COMMAND if is_commanded else OfForward.PASSED
-    return verified(passed.says(moved=rounded(moved, "m")))
+    return verified(passed.filled(moved=rounded(moved, "m")))
 
 
 def _returned(answer: Answer) -> Array:
@@ -127,11 +127,11 @@ def _mistake_in_all(readings: Array, answer: Answer, right: Readings, tolerance:
     if all_equal and (text := _why_all_equal(readings[3], answer, right)):
         return text
     if near(readings / 1000, right.tip, TOLERANCE):
-        return OfForward.MILLIMETRES.says()
+        return OfForward.MILLIMETRES.filled()
     if answer.forwards:  # without any, all are at the origin
         names = [name for name, places in right.others.items() if near(readings, places, tolerance)]
         if names:
-            return OfForward.OTHER_PLACE.says(places=" and ".join(names[:3]), tip=TIP)
+            return OfForward.OTHER_PLACE.filled(places=" and ".join(names[:3]), tip=TIP)
     return ""
 
 
@@ -141,13 +141,13 @@ def _why_all_equal(reading: Array, answer: Answer, right: Readings) -> str:
     if not reading.any() and answer.forwards and not any(answer.live):
         recomputed = {inputs.data for inputs in answer.forwards}
         if len(answer.ends) > len(recomputed):
-            return OfForward.OTHER_DATA.says()
+            return OfForward.OTHER_DATA.filled()
         if answer.memory[3] == 0:
-            return OfForward.READ_ONCE.says()
+            return OfForward.READ_ONCE.filled()
     if answer.memory[3] == 0 or all(answer.live):
-        return OfForward.OWN_MEMORY.says(place=place)
+        return OfForward.OWN_MEMORY.filled(place=place)
     if near(reading, right.tip[3], TOLERANCE):
-        return OfForward.ONLY_THE_LAST.says(place=place)
+        return OfForward.ONLY_THE_LAST.filled(place=place)
     return ""
 
 
@@ -162,24 +162,24 @@ def _why(
     """Return what reading k (3,) [m] is, as far as the run shows it."""
     expected = right.tip[k]
     away = _away(reading, expected)
-    rounding = grain(reading)
+    rounding = rounding_error(reading)
     slack = TOLERANCE + rounding
     if not np.isfinite(reading).all():
-        return OfForward.NO_NUMBER.says(place=vector(reading))
+        return OfForward.NO_NUMBER.filled(place=vector(reading))
     if world.where and near(reading, course.tip[k], slack):
-        return OfForward.COURSE.says()
+        return OfForward.COURSE.filled()
     if rounding and near(reading, expected, slack):
-        return OfForward.ROUNDED.says(away=away)
+        return OfForward.ROUNDED.filled(away=away)
     if k > 0:
         if near(reading, right.tip[0], TOLERANCE):
             return _why_at_origin(answer, away)
         for name, places in right.others.items():
             if near(reading, places[k], slack):
-                return OfForward.OTHER_PLACE_AWAY.says(places=name, tip=TIP, away=away)
+                return OfForward.OTHER_PLACE_AWAY.filled(places=name, tip=TIP, away=away)
     if text := _other_pose(k, reading, world.model, right, answer, away):
         return text
     value, wanted = told_apart(reading, expected, vector)
-    return OfForward.FIGURES.says(value=value, expected=wanted, away=away)
+    return OfForward.FIGURES.filled(value=value, expected=wanted, away=away)
 
 
 def _away(reading: Array, expected: Array) -> str:
@@ -190,10 +190,10 @@ def _away(reading: Array, expected: Array) -> str:
 def _why_at_origin(answer: Answer, away: str) -> str:
     """Return why a reading after the first is at the origin, so far away from what is right."""
     if not answer.forwards:
-        return OfForward.NEVER_FORWARD.says(away=away)
+        return OfForward.NEVER_FORWARD.filled(away=away)
     if len(answer.ends) > 1:
-        return OfForward.SEVERAL_DATA.says(away=away, count=len(answer.ends))
-    return OfForward.BEFORE_FORWARD.says(away=away)
+        return OfForward.SEVERAL_DATA.filled(away=away, count=len(answer.ends))
+    return OfForward.BEFORE_FORWARD.filled(away=away)
 
 
 def _other_pose(
@@ -202,10 +202,10 @@ def _other_pose(
     """Return that reading k (3,) [m] is of another pose of the arm; "" where it is of none."""
     if k < 3 and near(reading, right.tip[3], TOLERANCE):
         if _wrote_before_forward(answer, address(model)):
-            return OfForward.WRITTEN_EARLY.says(away=away)
-        return OfForward.FORWARD_EARLY.says(away=away)
+            return OfForward.WRITTEN_EARLY.filled(away=away)
+        return OfForward.FORWARD_EARLY.filled(away=away)
     if k == 0 and near(reading, right.tip[1], TOLERANCE):
-        return OfForward.NOT_FRESH.says(away=away)
+        return OfForward.NOT_FRESH.filled(away=away)
     if k == 3:
         return _pose(reading, model, answer, away)
     return ""
@@ -242,11 +242,11 @@ def _what_was_written(start: Inputs, met: Inputs, model: Model, answer: Answer, 
         unit = f"{angle:.1f} rad"
         if math.isclose(angle, math.radians(ANGLE)):
             unit = f"{ANGLE} degrees"
-        return OfForward.OTHER_ANGLE.says(angle=unit, away=away, expected=ANGLE)
+        return OfForward.OTHER_ANGLE.filled(angle=unit, away=away, expected=ANGLE)
     others = [entry for entry in _entries_that_differ(met.qpos, start.qpos) if entry != place]
     if others:
         remark = OfForward.ONE_MORE_ENTRY if angle == ANGLE else OfForward.OTHER_ENTRY
-        return remark.says(
+        return remark.filled(
             entry=others[0], owner=owner(model, others[0]), joint=LIFT, place=place, away=away
         )
     if angle == start.qpos[place]:
@@ -261,18 +261,18 @@ def _why_unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
         inputs for inputs in (*answer.forwards, *answer.ends) if inputs.qpos.shape == (model.nq,)
     ]
     if any(inputs.qpos[place] == ANGLE for inputs in answer.forwards):
-        return OfForward.SECOND_FORWARD_LATE.says(away=away)
+        return OfForward.SECOND_FORWARD_LATE.filled(away=away)
     if any(inputs.qpos[place] != start.qpos[place] for inputs in states):
-        return OfForward.NO_SECOND_FORWARD.says(away=away)
+        return OfForward.NO_SECOND_FORWARD.filled(away=away)
     write = _first_write(start, states)
     if write is None:
-        return OfForward.NOTHING_WRITTEN.says(away=away, angle=ANGLE)
+        return OfForward.NOTHING_WRITTEN.filled(away=away, angle=ANGLE)
     if write.array == "ctrl":
-        return OfForward.WROTE_CTRL.says(entry=write.entry, away=away, joint=LIFT, place=place)
+        return OfForward.WROTE_CTRL.filled(entry=write.entry, away=away, joint=LIFT, place=place)
     if write.array == "qvel":
-        return OfForward.WROTE_QVEL.says(entry=write.entry, away=away, joint=LIFT, place=place)
+        return OfForward.WROTE_QVEL.filled(entry=write.entry, away=away, joint=LIFT, place=place)
     written = owner(model, write.entry)
-    return OfForward.WROTE_QPOS.says(
+    return OfForward.WROTE_QPOS.filled(
         entry=write.entry, owner=written, away=away, joint=LIFT, place=place
     )
 

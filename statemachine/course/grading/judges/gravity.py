@@ -16,11 +16,11 @@ from ..inside.calls import FaultError
 from ..inside.worlds import LIFT, FallWorld, address
 from . import (
     WorldJudgement,
-    grain,
     near,
     numbers,
     owner,
     parts,
+    rounding_error,
     told_apart,
     verified,
     wrong,
@@ -88,27 +88,27 @@ def judge(answer: Answer, world: FallWorld, right: Falls, course: Falls) -> Worl
         return wrong(*remarks, command)  # what the arm then does follows from it
     falls = right.degrees
     if near(traces[0], falls[1], TOLERANCE) and near(traces[1], falls[0], TOLERANCE):
-        return wrong(*remarks, OfGravity.SWAPPED.says())
+        return wrong(*remarks, OfGravity.SWAPPED.filled())
     for limp, name in enumerate(_NAMES):
         if near(traces[limp], falls[limp], TOLERANCE):
             text = _by_the_clock(traces[limp], limp, world, right)
             if text:
-                remarks.append(OfGravity.OF_TRACE.says(trace=name, mistake=text))
+                remarks.append(OfGravity.OF_TRACE.filled(trace=name, mistake=text))
         else:
             remarks.append(_why(traces, limp, world, right, course, answer))
     if not answer.runs:
-        remarks.append(OfGravity.NO_STEP.says())
+        remarks.append(OfGravity.NO_STEP.filled())
     elif not remarks and sum(run.nstep >= right.marks[-1] for run in answer.runs) < 2:
         remarks.append(_short_runs(answer, world, int(right.marks[-1])))
     if remarks:
         return wrong(*remarks)
     on, off = falls[0][-1], falls[1][-1]
-    return verified(OfGravity.PASSED.says(joint=LIFT, seconds=size - 1, on=on, off=off))
+    return verified(OfGravity.PASSED.filled(joint=LIFT, seconds=size - 1, on=on, off=off))
 
 
 def _short_runs(answer: Answer, world: FallWorld, needed: int) -> str:
     """Return how many steps the runs took, where each needs so many."""
-    return OfGravity.SHORT_RUNS.says(
+    return OfGravity.SHORT_RUNS.filled(
         steps=", ".join(count(run.nstep, "step") for run in answer.runs[:4]),
         seconds=world.arguments[0],
         needed=needed,
@@ -124,16 +124,16 @@ def _traces(result: Any, size: int) -> list[Array]:
     """
     is_list = isinstance(result, (list, tuple)) and len(result) == size != 2
     if is_list and all(isinstance(pair, (list, tuple)) and len(pair) == 2 for pair in result):
-        raise FaultError(OfGravity.PAIRS.says(kind=kind(result)))
+        raise FaultError(OfGravity.PAIRS.filled(kind=kind(result)))
     traces: list[Array] = []
     pair = parts(result, 2, "(on, off), two lists of degrees")
     for trace, name in zip(pair, _NAMES, strict=True):
         shape = np.shape(trace) if _is_regular(trace) else ()
         if len(shape) == 2 and shape[0] == size:
             columns = shape[1]
-            raise FaultError(OfGravity.ONE_NUMBER.says(trace=name, columns=columns, joint=LIFT))
+            raise FaultError(OfGravity.ONE_NUMBER.filled(trace=name, columns=columns, joint=LIFT))
         if len(shape) == 1 and shape[0] != size:
-            length = OfGravity.LENGTH.says(
+            length = OfGravity.LENGTH.filled(
                 trace=name, length=shape[0], needed=size, seconds=size - 1
             )
             raise FaultError(length)
@@ -172,11 +172,11 @@ def _why(
     # The farthest, but not the start, where all is zero in any unit.
     k = int(np.argmax(np.nan_to_num(abs(trace - expected), nan=np.inf)))
     value, right = told_apart(trace[k], expected[k], lambda v, digits: f"{v + 0.0:.{digits}g}")
-    figures = OfGravity.FIGURES.says(trace=_NAMES[limp], value=value, second=k, expected=right)
+    figures = OfGravity.FIGURES.filled(trace=_NAMES[limp], value=value, second=k, expected=right)
     mistake = _mistake(traces, limp, world, falls, course, answer)
     if not mistake:
         mistake = _late(trace, limp, world, falls, answer)
-    return OfGravity.MISTAKE.says(figures=figures, mistake=mistake) if mistake else figures
+    return OfGravity.MISTAKE.filled(figures=figures, mistake=mistake) if mistake else figures
 
 
 def _mistake(
@@ -192,21 +192,21 @@ def _mistake(
     if text := _goes_on(trace, traces[1 - limp], world, answer):
         return text
     if _is_last_number(trace, expected):
-        return OfGravity.LAST_NUMBER.says()
+        return OfGravity.LAST_NUMBER.filled()
     for mistake in _mistakes(limp, world, falls, course, answer):
         # The zero at the start may be typed in.
         if _gives(mistake.degrees[1:], trace[1:], expected[1:]):
             return mistake.remark
-    runs = [run for run in answer.runs if run.own]
+    runs = [run for run in answer.runs if run.on_given_model]
     if not runs:
-        return OfGravity.NO_STEP.says()
+        return OfGravity.NO_STEP.filled()
     if float(abs(trace).max()) <= TOLERANCE < float(abs(expected).max()):
         if any(near(run.end.qpos, run.start.qpos, _STILL) for run in runs):
-            return OfGravity.STILL.says()
+            return OfGravity.STILL.filled()
         speed = falls.speed[limp, falls.marks]
         if trace.any() and any(near(trace, unit(speed), 1e-14) for unit in _UNITS):
-            return OfGravity.SPEED.says()
-        return OfGravity.ZEROS.says(joint=LIFT)
+            return OfGravity.SPEED.filled()
+        return OfGravity.ZEROS.filled(joint=LIFT)
     return ""
 
 
@@ -218,9 +218,11 @@ def _is_last_number(trace: Array, expected: Array) -> bool:
 
 def _gives(mistaken: Array, trace: Array, expected: Array) -> bool:
     """Return whether a mistake gives a trace, and neither what is right nor zeros."""
-    slack = 2 * _SAME + grain(trace)
-    telling = not near(mistaken, expected, 2 * slack) and bool((abs(mistaken) > 2 * slack).any())
-    return telling and near(trace, mistaken, slack + 1e-9 * float(abs(mistaken).max()))
+    slack = 2 * _SAME + rounding_error(trace)
+    is_distinct = not near(mistaken, expected, 2 * slack) and bool(
+        (abs(mistaken) > 2 * slack).any()
+    )
+    return is_distinct and near(trace, mistaken, slack + 1e-9 * float(abs(mistaken).max()))
 
 
 class _Mistake(NamedTuple):
@@ -241,19 +243,19 @@ def _mistakes(
     """Yield typical mistakes; arguments as of `_why`."""
     marks = falls.marks
     expected, other = falls.degrees[limp], falls.degrees[1 - limp]
-    yield _Mistake(np.radians(expected), OfGravity.RADIANS.says())
-    yield _Mistake(np.radians(np.radians(expected)), OfGravity.RADIANS_AGAIN.says())
-    yield _Mistake(np.degrees(expected), OfGravity.DEGREES_TWICE.says())
+    yield _Mistake(np.radians(expected), OfGravity.RADIANS.filled())
+    yield _Mistake(np.radians(np.radians(expected)), OfGravity.RADIANS_AGAIN.filled())
+    yield _Mistake(np.degrees(expected), OfGravity.DEGREES_TWICE.filled())
     yield from _other_entries(limp, world.model, falls)
     for unit in _UNITS:
-        yield _Mistake(unit(falls.speed[limp, marks]), OfGravity.SPEED.says())
+        yield _Mistake(unit(falls.speed[limp, marks]), OfGravity.SPEED.filled())
     if world.where:
-        is_loaded = not all(run.own for run in answer.runs)
+        is_loaded = not all(run.on_given_model for run in answer.runs)
         remark = OfGravity.COURSE_LOADED if is_loaded else OfGravity.COURSE
-        yield _Mistake(course.degrees[limp][: len(marks)], remark.says())
-    servos = OfGravity.SERVOS_ON.says() if limp else OfGravity.SERVOS_OFF.says()
+        yield _Mistake(course.degrees[limp][: len(marks)], remark.filled())
+    servos = OfGravity.SERVOS_ON.filled() if limp else OfGravity.SERVOS_OFF.filled()
     yield _Mistake(other, servos)
-    yield _Mistake(np.radians(other), OfGravity.AND_RADIANS.says(servos=servos))
+    yield _Mistake(np.radians(other), OfGravity.AND_RADIANS.filled(servos=servos))
     yield from _other_rates(limp, world.model, falls, answer)
 
 
@@ -261,7 +263,7 @@ def _other_entries(limp: int, model: Model, falls: Falls) -> Iterator[_Mistake]:
     """Yield what other entries of qpos give; arguments as of `_why`."""
     for entry in range(model.nq):
         if entry != falls.place:
-            remark = OfGravity.OTHER_JOINT.says(
+            remark = OfGravity.OTHER_JOINT.filled(
                 entry=entry, owner=owner(model, entry), joint=LIFT, place=falls.place
             )
             yield _Mistake(falls.angles[limp, falls.marks, entry], remark)
@@ -273,7 +275,7 @@ def _other_rates(limp: int, model: Model, falls: Falls, answer: Answer) -> Itera
     for nstep in dict.fromkeys(run.nstep for run in answer.runs):
         rate = nstep // (len(marks) - 1)
         if rate != marks[1] and (len(marks) - 1) * rate < len(angles):
-            remark = OfGravity.STEPS_A_SECOND.says(
+            remark = OfGravity.STEPS_A_SECOND.filled(
                 steps=count(rate, "step"), timestep=model.timestep * 1e3, needed=marks[1]
             )
             yield _Mistake(angles[np.arange(len(marks)) * rate, falls.place], remark)
@@ -282,31 +284,31 @@ def _other_rates(limp: int, model: Model, falls: Falls, answer: Answer) -> Itera
 def _goes_on(trace: Array, other: Array, world: FallWorld, answer: Answer) -> str:
     """Return that a run began where another had ended; "" where it did not."""
     place = address(world.model)
-    starts = [np.degrees(run.start.qpos[place]) for run in answer.runs if run.own]
+    starts = [np.degrees(run.start.qpos[place]) for run in answer.runs if run.on_given_model]
     fresh = sum(abs(start) <= TOLERANCE for start in starts)
     if fresh >= 2 or abs(trace[0]) <= TOLERANCE or abs(trace[0] - other[-1]) > TOLERANCE:
         return ""
-    return OfGravity.GOES_ON.says(start=trace[0])
+    return OfGravity.GOES_ON.filled(start=trace[0])
 
 
 def _late(trace: Array, limp: int, world: FallWorld, falls: Falls, answer: Answer) -> str:
     """Return for which other moments a trace is right, to which one of the runs came; or ""."""
     marks, timestep = falls.marks, world.model.timestep
     angles = falls.angles[limp, :, falls.place]
-    slack = _SAME + grain(trace)
+    slack = _SAME + rounding_error(trace)
     rate = int(marks[1])
     offsets: list[int] = []
     for late in range(1 - rate, rate + 1):
         if late and near(trace[1:], angles[marks[1:] + late], slack):
             offsets.append(late)
     # Where the arm rests it is the same at many moments: then what was stepped tells.
-    taken = {run.nstep - int(marks[-1]) for run in answer.runs}
+    step_counts = {run.nstep - int(marks[-1]) for run in answer.runs}
     if len(offsets) > 1:
-        offsets = [late for late in offsets if late in taken]
-    if len(offsets) != 1 or max(taken) < offsets[0]:
+        offsets = [late for late in offsets if late in step_counts]
+    if len(offsets) != 1 or max(step_counts) < offsets[0]:
         return ""
     remark = OfGravity.LATE if offsets[0] > 0 else OfGravity.EARLY
-    return remark.says(shift=abs(offsets[0]) * timestep)
+    return remark.filled(shift=abs(offsets[0]) * timestep)
 
 
 def _by_the_clock(trace: Array, limp: int, world: FallWorld, falls: Falls) -> str:
@@ -317,9 +319,9 @@ def _by_the_clock(trace: Array, limp: int, world: FallWorld, falls: Falls) -> st
         return ""
     k = int(np.argmax(np.diff(marks) != falls.marks[1])) + 1
     before = int(marks[k]) - 1
-    taken, time = marks[k] - marks[k - 1], float(falls.time[before])
-    return OfGravity.BY_THE_CLOCK.says(
-        steps=taken,
+    step_count, time = marks[k] - marks[k - 1], float(falls.time[before])
+    return OfGravity.BY_THE_CLOCK.filled(
+        steps=step_count,
         second=k - 1,
         next=k,
         needed=falls.marks[1],
@@ -340,9 +342,9 @@ def _command(answer: Answer, model: Model) -> str:
         if written.size:
             entry = int(written[0])
             name = model.actuator_names[entry]
-            return OfGravity.COMMAND.says(entry=entry, actuator=name, value=values[entry])
+            return OfGravity.COMMAND.filled(entry=entry, actuator=name, value=values[entry])
         if run.ctrl_changed is not None:  # and written back
-            return OfGravity.COMMAND_BETWEEN.says()
+            return OfGravity.COMMAND_BETWEEN.filled()
     return ""
 
 
@@ -350,5 +352,5 @@ def _changes_of_model(answer: Answer) -> list[str]:
     """Return what of the Model was not given back as it was."""
     flags = [int(values[0]) for values in answer.changed.get("opt.disableflags", ())]
     if flags:
-        return [OfGravity.FLAG_LEFT.says(before=flags[0], now=flags[1])]
-    return [OfGravity.MODEL_CHANGED.says(name=name) for name in answer.changed]
+        return [OfGravity.FLAG_LEFT.filled(before=flags[0], now=flags[1])]
+    return [OfGravity.MODEL_CHANGED.filled(name=name) for name in answer.changed]

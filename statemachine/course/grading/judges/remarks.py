@@ -11,7 +11,7 @@ from enum import StrEnum
 class Remark(StrEnum):
     """Text of a remark, with slots as `str.format` has them."""
 
-    def says(self, **slots: object) -> str:
+    def filled(self, **slots: object) -> str:
         """Return the text with its slots filled."""
         return self.value.format(**slots)
 

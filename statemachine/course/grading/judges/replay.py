@@ -16,11 +16,11 @@ from ..inside.watch import EngineRun, Inputs, inputs_of
 from ..inside.worlds import ReplayWorld
 from . import (
     WorldJudgement,
-    grain,
     listed,
     near,
     numbers,
     parts,
+    rounding_error,
     same_bits,
     short_float,
     verified,
@@ -80,26 +80,26 @@ def judge(answer: Answer, world: ReplayWorld, right: TwoRuns, _course: TwoRuns) 
     if remarks:
         return wrong(*remarks)
     first, second = answer.runs
-    apart = float(abs(first.end.qpos - second.end.qpos).max())
-    if apart and world.nudge is None:
-        return wrong(OfReplay.LEFT_OVER.says(apart=apart))
+    gap = float(abs(first.end.qpos - second.end.qpos).max())
+    if gap and world.nudge is None:
+        return wrong(OfReplay.LEFT_OVER.filled(apart=gap))
     if fault := _fault_of_goal(answer.runs, right, nstep):
         return wrong(fault)
     if same != same_bits(first.end.qpos, second.end.qpos):
-        return wrong(_fault_of_comparison(same, apart))
+        return wrong(_fault_of_comparison(same, gap))
     if fault := _fault_of_ends(ends, (first, second)):
         return wrong(fault)
-    return verified(OfReplay.PASSED.says(nstep=nstep))
+    return verified(OfReplay.PASSED.filled(nstep=nstep))
 
 
 def _fault_of_kind(same: Any, copies: Sequence[Any]) -> str:
     """Return what is wrong with a first value that is neither True nor False."""
     for place, value in enumerate(copies, start=2):
         if isinstance(value, bool):
-            return OfReplay.ORDER.says(place=place)
+            return OfReplay.ORDER.filled(place=place)
     if isinstance(same, np.ndarray) and same.dtype == np.bool_:
-        return OfReplay.SAME_ELEMENTS.says(kind=kind(same))
-    return OfReplay.SAME_KIND.says(kind=kind(same))
+        return OfReplay.SAME_ELEMENTS.filled(kind=kind(same))
+    return OfReplay.SAME_KIND.filled(kind=kind(same))
 
 
 def _end(end: Any, which: str, model: Model) -> Array:
@@ -109,26 +109,26 @@ def _end(end: Any, which: str, model: Model) -> Array:
         FaultError: It is no array of so many numbers.
     """
     if isinstance(end, OtherValue):
-        raise FaultError(OfReplay.WHOLE_DATA.says(which=which, kind=kind(end)))
+        raise FaultError(OfReplay.WHOLE_DATA.filled(which=which, kind=kind(end)))
     if np.shape(end) == (model.nv,) != (model.nq,):
-        raise FaultError(OfReplay.QVEL.says(which=which, nv=model.nv, nq=model.nq))
+        raise FaultError(OfReplay.QVEL.filled(which=which, nv=model.nv, nq=model.nq))
     return numbers(end, (model.nq,), f"{which}, qpos at the end,")
 
 
-def _fault_of_comparison(same: bool, apart: float) -> str:
+def _fault_of_comparison(same: bool, gap: float) -> str:
     """Return why what is said of two runs that ended so far apart [rad or m] is not so."""
     if not same:
-        return OfReplay.DIFFERENT.says()
-    remark = OfReplay.ALWAYS_TRUE if apart > _FAR else OfReplay.NEARLY
-    return remark.says(apart=apart)
+        return OfReplay.DIFFERENT.filled()
+    remark = OfReplay.ALWAYS_TRUE if gap > _FAR else OfReplay.NEARLY
+    return remark.filled(apart=gap)
 
 
 def _fault_of_goal(runs: Sequence[EngineRun], right: TwoRuns, nstep: int) -> str:
     """Return which run ended where such a run does not end; a record may have been made up."""
     for name, run, end in zip(_COUNT, runs, right.ends, strict=True):
         if run.end.qpos.shape != end.shape or not near(run.end.qpos, end, _END):
-            fault = OfReplay.OTHER_END.says(steps=count(nstep, "step"))
-            return OfReplay.RUN.says(which=name, fault=fault)
+            fault = OfReplay.OTHER_END.filled(steps=count(nstep, "step"))
+            return OfReplay.RUN.filled(which=name, fault=fault)
     return ""
 
 
@@ -141,17 +141,17 @@ def _fault_of_memory(answer: Answer) -> str:
         name, live = "second", second
     if answer.memory[2] == 1:
         if live:
-            return OfReplay.ONE_ARRAY_LIVE.says()
+            return OfReplay.ONE_ARRAY_LIVE.filled()
         if len(answer.runs) > 1:
-            return OfReplay.ONE_ARRAY.says()
-    return OfReplay.LIVE.says(which=name, live=live) if live else ""
+            return OfReplay.ONE_ARRAY.filled()
+    return OfReplay.LIVE.filled(which=name, live=live) if live else ""
 
 
 def _fault_of_type(copies: Sequence[object]) -> str:
     """Return which of the returned ends has a type that forgets digits; "" for none."""
     for name, end_copy in zip(_COUNT, copies, strict=True):
         if short := short_float(end_copy):
-            return OfReplay.FEW_DIGITS.says(which=name, dtype=short)
+            return OfReplay.FEW_DIGITS.filled(which=name, dtype=short)
     return ""
 
 
@@ -161,10 +161,10 @@ def _faults_of_runs(answer: Answer, world: ReplayWorld, start: Inputs) -> list[s
     if fault := _fault_of_number(answer, nstep):
         return [fault]
     first, second = (_faults(run, world, start) for run in answer.runs)
-    remarks = [OfReplay.RUN.says(which="first", fault=text) for text in first.values()]
+    remarks = [OfReplay.RUN.filled(which="first", fault=text) for text in first.values()]
     for concern, text in second.items():
         if concern not in first:
-            remarks.append(OfReplay.RUN.says(which="second", fault=text))
+            remarks.append(OfReplay.RUN.filled(which="second", fault=text))
     return remarks
 
 
@@ -173,18 +173,18 @@ def _fault_of_number(answer: Answer, nstep: int) -> str:
     runs = answer.runs
     if not runs:
         remark = OfReplay.FORWARD_FOR_STEP if answer.forwards else OfReplay.NO_STEP
-        return remark.says(nstep=nstep)
-    if not any(run.own for run in runs):
-        return OfReplay.OTHER_MODEL.says()
+        return remark.filled(nstep=nstep)
+    if not any(run.on_given_model for run in runs):
+        return OfReplay.OTHER_MODEL.filled()
     if len(runs) == 1 and runs[0].nstep >= 2 * nstep:
-        return OfReplay.NO_RESET_BETWEEN.says(steps=runs[0].nstep)
+        return OfReplay.NO_RESET_BETWEEN.filled(steps=runs[0].nstep)
     if len(runs) == 1:
-        return OfReplay.ONE_RUN.says()
+        return OfReplay.ONE_RUN.filled()
     if len(runs) > 2:
         steps = ", ".join(str(run.nstep) for run in runs[:6])
         if len(runs) > 6:
             steps += ", …"
-        return OfReplay.MANY_RUNS.says(runs=len(runs), steps=steps)
+        return OfReplay.MANY_RUNS.filled(runs=len(runs), steps=steps)
     return ""
 
 
@@ -194,15 +194,15 @@ def _faults(run: EngineRun, world: ReplayWorld, start: Inputs) -> dict[str, str]
     faults: dict[str, str] = {}
     is_misplaced = _is_command_in_qpos(run, ctrl, start)
     if is_misplaced:
-        faults["start"] = OfReplay.COMMAND_IN_QPOS.says()
+        faults["start"] = OfReplay.COMMAND_IN_QPOS.filled()
     elif fault := _fault_of_start(run, start):
         faults["start"] = fault
     if not (is_misplaced or same_bits(run.start.ctrl, ctrl)):
         faults["ctrl"] = _fault_of_command(run, ctrl, start, world.model)
     elif run.ctrl_changed is not None:
-        faults["ctrl"] = OfReplay.CTRL_CHANGED.says(step=run.ctrl_changed)
+        faults["ctrl"] = OfReplay.CTRL_CHANGED.filled(step=run.ctrl_changed)
     if run.nstep != nstep:
-        faults["steps"] = OfReplay.STEPS.says(steps=count(run.nstep, "step"), nstep=nstep)
+        faults["steps"] = OfReplay.STEPS.filled(steps=count(run.nstep, "step"), nstep=nstep)
     return faults
 
 
@@ -230,11 +230,11 @@ def _fault_of_start(run: EngineRun, start: Inputs) -> str:
         gap_of_speed = _gap(run.start.qvel, start.qvel)
         if gap_of_speed > gap:
             name, gap = "qvel", gap_of_speed
-        return OfReplay.ELSEWHERE.says(array=name, gap=gap)
+        return OfReplay.ELSEWHERE.filled(array=name, gap=gap)
     if run.start.time:
         is_keyframes = run.start.time == start.time
         remark = OfReplay.KEYFRAMES_TIME if is_keyframes else OfReplay.TIME
-        return remark.says(time=run.start.time)
+        return remark.filled(time=run.start.time)
     return ""
 
 
@@ -251,25 +251,25 @@ def _fault_of_command(run: EngineRun, ctrl: Array, start: Inputs, model: Model) 
     is_keyframes = same_bits(was, start.ctrl)
     if run.ctrl_changed is not None:
         remark = OfReplay.CTRL_LATE_KEYFRAMES if is_keyframes else OfReplay.CTRL_LATE
-        return remark.says(ctrl=listed(was), steps=count(run.ctrl_changed, "step"))
+        return remark.filled(ctrl=listed(was), steps=count(run.ctrl_changed, "step"))
     if is_keyframes:
-        return OfReplay.CTRL_NOT_WRITTEN.says()
+        return OfReplay.CTRL_NOT_WRITTEN.filled()
     if near(was, start.ctrl + ctrl, 1e-9):
-        return OfReplay.CTRL_ADDED.says()
+        return OfReplay.CTRL_ADDED.filled()
     if near(was, np.degrees(ctrl), 1e-9):
-        return OfReplay.CTRL_DEGREES.says(ctrl=listed(was))
+        return OfReplay.CTRL_DEGREES.filled(ctrl=listed(was))
     if near(was, np.radians(ctrl), 1e-9):
-        return OfReplay.CTRL_RADIANS.says(ctrl=listed(was))
+        return OfReplay.CTRL_RADIANS.filled(ctrl=listed(was))
     others = np.flatnonzero(was != ctrl)
     if len(others) == 1:
         entry = int(others[0])
-        return OfReplay.CTRL_ENTRY.says(
+        return OfReplay.CTRL_ENTRY.filled(
             entry=entry,
             actuator=model.actuator_names[entry],
             value=was[entry],
             expected=ctrl[entry],
         )
-    return OfReplay.CTRL_OTHER.says(ctrl=listed(was), expected=listed(ctrl))
+    return OfReplay.CTRL_OTHER.filled(ctrl=listed(was), expected=listed(ctrl))
 
 
 def _fault_of_ends(ends: Sequence[Array], runs: Sequence[EngineRun]) -> str:
@@ -278,21 +278,21 @@ def _fault_of_ends(ends: Sequence[Array], runs: Sequence[EngineRun]) -> str:
         if not same_bits(end, run.end.qpos):
             away = float(abs(end - run.end.qpos).max())
             why = _why(end, away, run, runs)
-            return OfReplay.END.says(which=name, away=away, why=why)
+            return OfReplay.END.filled(which=name, away=away, why=why)
     return ""
 
 
 def _why(end: Array, away: float, run: EngineRun, runs: Sequence[EngineRun]) -> str:
     """Return what a wrong end (nq,), so far away from the right one, may be."""
     if same_bits(end, run.start.qpos):
-        return OfReplay.AT_START.says()
+        return OfReplay.AT_START.filled()
     if same_bits(end, runs[0].end.qpos):
-        return OfReplay.FIRST_TWICE.says()
+        return OfReplay.FIRST_TWICE.filled()
     if same_bits(end, runs[1].end.qpos):
-        return OfReplay.SECOND_END.says()
-    rounding = grain(end)
+        return OfReplay.SECOND_END.filled()
+    rounding = rounding_error(end)
     if rounding and away <= rounding * 1.001:
-        return OfReplay.ROUNDED.says()
+        return OfReplay.ROUNDED.filled()
     if away < 1e-3:
-        return OfReplay.ROUNDED_OR_EARLY.says()
-    return OfReplay.READ_AT_END.says()
+        return OfReplay.ROUNDED_OR_EARLY.filled()
+    return OfReplay.READ_AT_END.filled()

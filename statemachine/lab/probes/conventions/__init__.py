@@ -178,13 +178,13 @@ class Phrase:
         concept: One of `CONCEPTS`.
         code: What is typed.
         works: Whether it ran, and the concept happened.
-        said: What was wrong; "" where nothing was.
+        fault: What was wrong; "" where nothing was.
     """
 
     concept: str
     code: str
     works: bool
-    said: str
+    fault: str
 
 
 @dataclass(frozen=True)
@@ -244,4 +244,4 @@ def _run_phrase(phrases: Phrases, concepts: Sequence[str]) -> Phrase:
             fault = f"{type(error).__name__}: {error}"
         finally:
             phrases.close(program)
-    return Phrase(concepts[-1], cell.code, works=not fault, said=fault)
+    return Phrase(concepts[-1], cell.code, works=not fault, fault=fault)

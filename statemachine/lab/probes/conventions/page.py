@@ -123,7 +123,7 @@ def _phrases_of(concept: str, result: Phrasebook) -> list[_EnginePhrase]:
             found.append(_EnginePhrase(engine, concept, "not asked"))
         else:
             state = "works" if call.works else "fails"
-            found.append(_EnginePhrase(engine, concept, state, call.code, call.said))
+            found.append(_EnginePhrase(engine, concept, state, call.code, call.fault))
     return found
 
 

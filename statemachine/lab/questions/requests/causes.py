@@ -16,7 +16,7 @@ from ....errors import BadInputError, check_name
 from ....interface import Model
 from ....models import AnyPath
 from ....processes import checked_jobs
-from ...compare.alike import for_left
+from ...compare.alike import in_layout_of_left
 from ...compare.bases import load_sides
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
@@ -169,7 +169,8 @@ def _question(
         loaded = load_sides(sides, {}, run.names)
         models = loaded.models
         recordings = [
-            for_left(trace, model, run) for trace, model in zip(traces, models, strict=False)
+            in_layout_of_left(trace, model, run)
+            for trace, model in zip(traces, models, strict=False)
         ]
         question = WhyRequest(
             models[0],
@@ -202,7 +203,7 @@ def _with_changes(
 def _result(explanation: Explanation, request: ExplainRequest, bases: Bases) -> ExplainResult:
     """Return an explanation with what was typed, and what was asked."""
     run = request.run
-    notes = [*run.taken]
+    notes = [*run.notes_on_parts]
     if run.is_traces:
         notes.append(_PLAYED)
     explanation = replace(

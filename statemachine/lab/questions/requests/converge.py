@@ -60,12 +60,12 @@ class ConvergeResult(ShownResult, Convergence):
         "gap_1" is the largest gap with the steps as given, "gap_2" with half of them, and so on
         [unit]; "limit" is what it tends to [unit].
         """
-        columns: dict[str, Column] = {"quantity": [limit.name for limit in self.whole]}
-        columns |= columns_of(self.whole, ("kind", "unit"))
-        runs = len(self.whole[0].gaps) if self.whole else 0
+        columns: dict[str, Column] = {"quantity": [limit.name for limit in self.whole_run]}
+        columns |= columns_of(self.whole_run, ("kind", "unit"))
+        runs = len(self.whole_run[0].gaps) if self.whole_run else 0
         for number, finer in enumerate(FINER[:runs]):
-            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in self.whole]
-        columns |= columns_of(self.whole, ("limit", "verdict"))
+            columns[f"gap_{finer}"] = [limit.gaps[number] for limit in self.whole_run]
+        columns |= columns_of(self.whole_run, ("limit", "verdict"))
         return columns
 
 
@@ -75,32 +75,32 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> ConvergeResu
     Raises:
         StateMachineError: As `run_sides` does.
     """
-    took: list[float] = []  # by the clock [s]
+    durations: list[float] = []  # by the clock [s]
 
     def run(times: int) -> tuple[Trace, Trace]:
         what = "converge, steps as given"
         if times > 1:
             what = f"converge, steps {times} times finer"
         began = time.monotonic()
-        with reporter.stage(what, takes=_expected(took)) as progress:
+        with reporter.stage(what, takes=_expected(durations)) as progress:
             traces = run_sides(request.with_finer_steps(times), progress).traces
-        took.append(time.monotonic() - began)
+        durations.append(time.monotonic() - began)
         return traces
 
     limits = convergence(run)
     return ConvergeResult(**vars(limits), request=request)
 
 
-def _expected(took: list[float]) -> float | None:
+def _expected(durations: list[float]) -> float | None:
     """Estimate how long runs with steps of half the length take [s]; None before two were measured.
 
     Args:
-        took: How long each of those before took, whose steps were halved each time [s]. Loading
-            takes the same each time, and is no part of what grows.
+        durations: How long each of those before took, whose steps were halved each time [s].
+            Loading takes the same each time, and is no part of what grows.
     """
-    if len(took) < 2:
+    if len(durations) < 2:
         return None
-    return took[-1] + 2.0 * max(0.0, took[-1] - took[-2])
+    return durations[-1] + 2.0 * max(0.0, durations[-1] - durations[-2])
 
 
 def _substeps(options: Mapping[str, OptionValue], usual: int) -> int:

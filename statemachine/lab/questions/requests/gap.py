@@ -52,7 +52,10 @@ class CompareRequest:
 
     @property
     def names_sides(self) -> bool:
-        """Whether what is said of the sides belongs to the answer: they are given, or commanded."""
+        """Tell whether an answer says what its sides are.
+
+        It does where sides are named, or where a function of the user's commands them.
+        """
         return bool(self.run.sides) or is_function(self.run.what[0])
 
 
@@ -104,12 +107,12 @@ class CompareResult(ShownResult):
 
     @cached_property
     def finding(self) -> Finding:
-        """What it comes to: what differs most, since when, how far at the end, by chance or not."""
+        """Return what the comparison shows: what differs most, since when, how far, by chance?"""
         return finding_of(self.comparison, self.floor, self.played, self.run.missing)
 
     @cached_property
     def call_periods(self) -> CallPeriods | None:
-        """How often a function is called on each side; None where none is run."""
+        """Return how often a function is called on each side; None where none is run."""
         left, right = self.run.traces
         return self.request.run.call_periods((left.header.timestep, right.header.timestep))
 
@@ -183,20 +186,20 @@ def _instead(request: Request, run: SidesRun, comparison: Comparison) -> Instead
     return None if model is None else instead_of(model, asked, request.seed)
 
 
-def _without_experiment(model: Model, asked: str, request: Request) -> Model:
+def _without_experiment(model: Model, experiment: str, request: Request) -> Model:
     """Return the left's model without what an experiment switches off, such as its servos.
 
     Args:
         model: As the experiment ran on it.
-        asked: The experiment.
+        experiment: The experiment.
         request: Of the run; what it says itself stays as it is.
     """
-    if asked not in SCENARIOS:
+    if experiment not in SCENARIOS:
         return model
-    said = dict(request.options)
+    set_options = dict(request.options)
     if request.sides:
-        said |= request.sides[0].options
-    switched = [name for name in SCENARIOS[asked].options if name not in said]
+        set_options |= request.sides[0].options
+    switched = [name for name in SCENARIOS[experiment].options if name not in set_options]
     return model.replace(**dict.fromkeys(switched, True)) if switched else model
 
 

@@ -83,11 +83,11 @@ class ModelsResult(ShownResult, ModelsComparison):
         if rewritten is None:
             return super().page(details)
         if not details:
-            return first_that_fits(self._ever_shorter(rewritten))
+            return first_that_fits(self._shorter_pages(rewritten))
         page = super().page(details)
         return replace(page, blocks=[*page.blocks, *rewritten_blocks(rewritten)])
 
-    def _ever_shorter(self, rewritten: RewrittenFile) -> Iterator[Page]:
+    def _shorter_pages(self, rewritten: RewrittenFile) -> Iterator[Page]:
         """Yield the page with ever fewer rows of differences, then of what was not written."""
         for refusals in range(_MOST_ROWS, -1, -1):
             blocks = rewritten_blocks(rewritten, refusals)

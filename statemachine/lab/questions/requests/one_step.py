@@ -28,8 +28,19 @@ class OneStepRequest:
 
 
 _COLUMNS = (
-    *("stage", "unit", "worst", "at", "where", "tolerance", "beyond", "first", "leads", "scale"),
-    *("null", "told", "reason"),
+    *(
+        "stage",
+        "unit",
+        "worst",
+        "at",
+        "where",
+        "tolerance",
+        "beyond",
+        "first",
+        "first_count",
+        "scale",
+    ),
+    *("null", "is_available", "reason"),
 )
 
 

@@ -71,7 +71,7 @@ class ReleasePair:
     @property
     @only_on_pages
     def is_changed(self) -> bool:
-        """Whether the motion changes between the two."""
+        """Tell whether the motion changes between the two releases."""
         return self.comparison.outcome in ("differs", "ended")
 
 
@@ -104,7 +104,7 @@ class VersionsResult(ShownResult):
     @property
     @only_on_pages
     def comparisons(self) -> tuple[Comparison, ...]:
-        """The comparisons of all pairs."""
+        """Return the comparisons of all pairs."""
         return tuple(pair.comparison for pair in self.pairs)
 
 
