@@ -139,7 +139,7 @@ class TableCell(str):
 
 
 def _one_line(cell: str) -> str:
-    """A cell; the name of a file or a joint may have line breaks."""
+    """Return a cell; the name of a file or a joint may have line breaks."""
     return "?".join(cell.splitlines()) if len(f"{cell}.".splitlines()) > 1 else cell
 
 
@@ -181,7 +181,7 @@ class Table:
         wide: Iterable[str] = (),
         emphasis: Callable[[R], bool] = lambda _: False,
     ) -> Table:
-        """A table with a row for each record.
+        """Return a table with a row for each record.
 
         Args:
             records: Whatever the rows are of.
@@ -284,7 +284,7 @@ class Headline:
 
     @property
     def text(self) -> str:
-        """All of it on one line."""
+        """Return all of it on one line."""
         return " ".join(part for part in (f"{self.lead}.", *self.causes, self.end) if part)
 
 
@@ -322,6 +322,6 @@ class Page:
 
     @property
     def holds(self) -> bool:
-        """Whether its headline and every verdict on it held."""
+        """Tell whether its headline and every verdict on it held."""
         verdicts = [block.holds for block in self.blocks if isinstance(block, Verdict)]
         return all(verdicts) and (self.headline is None or self.headline.holds)

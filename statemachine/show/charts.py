@@ -59,7 +59,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 
 def check_suffix(path: Path) -> str:
-    """The form of a figure's file, "svg", "png" or "pdf".
+    """Return the form of a figure's file, "svg", "png" or "pdf".
 
     Raises:
         BadInputError: It is not a figure.
@@ -74,7 +74,7 @@ def check_suffix(path: Path) -> str:
 
 
 def require_matplotlib() -> Any:
-    """The package matplotlib.
+    """Return the package matplotlib.
 
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
@@ -86,7 +86,7 @@ def require_matplotlib() -> Any:
 def saved(
     draw: Callable[[], Any], form: str, settings: Mapping[str, Any] = SETTINGS, dpi: int = _DOTS
 ) -> bytes:
-    """What is drawn, as svg, png or pdf; the same gives the same bytes.
+    """Return what is drawn, as svg, png or pdf; the same gives the same bytes.
 
     Args:
         draw: Makes a figure of matplotlib's.

@@ -24,17 +24,17 @@ class Origin(Protocol):
 
     @property
     def backend(self) -> str:
-        """What ran the model."""
+        """Return what ran the model."""
         ...
 
     @property
     def versions(self) -> Mapping[str, str]:
-        """Of the package, the engine and what else counts, by name."""
+        """Return of the package, the engine and what else counts, by name."""
         ...
 
     @property
     def model_file(self) -> str:
-        """The model's file and its folder."""
+        """Return the model's file and its folder."""
         ...
 
     @property
@@ -44,7 +44,7 @@ class Origin(Protocol):
 
     @property
     def emulated(self) -> tuple[str, ...]:
-        """The promises of the contract that the backend keeps instead of its engine."""
+        """Return the promises of the contract that the backend keeps instead of its engine."""
         ...
 
 
@@ -53,7 +53,7 @@ class HasProvenance(Protocol):
 
     @property
     def provenance(self) -> Origin:
-        """The model, the versions and the timestep of the run."""
+        """Return the model, the versions and the timestep of the run."""
         ...
 
 

@@ -52,7 +52,7 @@ class RemainingTime:
 
     @property
     def seconds(self) -> float | None:
-        """The time that the rest takes from now on [s]; None while that cannot be told."""
+        """Return the time that the rest takes from now on [s]; None while that cannot be told."""
         pace = self._pace()
         if pace is None:
             return None

@@ -214,7 +214,10 @@ def _text(console: Console, blocks: Sequence[Page | Block]) -> str:
 
 
 def _unfolded(blocks: Sequence[Page | Block]) -> Iterator[Page | Block]:
-    """The blocks; of a section what is no detail, its heading if no table's title says the same."""
+    """Yield the blocks; of a section what is no detail, under its heading.
+
+    The heading is left out if a table's title says the same.
+    """
     for block in blocks:
         if not isinstance(block, Section):
             yield block

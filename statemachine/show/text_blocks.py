@@ -91,12 +91,12 @@ NO_BREAK = "\ue000"  # of no language, and as wide as a blank
 
 
 def non_breaking(text: str) -> str:
-    """A text whose figures stay on one line with their units and signs."""
+    """Return a text whose figures stay on one line with their units and signs."""
     return _INSIDE.sub("\u00a0", text)
 
 
 def _shown(text: str, plain: bool) -> str:
-    """A text without what a terminal would take for a command, or has no letters for."""
+    """Return a text without what a terminal would take for a command, or has no letters for."""
     text = _CONTROL.sub("?", text)
     # Rich breaks lines at a no-break space, too.
     return non_breaking(text.translate(ASCII) if plain else text).replace("\u00a0", NO_BREAK)
@@ -109,7 +109,10 @@ def _spelled(text: str, plain: bool) -> str:
 
 
 def drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[RenderableType]:
-    """What a block looks like, from top to bottom; nothing of a picture. Of a page the heading."""
+    """Return what a block looks like, from top to bottom; of a page its heading.
+
+    Nothing is drawn of a picture.
+    """
     from rich.text import Text as RichText
 
     def coded(text: str, style: str = "") -> RichText:
@@ -238,12 +241,12 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
 
 
 def _loud(cell: str) -> str:
-    """A cell; that something differs is seen without a colour."""
+    """Return a cell; that something differs is seen without a colour."""
     return cell.upper() if getattr(cell, "verdict", "") == "differs" else cell
 
 
 def _broken(cell: str, width: int) -> str:
-    """A cell in whose names that are too long there are blanks, if possible behind a sign.
+    """Return a cell in whose names that are too long there are blanks, if possible behind a sign.
 
     The suffix of a file stays with its name.
     """

@@ -27,7 +27,7 @@ class Wait:
 
     @property
     def seconds(self) -> float | None:
-        """How long it still takes [s]; None where that is not known."""
+        """Return how long it still takes [s]; None where that is not known."""
         if self._takes is not None:
             return max(0.0, self._takes - (time.monotonic() - self._began))
         return None if self._measured is None else self._measured.seconds

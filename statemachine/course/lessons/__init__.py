@@ -41,12 +41,12 @@ class Option(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Its name among the values of a lesson's options."""
+        """Return its name among the values of a lesson's options."""
         return self.flag.removeprefix("--")
 
     @property
     def default(self) -> Any:
-        """Its value where nobody sets it; None of one that depends on the robot."""
+        """Return its value where nobody sets it; None of one that depends on the robot."""
         return self.settings.get("default", None if self.metavar else False)
 
 
@@ -72,12 +72,12 @@ class Lesson:
 
     @property
     def defaults(self) -> dict[str, Any]:
-        """Its options where nobody sets one."""
+        """Return its options where nobody sets one."""
         return {option.key: option.default for option in self.options}
 
     @property
     def more(self) -> tuple[str, ...]:
-        """The switch that shows what goes further, if it has one; JSON and documentation do."""
+        """Return the switch that shows what goes further, if any; JSON and documentation set it."""
         return tuple(option.key for option in self.options if option is FURTHER)
 
 

@@ -62,7 +62,7 @@ class Forces:
 
     @property
     def total(self) -> float | None:
-        """What is left over to accelerate the joint: zero at rest, None if a part is missing."""
+        """Return what is left to accelerate the joint: zero at rest, None if a part is missing."""
         parts = [part for part in self.parts().values() if part is not None]
         if self.bias is None or len(parts) < len(self.parts()):
             return None
@@ -124,12 +124,12 @@ class Droop:
 
     @property
     def moves(self) -> bool:
-        """Whether the joint moves at the end, or is about to."""
+        """Tell whether the joint moves at the end, or is about to."""
         return abs(self.velocity) > _SLOW or abs(self.acceleration) > _STARTS
 
     @property
     def balanced(self) -> bool:
-        """Whether the forces on the joint sum to zero, if nothing of the model moves."""
+        """Tell whether the forces on the joint sum to zero, if nothing of the model moves."""
         total, bias = self.forces.total, self.forces.bias
         if self.moves or total is None or self.most_acceleration > _AT_REST:
             return True
@@ -139,7 +139,7 @@ class Droop:
 
     @property
     def held_by(self) -> str:
-        """The part that carries most of the load at the end."""
+        """Return the part that carries most of the load at the end."""
         load = self.forces.bias
         if self.moves:
             return "still moves"

@@ -46,13 +46,13 @@ class Torques:
 
     @property
     def steps_at_limit(self) -> int:
-        """In how many steps a servo exerted all that it can."""
+        """Return in how many steps a servo exerted all that it can."""
         at_limit = np.abs(self.exerted) >= self.limit * (1 - _ALL)
         return int(at_limit.any(axis=1).sum())
 
     @property
     def common_limit(self) -> float | None:
-        """What each of them can exert at most [N·m]; None where they differ, or have no limit."""
+        """Return what each can exert at most [N·m]; None where they differ, or have no limit."""
         limit = float(self.limit[0])
         is_common = bool((self.limit == limit).all()) and not any(self.slides)
         return limit if is_common and 0 < limit < np.inf else None

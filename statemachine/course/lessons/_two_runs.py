@@ -59,7 +59,7 @@ class BrokenRun:
 
     @property
     def course(self) -> Literal["grows", "shrinks", "stays"]:
-        """What becomes of the difference by the end."""
+        """Return what becomes of the difference by the end."""
         return course_of(self.gap)
 
 

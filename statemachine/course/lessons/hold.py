@@ -93,17 +93,17 @@ class HoldResult:
 
     @property
     def touched(self) -> tuple[str, ...]:
-        """What touches what then."""
+        """Return what touches what then."""
         return next((pairs for pairs in self.pairs if pairs), ())
 
     @property
     def contact_steps(self) -> int:
-        """How many steps found a contact."""
+        """Return how many steps found a contact."""
         return sum(len(pairs) > 0 for pairs in self.pairs[:-1])
 
     @property
     def touching(self) -> tuple[str, ...]:
-        """What the robot touches at the end."""
+        """Return what the robot touches at the end."""
         return self.pairs[-1]
 
     def distances(self) -> Array:

@@ -93,12 +93,12 @@ class ReplayResult:
 
     @property
     def identical(self) -> bool:
-        """Whether the last qpos are equal, by `np.array_equal`."""
+        """Tell whether the last qpos are equal, by `np.array_equal`."""
         return bool(np.array_equal(self.first_run[-1], self.second_run[-1]))
 
     @property
     def close(self) -> bool:
-        """Whether `np.allclose` calls them equal."""
+        """Tell whether `np.allclose` calls them equal."""
         return bool(np.allclose(self.first_run[-1], self.second_run[-1]))
 
     @property

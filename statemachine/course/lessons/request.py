@@ -53,22 +53,22 @@ class LessonRequest:
 
     @property
     def lesson(self) -> Lesson:
-        """The lesson."""
+        """Return the lesson."""
         return LESSONS[self.name]
 
     @property
     def values(self) -> dict[str, LessonValue]:
-        """All options of the lesson, by key."""
+        """Return all options of the lesson, by key."""
         return {**self.lesson.defaults, **self.options}
 
     @property
     def shows_parts(self) -> bool:
-        """Whether an option asks for parts of the lesson alone."""
+        """Tell whether an option asks for parts of the lesson alone."""
         return any(self.values[part] for part in self.lesson.more)
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is taken on its own model, and with its own options."""
+        """Tell whether it is taken on its own model, and with its own options."""
         on_its_own = self.model is None or self.model == self.lesson.model
         return on_its_own and self.values == self.lesson.defaults
 

@@ -65,7 +65,7 @@ class Camera:
 
 
 def framed(points: ArrayLike, aspect: float, azimuth: float, elevation: float) -> Camera:
-    """The nearest camera in a direction that has all points in its picture.
+    """Return the nearest camera in a direction that has all points in its picture.
 
     A point at p from the target is seen within the picture if |p·right| ≤ tan(half the
     angle of view)·(distance + p·forward), and so for up: of these distances the largest.
@@ -124,7 +124,7 @@ class Motion:
 
 
 def posed(model: Model, qpos: Array) -> Iterator[Data]:
-    """A Data in each pose of some (n, nq), after `forward`; it is the same one each time."""
+    """Return a Data in each pose of some (n, nq), after `forward`; it is the same one each time."""
     with make_data(model) as data:
         for row in qpos:
             data.qpos = row
@@ -141,7 +141,7 @@ def poses_through(model: Model, qpos: Array) -> tuple[Array, Array]:
 
 
 def camera_for(sides: Sequence[Motion], aspect: float, reach: float = np.inf) -> Camera:
-    """A camera that has all bodies in its picture at every moment, on all sides.
+    """Return a camera that has all bodies in its picture at every moment, on all sides.
 
     It stands where the bodies lie widest beside one another, on the mean of all moments.
 
@@ -185,7 +185,7 @@ class Drawer(Protocol):
     """Draws the bodies of one model wherever they are told to be, until its process ends."""
 
     def shot(self, xpos: Array, xquat: Array) -> Shot:
-        """A picture.
+        """Return a picture.
 
         Args:
             xpos: (nbody, 3) origins of the bodies [m].
@@ -223,7 +223,7 @@ def _without_edge(region: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def smaller(rgb: Pixels, by: int) -> Pixels:
-    """A picture at a fraction of its size; each pixel is the mean of those it stands for."""
+    """Return a picture at a fraction of its size; each pixel is the mean of those it stands for."""
     height, width = rgb.shape[0] // by, rgb.shape[1] // by
     blocks = rgb[: height * by, : width * by].reshape(height, by, width, by, 3)
     return (blocks.sum((1, 3), dtype=np.uint16) // (by * by)).astype(np.uint8)

@@ -45,36 +45,36 @@ class Surface:
 
 
 def box(size: Sequence[float]) -> Surface:
-    """A box; `size` are half of its edges."""
+    """Return a box; `size` are half of its edges."""
     return Surface(_CORNERS * np.asarray(size)[:3], _BOX[:, [(0, 1, 2), (0, 2, 3)]].reshape(-1, 3))
 
 
 def rectangle(half_x: float, half_y: float) -> Surface:
-    """A rectangle in the plane z = 0, seen from above."""
+    """Return a rectangle in the plane z = 0, seen from above."""
     return terrain(np.zeros((2, 2)), half_x, half_y)
 
 
 def ellipsoid(size: Sequence[float], around: int = AROUND) -> Surface:
-    """An ellipsoid; `size` are its semi-axes. A sphere has three equal ones."""
+    """Return an ellipsoid; `size` are its semi-axes. A sphere has three equal ones."""
     turn = np.linspace(0, np.pi, around // 2 + 1)
     unit = lathe(np.sin(turn), -np.cos(turn), around)
     return Surface(unit.vertices * np.asarray(size)[:3], unit.faces)
 
 
 def cylinder(radius: float, half: float, around: int = AROUND) -> Surface:
-    """A cylinder along z of length 2·`half`."""
+    """Return a cylinder along z of length 2·`half`."""
     return lathe([0, radius, radius, 0], [-half, -half, half, half], around)
 
 
 def capsule(radius: float, half: float, around: int = AROUND) -> Surface:
-    """A cylinder along z of length 2·`half`, with half a ball at each end."""
+    """Return a cylinder along z of length 2·`half`, with half a ball at each end."""
     turn = np.linspace(0, np.pi / 2, max(around // 4, 2) + 1)
     out, up = radius * np.sin(turn), radius * np.cos(turn) + half
     return lathe([*out, *out[::-1]], [*-up, *up[::-1]], around)
 
 
 def lathe(radii: ArrayLike, heights: ArrayLike, around: int = AROUND) -> Surface:
-    """A profile turned about z, from its lower end on the axis to its upper one.
+    """Return a profile turned about z, from its lower end on the axis to its upper one.
 
     Args:
         radii: (n,) distances from the axis [m]; the first and the last are the poles.
@@ -93,7 +93,7 @@ def lathe(radii: ArrayLike, heights: ArrayLike, around: int = AROUND) -> Surface
 
 
 def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Surface:
-    """The upper side of a height field.
+    """Return the upper side of a height field.
 
     Args:
         heights: (rows, columns) [m]; columns go along x, rows along y.
@@ -115,7 +115,7 @@ def _triangles(number: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def welded(vertices: ArrayLike, faces: ArrayLike) -> Surface:
-    """The same surface with every point there once, and without faces of no area.
+    """Return the same surface with every point there once, and without faces of no area.
 
     Args:
         vertices: (v, 3) [m]; points that are equal as float32 become one.
@@ -164,7 +164,7 @@ class Part:
 
     @property
     def is_ground(self) -> bool:
-        """Whether it is an endless level plane of the world."""
+        """Tell whether it is an endless level plane of the world."""
         return self.endless and self.body == 0 and bool(np.ptp(self.vertices[:, 2]) < 1e-6)
 
 
@@ -196,7 +196,7 @@ class Drawing:
 
 
 def drawing_of(model: Model) -> Drawing:
-    """The visual geoms of a model, on whichever backend it is.
+    """Return the visual geoms of a model, on whichever backend it is.
 
     It is drawn from what MuJoCo made of the same file, whatever the engine. Geoms of groups 3
     to 5, by convention what touches and is not seen, are drawn only where nothing but the

@@ -176,13 +176,13 @@ def _content(text: str, signed: bool) -> object:
 
 
 def badge(verdict: str) -> Html:
-    """A verdict as a word with a sign."""
+    """Return a verdict as a word with a sign."""
     sign = tag("span", _SIGNS[verdict], aria_hidden="true")
     return tag("span", sign, f" {verdict}", class_=f"badge {verdict}")
 
 
 def _bar(share: float, text: str, signed: bool) -> Html:
-    """A share as a bar from a line of zero, to the left if it is below zero."""
+    """Return a share as a bar from a line of zero, to the left if it is below zero."""
     length, left, look = 100 * min(1.0, abs(share)), 0.0, "bar"
     if signed:
         length, look = length / 2, "bar signed"

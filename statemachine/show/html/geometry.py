@@ -95,7 +95,7 @@ def _snapped(part: Part, cell: float) -> tuple[Any, Any]:
 
 
 def packed(array: Any, kind: str) -> str:
-    """An array as base64 of little-endian numbers of a kind, as "u2" or "f4"."""
+    """Return an array as base64 of little-endian numbers of a kind, as "u2" or "f4"."""
     return base64.b64encode(np.ascontiguousarray(array).astype(f"<{kind}").tobytes()).decode()
 
 

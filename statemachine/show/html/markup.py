@@ -28,31 +28,31 @@ class Html(str):
 
 
 def escaped(text: object) -> Html:
-    """A text as markup that shows it; markup stays as it is."""
+    """Return a text as markup that shows it; markup stays as it is."""
     if isinstance(text, Html):
         return text
     return Html(html.escape(_printable(with_minus(str(text)))))
 
 
 def with_minus(text: str) -> str:
-    """A text whose figures have the sign minus, not a hyphen."""
+    """Return a text whose figures have the sign minus, not a hyphen."""
     return re.sub(r"(?<![\w\-–)\].])-(?=\d)|(?<=\de)-(?=\d)", "−", text)
 
 
 def prose(text: str) -> str:
-    """A text whose figures stay on one line with their units; of Markdown its markup."""
+    """Return a text whose figures stay on one line with their units; of Markdown its markup."""
     if not isinstance(text, Markdown):
         return non_breaking(text)
     return Html(inline_html(Markdown(non_breaking(with_minus(text)))))
 
 
 def literal(text: object) -> Html:
-    """A text as it is, for what may be typed or copied."""
+    """Return a text as it is, for what may be typed or copied."""
     return Html(html.escape(_printable(str(text))))
 
 
 def tag(name: str, *content: object, **attributes: object) -> Html:
-    """An element.
+    """Return an element.
 
     Args:
         name: Of the element.
@@ -97,7 +97,7 @@ def text_of(name: str) -> str:
 
 
 def data_of(value: Any) -> Html:
-    """A value as JSON that can stand in a script element, which "<" could end."""
+    """Return a value as JSON that can stand in a script element, which "<" could end."""
     text = json.dumps(value, allow_nan=False, separators=(",", ":"))
     return Html(text.replace("<", "\\u003c"))
 

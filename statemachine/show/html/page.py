@@ -121,7 +121,7 @@ def _header(page: Page, opening: Sequence[Block], interaction: Interaction) -> H
 
 
 def check_target(path: str | Path) -> Path:
-    """Where a report is to be written, checked before anything is run.
+    """Return where a report is to be written, checked before anything is run.
 
     Raises:
         BadInputError: It is not a name of a page, or see `check_place`.
