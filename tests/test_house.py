@@ -311,7 +311,6 @@ _NO_PAGES = {
     "show/html/notebook.py": "the name of a file",
     "show/html/page.py": "names of files, and a policy for the browser",
     "show/markdown.py": "what replaces a pattern",
-    "show/templates.py": "an assertion",
 }
 
 

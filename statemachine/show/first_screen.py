@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
-from .blocks import Page
+from .blocks import Headline, Page, Verdict
+from .markdown import plain_text
 from .page_text import text_of
 
 LINES = 24  # of a terminal, blank ones included
@@ -47,3 +49,11 @@ def first_screen(page_with: Callable[[int], Page], rows: int = MOST_ROWS) -> Pag
     """
     most = min(rows, MOST_ROWS)
     return first_that_fits(page_with(number) for number in range(most, min(most, 1) - 1, -1))
+
+
+def with_answer(page: Page) -> Page:
+    """Return a page whose first block, a verdict, is its answer: it stands before all else."""
+    first, *others = page.blocks
+    assert isinstance(first, Verdict)  # with which the template begins
+    lead = plain_text(first.text).removesuffix(".")
+    return replace(page, blocks=others, headline=Headline(lead, holds=first.holds))

@@ -40,12 +40,11 @@ import inspect
 import math
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from importlib import resources
 from typing import TYPE_CHECKING, ClassVar
 
 from ..measures import text as numbers
-from .blocks import Block, Headline, Markdown, Page, Text, Verdict
+from .blocks import Block, Markdown, Page, Text
 from .markdown import code, escape, plain_text, prose
 from .placed_blocks import PageOrigin, PageTitle, PlacedBlocks
 
@@ -82,14 +81,6 @@ def render(content: PageContent) -> Page:
         else:
             blocks.append(block)
     return Page(title, origin, blocks)
-
-
-def with_answer(page: Page) -> Page:
-    """Return a page whose first block, a verdict, is its answer: it stands before all else."""
-    first, *others = page.blocks
-    assert isinstance(first, Verdict), "the template begins with a verdict"
-    lead = plain_text(first.text).removesuffix(".")
-    return replace(page, blocks=others, headline=Headline(lead, holds=first.holds))
 
 
 def render_blocks(content: PageContent) -> list[Block]:

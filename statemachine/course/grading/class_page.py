@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from ...measures.text import count
 from ...show.blocks import Page, Table
-from ...show.templates import PageContent, render, with_answer
+from ...show.first_screen import with_answer
+from ...show.templates import PageContent, render
 from .alike import ALIKE, NEARLY_ALIKE, AlikeGroup
 from .class_table import ClassEntry, verdicts_of
 from .judges import JUDGES

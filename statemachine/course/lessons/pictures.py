@@ -11,12 +11,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ...show.blocks import Page, Printed
+from ...show.labels import TableLabels
 from ...show.pictures import RobotPicture
 from . import PATH
 from ._robot import ARM, BOX
 
 if TYPE_CHECKING:
     from .poses import Poses
+
+
+_SAY = TableLabels(__name__, "pictures_labels.md.j2")
 
 
 def with_picture(page: Page, lesson: str) -> Page:
@@ -42,83 +46,31 @@ def _poses_of(lesson: str) -> Callable[[], Poses]:
     return poses
 
 
+def _picture(lesson: str, view: str, model: str) -> RobotPicture:
+    """Return the picture of a lesson.
+
+    Args:
+        lesson: Its name.
+        view: The command that shows the same in a browser.
+        model: What is drawn.
+    """
+    title, words = _SAY(f"{lesson}_title"), _SAY(f"{lesson}_words")
+    return RobotPicture(title, words, view, model, _poses_of(lesson))
+
+
 PICTURES: Mapping[str, RobotPicture] = {
-    "nowhere": RobotPicture(
-        "The arm of these lessons, an SO-101: six joints, and a motor in each.",
-        "An arm on a floor, stretched out to the front, with its gripper above the floor.",
-        "statemachine view so101/scene --paused",
-        ARM,
-        _poses_of("nowhere"),
+    "nowhere": _picture("nowhere", "statemachine view so101/scene --paused", ARM),
+    "objects": _picture("objects", "statemachine view so101/scene", ARM),
+    "state": _picture("state", "statemachine view --keyframe held", BOX),
+    "forward": _picture("forward", "statemachine view so101/scene --paused", ARM),
+    "hold": _picture(
+        "hold", "statemachine trace record hold && statemachine view hold.mujoco.npz", ARM
     ),
-    "objects": RobotPicture(
-        "Two Data of one Model, four times as slow: one is commanded and advanced; the other, in "
-        "violet, waits.",
-        "Two arms in one place. One turns down towards the floor; the other, in violet, stays "
-        "stretched out where both began, for nobody advances it.",
-        "statemachine view so101/scene",
-        ARM,
-        _poses_of("objects"),
+    "gravity": _picture(
+        "gravity", "statemachine trace record gravity && statemachine view gravity.mujoco.npz", ARM
     ),
-    "state": RobotPicture(
-        "Six hinges and a box that nothing holds but the jaws: 13 positions, 12 velocities.",
-        "The arm with a small box between its jaws, above the floor.",
-        "statemachine view --keyframe held",
-        BOX,
-        _poses_of("state"),
-    ),
-    "forward": RobotPicture(
-        "What xpos still says, and in violet what was written into qpos.",
-        "Two arms: one stretched out as before the write; the other, in violet, bent down at "
-        "shoulder_lift by 0.8 rad, where qpos says that it is, part of it below the floor.",
-        "statemachine view so101/scene --paused",
-        ARM,
-        _poses_of("forward"),
-    ),
-    "hold": RobotPicture(
-        "The arm on its way, four times as slow, and in violet the goal that ctrl tells it.",
-        "The arm folds from stretched out into the violet pose in about 0.3 s, meets the floor "
-        "with a finger, and stays a degree short of it.",
-        "statemachine trace record hold && statemachine view hold.mujoco.npz",
-        ARM,
-        _poses_of("hold"),
-    ),
-    "gravity": RobotPicture(
-        "Nobody writes ctrl: the servos off, and in violet on.",
-        "Without servos the arm sinks until its gripper lies on the floor, after half a second; "
-        "with servos, in violet, it stays stretched out above it.",
-        "statemachine trace record gravity && statemachine view gravity.mujoco.npz",
-        ARM,
-        _poses_of("gravity"),
-    ),
-    "reset": RobotPicture(
-        "The keyframe 'held', and in violet the default state of the arm.",
-        "The arm holds the box between its jaws; in violet it is stretched out, with all "
-        "joints at zero, and the box stands away from it.",
-        "statemachine view --keyframe held",
-        BOX,
-        _poses_of("reset"),
-    ),
-    "replay": RobotPicture(
-        "Two runs in one picture. The second would be violet wherever it parts from the first.",
-        "The arm swings the box to the side. No violet is to be seen: the second run is "
-        "in the same place all the time.",
-        "statemachine view --keyframe held",
-        BOX,
-        _poses_of("replay"),
-    ),
-    "time": RobotPicture(
-        "After 100 steps, and 0.2 s later by the clock: the second is drawn in violet.",
-        "The arm with the box in its jaws. No violet is to be seen: while nobody called step, "
-        "nothing moved.",
-        "statemachine view --keyframe held --speed 4",
-        BOX,
-        _poses_of("time"),
-    ),
-    "summary": RobotPicture(
-        "The robot of the path: six joints, a box, and the contacts between them.",
-        "The arm with a small box between its jaws, above the floor.",
-        "statemachine view --keyframe held",
-        BOX,
-        _poses_of("summary"),
-    ),
+    "reset": _picture("reset", "statemachine view --keyframe held", BOX),
+    "replay": _picture("replay", "statemachine view --keyframe held", BOX),
+    "time": _picture("time", "statemachine view --keyframe held --speed 4", BOX),
+    "summary": _picture("summary", "statemachine view --keyframe held", BOX),
 }

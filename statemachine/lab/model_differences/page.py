@@ -9,8 +9,8 @@ from typing import Literal
 from ...measures.text import capital, display_unit, grouped, rounded, sentence, unit_suffix
 from ...measures.text import versions_of as versions_text
 from ...show.blocks import Page, Table
-from ...show.first_screen import MOST_ROWS, first_that_fits
-from ...show.templates import PageContent, render, with_answer
+from ...show.first_screen import MOST_ROWS, first_that_fits, with_answer
+from ...show.templates import PageContent, render
 from ..compare.matched import RenamedPair
 from ..compare.typed_command import TypedCommand
 from .changes_page import (

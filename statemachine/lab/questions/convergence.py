@@ -9,8 +9,8 @@ from typing import Literal
 from ...measures import QUANTITIES
 from ...measures.text import grouped, milliseconds, quantity, short_time
 from ...show.blocks import Block, Page, Table
-from ...show.first_screen import first_screen
-from ...show.templates import PageContent, render, with_answer
+from ...show.first_screen import first_screen, with_answer
+from ...show.templates import PageContent, render
 from ..compare.call_periods_page import call_periods_blocks
 from ..compare.convergence import FINER, Convergence, GapLimit, GapState, TouchState
 from ..compare.sides import Request, Side

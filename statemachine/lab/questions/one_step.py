@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from ...measures.text import NO_NUMBER, percent, quantity, sentence
 from ...show.blocks import Page, Table
-from ...show.first_screen import first_screen
-from ...show.templates import PageContent, render, with_answer
+from ...show.first_screen import first_screen, with_answer
+from ...show.templates import PageContent, render
 from ..compare.one_step import OneStep, Spike, StageGap
 from ..compare.stages import FORCES
 from ..compare.typed_command import typed_command

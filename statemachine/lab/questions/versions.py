@@ -8,9 +8,9 @@ from typing import Literal
 
 from ...measures.text import NO_NUMBER, quantity, sentence, short_time
 from ...show.blocks import Block, Page, Table
-from ...show.first_screen import MOST_ROWS, first_that_fits
+from ...show.first_screen import MOST_ROWS, first_that_fits, with_answer
 from ...show.pictures import Bars
-from ...show.templates import PageContent, render, with_answer
+from ...show.templates import PageContent, render
 from ..compare import Agreement
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
 from ..compare.sides import Request, Side
