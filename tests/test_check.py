@@ -26,7 +26,7 @@ from statemachine.course.grading.inside.answers import Answer, OtherValue, decod
 from statemachine.course.grading.inside.calls import FaultError, answers_of, answers_of_file
 from statemachine.course.grading.inside.watch import EngineRun, Inputs, engine_watched
 from statemachine.course.grading.inside.worlds import AnyWorld, Scenes, worlds_of
-from statemachine.course.grading.judges import JUDGES, Judgement, judge_of, judged
+from statemachine.course.grading.judges import JUDGES, Judgement, judge_of, judgement_of
 from statemachine.errors import MissingEngineError
 from statemachine.processes import sandbox
 
@@ -58,7 +58,7 @@ def _verdict(attempt: Attempt, prepared: Prepared) -> Judgement:
             else decode(json.loads(json.dumps(answer)))  # as from another process
             for answer in answers_of(attempt.function, worlds)
         )
-        verdict: Any = judged(attempt.solves, worlds, rights, answers)
+        verdict: Any = judgement_of(attempt.solves, worlds, rights, answers)
     return verdict
 
 
@@ -509,7 +509,7 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
     file.write_text(content, encoding="latin-1")
     worlds, rights = prepared("demo_gravity", "mujoco")
     answers = answers_of_file(file, "demo_gravity", worlds)
-    assert message in _one(judged("demo_gravity", worlds, rights, answers))
+    assert message in _one(judgement_of("demo_gravity", worlds, rights, answers))
 
 
 def test_a_file_that_is_saved_as_utf_16_is_told_as_any_other_encoding(
@@ -519,7 +519,7 @@ def test_a_file_that_is_saved_as_utf_16_is_told_as_any_other_encoding(
     file.write_text("def demo_gravity(model, seconds): pass\n", encoding="utf-16")
     worlds, rights = prepared("demo_gravity", "mujoco")
     answers = answers_of_file(exercise.python_file(file), "demo_gravity", worlds)
-    judgement = judged("demo_gravity", worlds, rights, answers)
+    judgement = judgement_of("demo_gravity", worlds, rights, answers)
     assert "it is saved as UTF-16" in _one(judgement)
     assert judgement is not None
     assert judgement.judged

@@ -60,7 +60,7 @@ def test_copies_are_right_and_nothing_but_their_likeness_tells_of_them(
 ) -> None:
     for number in range(1, COPIES + 1):
         copy = judged.entries[f"{number:02}_copy.py"]
-        assert (copy.right, copy.looks) == (len(JUDGES), ())
+        assert (copy.right, copy.flags) == (len(JUDGES), ())
     (group,) = judged.result.alike
     assert len(group.students) == COPIES
 

@@ -181,7 +181,7 @@ def test_each_answer_on_the_path_is_in_a_fold(path_page: PathPage) -> None:
 def test_nothing_stands_open_below_the_first_question_of_a_page_but_questions(
     path_page: PathPage,
 ) -> None:
-    asked = [md.asked(question) for question in path_page.questions]
+    asked = [md.question_text(question) for question in path_page.questions]
     _, _, rest = path_page.unfolded.partition(asked[0])
     for question in asked:
         assert question in path_page.unfolded
@@ -192,7 +192,7 @@ def test_nothing_stands_open_below_the_first_question_of_a_page_but_questions(
 
 @pytest.mark.slow
 def test_nothing_that_the_code_prints_stands_above_the_questions(path_page: PathPage) -> None:
-    before, _, _ = path_page.unfolded.partition(md.asked(path_page.questions[0]))
+    before, _, _ = path_page.unfolded.partition(md.question_text(path_page.questions[0]))
     printed = {line for line in path_page.printed.splitlines() if line.strip()}
     assert not printed & set(before.splitlines())
 

@@ -156,7 +156,7 @@ def test_nothing_is_said_of_what_is_not_made_of_runs(
 def test_what_was_measured_before_is_said_at_once(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with bar.progress("converge, steps 4 times finer", takes=40.0):
+    with bar.progress("converge, steps 4 times finer", expected_seconds=40.0):
         assert capsys.readouterr().err == "converge, steps 4 times finer: about 40 s more\n"
 
 

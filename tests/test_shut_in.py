@@ -645,7 +645,7 @@ def test_a_hard_link_is_as_good_as_the_file(tmp_path: Path) -> None:
     mine.hardlink_to(folder / "bob" / "step_loop.py")
     ann, bob = judge_all(submissions([folder / "ann", folder / "bob"]), "mujoco")
     assert (ann.right, bob.right) == (4, 4)
-    assert ann.looks == ()
+    assert ann.flags == ()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights on Windows")

@@ -60,12 +60,12 @@ class TerminalReporter:
     """A `Reporter` that shows a bar of progress and prints each note, on standard error."""
 
     def stage(
-        self, what: str, runs_at_once: int = 0, takes: float | None = None
+        self, what: str, runs_at_once: int = 0, expected_seconds: float | None = None
     ) -> AbstractContextManager[Callable[[float], None]]:
         """Show a bar for a stage of the work."""
         from ..show.progress import progress
 
-        return progress(what, runs_at_once, takes)
+        return progress(what, runs_at_once, expected_seconds)
 
     def note(self, text: str) -> None:
         """Print a note in one line."""

@@ -10,18 +10,18 @@ from .common import INTERRUPTED, print_error
 
 
 @contextmanager
-def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
+def resumable(folder: Path | None, what: str, but: str = "") -> Iterator[None]:
     """Say, where a Ctrl-C ends it, what there is already, and how to go on.
 
     Args:
-        written: The file or the folder that it is in.
+        folder: The file or the folder that it is in.
         what: What was done with what is there.
         but: What is to be typed otherwise.
     """
     try:
         yield
     except KeyboardInterrupt:
-        if written is not None and written.exists():
-            text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
+        if folder is not None and folder.exists():
+            text = f"stopped; {folder} has what was {what}. Type the same{but} to go on"
             raise SystemExit(print_error(text, INTERRUPTED)) from None
         raise

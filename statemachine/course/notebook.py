@@ -219,7 +219,7 @@ def _leading(page: Page) -> list[Text]:
 def opening_text(page: Page) -> str:
     """Write the first paragraphs and the questions, without what answers them."""
     paragraphs = [block_as_markdown(block, inline) for block in _leading(page)]
-    questions = [asked(question) for question in _questions(page)]
+    questions = [question_text(question) for question in _questions(page)]
     return "\n\n".join([*paragraphs, *questions])
 
 
@@ -268,7 +268,7 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
         inside = [block_as_markdown(block, picture) for block in rest]
         if isinstance(opening, Question):
             inside.insert(_place_of_answer(opening, rest), answer(opening))
-            yield f"{asked(opening)}\n\n{_folded(inside)}"
+            yield f"{question_text(opening)}\n\n{_folded(inside)}"
         elif isinstance(opening, Heading):
             yield _folded(inside, _escaped(opening.text))
         yield from (block_as_markdown(diagram, picture) for diagram in diagrams)
@@ -316,7 +316,7 @@ def _words(
         case Printed():
             return _printed(block)
         case Question():
-            return f"{asked(block)}\n\n{_folded([answer(block)])}"
+            return f"{question_text(block)}\n\n{_folded([answer(block)])}"
         case Table():
             return _table(block)
         case Verdict(text, holds):
@@ -355,7 +355,7 @@ def _section(block: Section, picture: Callable[[Picture], str]) -> str:
     return f"## {heading}\n\n{text}"
 
 
-def asked(block: Question) -> str:
+def question_text(block: Question) -> str:
     """Write a question and its choices, without the answer."""
     text = "" if block.always else "**Before you read on:** "
     choices = [f"- {_escaped(choice)}" for choice in lettered(block)]

@@ -72,7 +72,7 @@ class Reader:
         Raises:
             Stopped: The reader typed q.
         """
-        self.read("\n" + "".join(f"{line}\n" for line in _asked(question)))
+        self.read("\n" + "".join(f"{line}\n" for line in _question_lines(question)))
         self.show()
         letters = LETTERS[: len(question.choices)]
         while True:
@@ -283,7 +283,7 @@ def _rows(line: str) -> int:
     return max(math.ceil(cells / columns), 1)
 
 
-def _asked(question: Question) -> Iterator[str]:
+def _question_lines(question: Question) -> Iterator[str]:
     """Yield a question and its choices in lines of the window's width."""
     width = max(min(shutil.get_terminal_size().columns, _WIDTH_MOST), 20)
     text = question.text if question.always else f"Before you read on: {question.text}"

@@ -11,7 +11,7 @@ from .waiting import Wait
 
 @contextmanager
 def progress(
-    what: str, runs_at_once: int = 0, takes: float | None = None
+    what: str, runs_at_once: int = 0, expected_seconds: float | None = None
 ) -> Iterator[Callable[[float], None]]:
     """Give a function to call with the fraction done; a bar appears if it takes long.
 
@@ -22,9 +22,9 @@ def progress(
         what: What is done.
         runs_at_once: How many runs are made side by side, where each call tells that runs have
             ended; 0 where it does not.
-        takes: How long it takes, from what was measured before [s]; None where that is not known.
+        expected_seconds: How long it takes by what was measured before [s]; None if unknown.
     """
-    wait = Wait(runs_at_once, takes)
+    wait = Wait(runs_at_once, expected_seconds)
     if sys.stderr.isatty():
         from .progress_bar import shown_bar  # here, for nobody sees one elsewhere
 

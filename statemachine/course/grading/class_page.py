@@ -22,7 +22,7 @@ _MARKS = {"right": "✓", "wrong": "✗", "not written": "–", "not judged": "?
 
 
 @dataclass(frozen=True)
-class _Look:
+class _Flag:
     """What somebody should look at in a file."""
 
     name: str
@@ -87,12 +87,12 @@ class ClassPage(PageContent):
         return any(entry.watched for entry in self.result.entries)
 
     @property
-    def looks(self) -> list[_Look]:
+    def flags(self) -> list[_Flag]:
         """Return what a teacher should look at, with the submission that it is in."""
-        looks: list[_Look] = []
+        flags: list[_Flag] = []
         for entry in self.result.entries:
-            looks += [_Look(entry.label, text) for text in entry.looks]
-        return looks
+            flags += [_Flag(entry.label, text) for text in entry.flags]
+        return flags
 
     @property
     def groups(self) -> list[_Group]:

@@ -107,7 +107,7 @@ class ClassEntry:
         return self.made_with.endswith(WATCHED)
 
     @property
-    def looks(self) -> tuple[str, ...]:
+    def flags(self) -> tuple[str, ...]:
         """Return what a teacher should look at, each once."""
         remarks = (text for judgement in self.functions for text in judgement.remarks)
         return tuple(dict.fromkeys(text for text in remarks if text.startswith(LOOK)))
@@ -131,7 +131,7 @@ class ClassEntry:
         """Return all that is said of a function that is not right."""
         if not judgement.written:
             return verdict_word(judgement)
-        texts = dict.fromkeys(text for text in judgement.remarks if text not in self.looks)
+        texts = dict.fromkeys(text for text in judgement.remarks if text not in self.flags)
         return "; ".join(texts)
 
 
@@ -186,7 +186,7 @@ def _first_cells(entry: ClassEntry) -> list[object]:
 
 def _remarks_of(entry: ClassEntry) -> str:
     """Return what is not right, and what somebody should look at, a line each."""
-    return "\n".join([*(remark.line for remark in entry.remarks), *entry.looks])
+    return "\n".join([*(remark.line for remark in entry.remarks), *entry.flags])
 
 
 def _details_of(entry: ClassEntry) -> str:

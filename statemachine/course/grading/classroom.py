@@ -111,7 +111,7 @@ def _made_with(judge: ExerciseJudge, time_limit: float) -> str:
 
 def _with_facts(entry: ClassEntry, submission: Submission, comparison: ClassLikeness) -> ClassEntry:
     """Return an entry with what is known of the submission beside the verdict."""
-    predictions = submission.named(_PREDICTIONS)
+    predictions = submission.file_named(_PREDICTIONS)
     nearest = comparison.nearest.get(submission.name)
     if nearest is not None:
         entry = replace(entry, nearest=nearest.student, likeness=nearest.likeness)
@@ -162,7 +162,7 @@ class _ClassRoom:
         file = self._tests_to_run(submission, entry)
         if file is not None:
             entry = replace(entry, tests=_caught(file, self.judge.backend, submission.files))
-        if entry.judged and not entry.looks and not entry.refusal:
+        if entry.judged and not entry.flags and not entry.refusal:
             tests = entry.tests if _COUNTED.match(entry.tests) else ""
             self.store.keep(entry.sha256, KnownVerdicts(entry.functions, tests))
         return entry
@@ -171,7 +171,7 @@ class _ClassRoom:
         """Return the student's tests, if they are to be run and it is not known what they catch."""
         if not self.tests or entry.tests:
             return None
-        return submission.named(EXERCISE_FILES[1])
+        return submission.file_named(EXERCISE_FILES[1])
 
 
 def _caught(file: Path, backend: str, submitted_files: Mapping[str, Path]) -> str:

@@ -32,7 +32,7 @@ from ...processes.parallel import in_parallel, unwinding
 from ...release_names import is_release
 from ...show.blocks import only_on_pages
 from .inside.worlds import AnyWorld, Scenes, worlds_of
-from .judges import JUDGES, Judgement, judge_of, judged
+from .judges import JUDGES, Judgement, judge_of, judgement_of
 from .links import refusal_of
 from .recording import (
     LARGEST,
@@ -275,7 +275,7 @@ class ExerciseJudge(ExitStack):
         else:
             key = self._keys[name]
             try:
-                judgement = judged(name, key.worlds, key.solutions, recording.answers)
+                judgement = judgement_of(name, key.worlds, key.solutions, recording.answers)
             except Exception as error:  # what was recorded may have been made up
                 recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         if judgement is None:

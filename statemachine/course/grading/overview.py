@@ -205,7 +205,7 @@ def _wrong_remarks(entry: ClassEntry) -> Iterator[tuple[str, str]]:
     for judgement in entry.functions:
         if judgement.judged and judgement.written and not judgement.passed:
             for remark in judgement.remarks:
-                if remark not in entry.looks:
+                if remark not in entry.flags:
                     yield judgement.function, remark
 
 

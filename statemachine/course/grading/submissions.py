@@ -46,7 +46,7 @@ class Submission:
             return in_folder(self.folder)
         return {self.path.name: self.path} if self.path else {}
 
-    def named(self, name: str) -> Path | None:
+    def file_named(self, name: str) -> Path | None:
         """Return the first of its files that is called so."""
         return next((file for file in self.files.values() if file.name == name), None)
 

@@ -92,5 +92,5 @@ def _write_page(result: CompareResult, target: Path, why: bool, reporter: Report
     write_page(target, result.run.traces, ShownModels.of(run), page)
 
 
-def _other_suffix(target: Path, known: tuple[str, ...]) -> BadInputError:
-    return BadInputError(f"a file of it ends in {', '.join(known)}; got {target.name!r}")
+def _other_suffix(target: Path, suffixes: tuple[str, ...]) -> BadInputError:
+    return BadInputError(f"a file of it ends in {', '.join(suffixes)}; got {target.name!r}")

@@ -196,10 +196,10 @@ def _gaps_of(comparison: Comparison) -> dict[str, Array]:
     return gaps
 
 
-def _largest_nearby(values: Array, reach: int) -> Array:
+def _largest_nearby(values: Array, half_width: int) -> Array:
     """Return for each of some values (n,) the largest within so many rows to either side."""
-    padded = np.pad(values, reach, mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+    padded = np.pad(values, half_width, mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * half_width + 1).max(axis=1)
 
 
 @dataclass(frozen=True)
@@ -286,11 +286,11 @@ def _departure(
     return _Departure(distances, bool(run.header.ended))
 
 
-def _named_as(known: Mapping[str, Array], distances: dict[str, Array]) -> dict[str, Array]:
+def _named_as(curves: Mapping[str, Array], distances: dict[str, Array]) -> dict[str, Array]:
     """Return distances by the names of the comparison: "a on b" may be "b on a" on one side."""
     named = dict(distances)
     for ending in (NORMAL, _FIRST_TOUCH):
-        pairs = {name.removesuffix(ending): name for name in known if name.endswith(ending)}
+        pairs = {name.removesuffix(ending): name for name in curves if name.endswith(ending)}
         measured = {name.removesuffix(ending): name for name in distances if name.endswith(ending)}
         for pair, name in with_left_pair_names(pairs, measured).items():
             named[f"{pair}{ending}"] = named.pop(name)

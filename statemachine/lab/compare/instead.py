@@ -30,17 +30,17 @@ class Instead:
     has_actuators: bool
 
 
-def instead_of(model: Model, asked: str, seed: int = 0) -> Instead:
+def instead_of(model: Model, experiment: str, seed: int = 0) -> Instead:
     """Return which other experiment moves a model.
 
     Args:
         model: The left side, as loaded: without the options of the experiment.
-        asked: The experiment that moves nothing.
+        experiment: The experiment that moves nothing.
         seed: Of what an experiment draws.
     """
     moving = ""
     for name in _IN_TURN:
-        if name != asked and not moving and _moves(model, name, seed):
+        if name != experiment and not moving and _moves(model, name, seed):
             moving = name
     return Instead(moving, model.path.name, has_actuators=model.nu > 0)
 

@@ -218,7 +218,7 @@ def _weight(gap: StageGap) -> tuple[bool, float]:
 def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
     """Return how far apart the sides are in one unit of a stage; `first_count` is 0."""
     row, element = measure.worst
-    worst = float(measure.apart[row, element])
+    worst = float(measure.gaps[row, element])
     at, where = None, ""
     if worst:
         at, where = times[row], measure.culprit(row)
@@ -250,13 +250,13 @@ def _spikes(
     for measure in measured:
         if measure.stage != AFTER:
             continue
-        most = measure.apart.max(axis=1)
+        most = measure.gaps.max(axis=1)
         is_spike = measure.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
         padded = np.concatenate([[-np.inf], most, [-np.inf]])
         is_spike &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
         for row in np.flatnonzero(is_spike).tolist():
             stage, where = leading[row]
-            size, joint = float(most[row]), int(np.argmax(measure.apart[row]))
+            size, joint = float(most[row]), int(np.argmax(measure.gaps[row]))
             spike = Spike(
                 at=times[row],
                 size=size,

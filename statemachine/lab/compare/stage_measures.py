@@ -38,7 +38,7 @@ class StageMeasure:
         stage: Of all elements.
         unit: Of all elements.
         names: What each is of: a joint, a body, a pair of joints.
-        apart: (n, k) how far the two sides are apart.
+        gaps: (n, k) how far the two sides are apart.
         null: (n, k) how far the left side is from itself.
         scale: Its usual size, on either side.
         floors: (k,) what counts of no element, whatever the scale is: see `RobotScale`.
@@ -48,7 +48,7 @@ class StageMeasure:
     stage: str
     unit: str
     names: list[str]
-    apart: Array
+    gaps: Array
     null: Array
     scale: float
     floors: Array
@@ -57,7 +57,7 @@ class StageMeasure:
     @property
     def beyond(self) -> NDArray[np.bool_]:
         """(n, k) what is beyond the tolerance, beyond its floor, and beyond the null."""
-        return self.apart > np.maximum(np.maximum(self.tolerance, self.floors), self.null)
+        return self.gaps > np.maximum(np.maximum(self.tolerance, self.floors), self.null)
 
     @property
     def worst(self) -> tuple[int, int]:
@@ -66,7 +66,7 @@ class StageMeasure:
         Where differences are beyond the tolerance, only those are looked at.
         """
         beyond = self.beyond
-        gaps = np.where(beyond, self.apart, 0.0) if beyond.any() else self.apart
+        gaps = np.where(beyond, self.gaps, 0.0) if beyond.any() else self.gaps
         row, element = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         return int(row), int(element)
 
@@ -83,7 +83,7 @@ class StageMeasure:
         ]
         if hits and self.stage in (KINEMATICS, MASS):
             return self.names[hits[0 if self.stage == KINEMATICS else -1]]
-        return self.names[int(np.argmax(self.apart[row]))]
+        return self.names[int(np.argmax(self.gaps[row]))]
 
 
 def measures(

@@ -13,7 +13,7 @@ from ..compare import Agreement, Comparison
 from ..compare.instead import Instead
 from ..compare.motion import MotionExtent
 from ..runs.floating import Bases
-from .compared_names import name_of, named, short_labels, shortened
+from .compared_names import name_of, noun_phrase, short_labels, shortened
 from .finding import Divergence, EarlyEnd, Finding
 
 _NAME = 30  # characters of a name within a sentence
@@ -45,7 +45,7 @@ class _Verdict:
     @property
     def lead_name(self) -> str:
         """Return the name of that quantity, as a sentence has it."""
-        return _named(self.lead)
+        return _noun_phrase(self.lead)
 
     @property
     def divergence(self) -> Divergence | None:
@@ -76,7 +76,7 @@ class DifferVerdict(_Verdict, PageContent):
         None where that is the lead, or there is none.
         """
         noticed = self.finding.noticed
-        return None if noticed is None else _named(noticed)
+        return None if noticed is None else _noun_phrase(noticed)
 
     @property
     def event(self) -> tuple[str, str] | None:
@@ -220,8 +220,8 @@ def extents_of(motion: MotionExtent) -> list[str]:
     return extents
 
 
-def _named(agreement: Agreement) -> str:
-    return named(agreement, _NAME)
+def _noun_phrase(agreement: Agreement) -> str:
+    return noun_phrase(agreement, _NAME)
 
 
 def _short(name: str) -> str:

@@ -38,7 +38,7 @@ def moment(time: float | None) -> TableCell:
     return TableCell("never" if time is None else f"{time:.3f}", at=time)
 
 
-def named(agreement: Agreement, width: int = 1000) -> str:
+def noun_phrase(agreement: Agreement, width: int = 1000) -> str:
     """Return what a quantity is called within a sentence; the middle of a long name is left out."""
     name, _, part = agreement.name.partition(", ")
     (short,) = shortened([name], width)

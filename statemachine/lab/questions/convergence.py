@@ -135,7 +135,7 @@ class ConvergencePage(PageContent):
         return max(self.limits.periods)
 
     @property
-    def before(self) -> Table:
+    def before_touch(self) -> Table:
         """Return a table of the gaps until the first touch; without rows where nothing touches."""
         touch = self.limits.touch
         if touch is None:
@@ -144,7 +144,7 @@ class ConvergencePage(PageContent):
         return _limits_table(self.limits.before_touch, title)
 
     @property
-    def whole(self) -> Table:
+    def whole_run(self) -> Table:
         """Return a table of the gaps over the whole run."""
         return _limits_table(self.limits.whole_run, "The gap with finer steps, over the whole run")
 

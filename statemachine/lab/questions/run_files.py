@@ -157,7 +157,7 @@ def write_figure(
 def write_film(
     file: Path,
     traces: Sequence[Trace],
-    shown: ShownModels,
+    shown_models: ShownModels,
     renderer: Renderer,
     comparison: Comparison | None = None,
     reporter: Reporter = QUIET,
@@ -167,7 +167,7 @@ def write_film(
     Args:
         file: Where to write it.
         traces: One, or the two of a comparison.
-        shown: What they are drawn with.
+        shown_models: What they are drawn with.
         renderer: What draws, from `find_renderer`.
         comparison: Of the two.
         reporter: Told how it gets on.
@@ -175,8 +175,8 @@ def write_film(
     Raises:
         ModelFileError: A model is not here.
     """
-    models = [_filmed(shown, number, trace, reporter) for number, trace in enumerate(traces)]
-    if shown.own_names:
+    models = [_filmed(shown_models, number, trace, reporter) for number, trace in enumerate(traces)]
+    if shown_models.own_names:
         traces = [with_bodies_of(trace, model) for trace, model in zip(traces, models, strict=True)]
     with reporter.stage("film") as progress:
         film = films.write_film(file, traces, models, renderer, comparison, progress=progress)
@@ -190,10 +190,10 @@ def _bytes(size: int) -> str:
     return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{max(1, round(size / 1000))} kB"
 
 
-def _filmed(shown: ShownModels, number: int, trace: Trace, reporter: Reporter) -> Model:
+def _filmed(shown_models: ShownModels, number: int, trace: Trace, reporter: Reporter) -> Model:
     """Return what a run is filmed with; note it where it was recorded with another."""
     try:
-        file, model, is_same = shown.load(number, trace)
+        file, model, is_same = shown_models.load(number, trace)
     except (ModelFileError, UnknownNameError) as error:
         raise ModelFileError(f"a film needs the model: {error}; name it behind the trace") from None
     if not is_same:
@@ -204,30 +204,30 @@ def _filmed(shown: ShownModels, number: int, trace: Trace, reporter: Reporter) -
     return model
 
 
-def write_page(file: Path, traces: Sequence[Trace], shown: ShownModels, page: Page) -> str:
+def write_page(file: Path, traces: Sequence[Trace], shown_models: ShownModels, page: Page) -> str:
     """Write a page of two runs that stands alone, and return what was written, in a line.
 
     Args:
         file: Where to write it.
         traces: The two runs.
-        shown: What they are drawn with.
+        shown_models: What they are drawn with.
         page: What it says.
     """
     left, right = (trace.header for trace in traces)
-    look = _look(shown, 0, traces[0])
+    look = _look(shown_models, 0, traces[0])
     looks = [look, look]
     if (left.provenance.model_sha256, left.bodies) != (right.provenance.model_sha256, right.bodies):
-        looks[1] = _look(shown, 1, traces[1])
+        looks[1] = _look(shown_models, 1, traces[1])
     text = report(page, looks)
     target = write_report(file, text)
     return f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)"
 
 
-def _look(shown: ShownModels, number: int, trace: Trace) -> Drawing | str:
+def _look(shown_models: ShownModels, number: int, trace: Trace) -> Drawing | str:
     """Return what a run is drawn as on a page, or why that cannot be had."""
     file = trace.header.provenance.model_file
     try:
-        _, model, is_same = shown.load(number, trace)
+        _, model, is_same = shown_models.load(number, trace)
         if model.nbody != len(trace.header.bodies):
             return f"{file} as it is here has other bodies"
         return drawing_of(model) if is_same else f"{file} as it is here has another digest"

@@ -17,7 +17,7 @@ class Reporter(Protocol):
     """Somebody who is told how an answer gets on; what computes it prints nothing itself."""
 
     def stage(
-        self, what: str, runs_at_once: int = 0, takes: float | None = None
+        self, what: str, runs_at_once: int = 0, expected_seconds: float | None = None
     ) -> AbstractContextManager[Progress]:
         """Begin a stage of the work, and give what is told the fraction of it that is done.
 
@@ -26,7 +26,7 @@ class Reporter(Protocol):
             runs_at_once: How many runs are made side by side, at most, where each fraction is told
                 as runs end: only then can be measured how long the rest takes. 0 where it is told
                 of something else.
-            takes: How long it takes, from what was measured before [s]; None if that is not known.
+            expected_seconds: How long it takes by what was measured before [s]; None if unknown.
         """
         ...
 
@@ -44,7 +44,7 @@ class QuietReporter:
 
     @contextmanager
     def stage(
-        self, what: str, runs_at_once: int = 0, takes: float | None = None
+        self, what: str, runs_at_once: int = 0, expected_seconds: float | None = None
     ) -> Iterator[Progress]:
         """Begin a stage of which nothing is shown."""
         yield no_progress

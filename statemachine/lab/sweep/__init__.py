@@ -114,18 +114,18 @@ def run_sweep(
     check_folder(folder)
     with locked(folder), ExitStack() as stack:
         client = stack.enter_context(_connected(scheduler, ready)) if scheduler else None
-        known = dict(iter_cell_outcomes(folder))
-        if extend and known:
-            _check_grows(folder, ready, known)
+        outcomes = dict(iter_cell_outcomes(folder))
+        if extend and outcomes:
+            _check_grows(folder, ready, outcomes)
         write_or_check_manifest(folder, ready.manifest(), extend)
         if retry_failed:
             remove_failed(folder)
-            known = {cell: kind for cell, kind in known.items() if kind == DONE}
-        ran, cost, total_cost = 0, 0.0, _cost_of_missing(ready, known)
-        kinds = Counter(known.values())
+            outcomes = {cell: kind for cell, kind in outcomes.items() if kind == DONE}
+        ran, cost, total_cost = 0, 0.0, _cost_of_missing(ready, outcomes)
+        kinds = Counter(outcomes.values())
         writer = RowWriter(folder, ready.design.factors, ready.provenance())
         workers = max(1, sum(client.nthreads().values())) if client else jobs
-        batches = _batches(ready, known, workers)
+        batches = _batches(ready, outcomes, workers)
         with unwinding(at_once=False) as raise_if_ended:
             if client:
                 run = _run_on_dask(ready, batches, workers, client, raise_if_ended)
@@ -144,23 +144,23 @@ def run_sweep(
     return _summary(ready, folder, kinds, ran, time.monotonic() - began)
 
 
-def _check_grows(folder: Path, ready: PreparedSweep, known: Mapping[str, str]) -> None:
+def _check_grows(folder: Path, ready: PreparedSweep, outcomes: Mapping[str, str]) -> None:
     """Check that all that a folder has is of a design.
 
     Args:
         folder: Of the dataset.
         ready: The sweep.
-        known: What became of each cell that is there, by its id.
+        outcomes: What became of each cell that is there, by its id.
 
     Raises:
         BadInputError: It has cells that are not of this design.
     """
     shared = 0
     for backend in ready.backends:
-        shared += sum(cell.id in known for cell in ready.cells(backend))
-    if shared < len(known):
+        shared += sum(cell.id in outcomes for cell in ready.cells(backend))
+    if shared < len(outcomes):
         raise BadInputError(
-            f"{folder} has {len(known) - shared} cells that are not of this design: a "
+            f"{folder} has {len(outcomes) - shared} cells that are not of this design: a "
             "sweep grows by values, seeds and backends that are added"
         )
 
@@ -204,25 +204,25 @@ def _cost_of_cell(ready: PreparedSweep, backend: str) -> float:
     return max(1e-6, ready.cost.get(parse_backend(backend).name, _BATCH_SECONDS))
 
 
-def _cost_of_missing(ready: PreparedSweep, known: Mapping[str, str]) -> float:
+def _cost_of_missing(ready: PreparedSweep, outcomes: Mapping[str, str]) -> float:
     """Return roughly what all cells take that are not known, one after the other [s]."""
     cost = 0.0
     for backend in ready.backends:
-        cells = sum(cell.id not in known for cell in ready.cells(backend))
+        cells = sum(cell.id not in outcomes for cell in ready.cells(backend))
         cost += cells * _cost_of_cell(ready, backend)
     return cost
 
 
-def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Iterator[Batch]:
+def _batches(ready: PreparedSweep, outcomes: Mapping[str, str], jobs: int) -> Iterator[Batch]:
     """Yield what is missing, in tasks of about a second, from all backends in turn."""
-    missing = len(ready) - len(known)
+    missing = len(ready) - len(outcomes)
     most = max(1, math.ceil(missing / (_TASKS_PER_JOB * jobs * len(ready.backends))))
 
     def of(backend: str) -> Iterator[Batch]:
         size = min(
             _MAX_BATCH_CELLS, max(1, int(_BATCH_SECONDS / _cost_of_cell(ready, backend))), most
         )
-        cells = (cell for cell in ready.cells(backend) if cell.id not in known)
+        cells = (cell for cell in ready.cells(backend) if cell.id not in outcomes)
         while batch := list(itertools.islice(cells, size)):
             yield batch
 

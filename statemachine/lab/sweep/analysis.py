@@ -365,16 +365,16 @@ def _last_part(name: str) -> str:
     return Path(name).name if Path(name).is_absolute() else name
 
 
-def _compared_backends(there: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:
+def _compared_backends(available: Sequence[str], requested: Sequence[str]) -> tuple[str, ...]:
     """Return the engine, or the two engines, that a report is about.
 
     Raises:
         UnknownNameError: The sweep has no such engine.
         BadInputError: They are more than two.
     """
-    for name in asked:
-        check_name("backend of this sweep", name, there)
-    chosen = tuple(dict.fromkeys(asked or there))
+    for name in requested:
+        check_name("backend of this sweep", name, available)
+    chosen = tuple(dict.fromkeys(requested or available))
     if len(chosen) > 2:
         raise BadInputError(
             f"a report is of one engine, or of the gap between two; got {listed(list(chosen))}: "

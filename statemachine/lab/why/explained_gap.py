@@ -53,7 +53,7 @@ def named_quantity(trials: Trials, words: str | None) -> str | None:
     """
     if words is None:
         return None
-    quantity = trials.ruler.named(words)
+    quantity = trials.ruler.quantity_of(words)
     if quantity not in trials.ruler.units:
         further = trials.ruler.further_quantities
         known = (*trials.ruler.units, *further, *trials.traces[0].header.joint_labels)

@@ -113,15 +113,15 @@ class Effect:
     @property
     def range(self) -> Range | None:
         """Return the least and the largest effect, alone or last; None where neither is known."""
-        effects = self._known()
+        effects = self._known_effects()
         return (min(effects), max(effects)) if effects else None
 
     def size(self) -> float:
         """Return the size of the mean of what is known; 0 where nothing is."""
-        effects = self._known()
+        effects = self._known_effects()
         return abs(sum(effects)) / len(effects) if effects else 0.0
 
-    def _known(self) -> list[float]:
+    def _known_effects(self) -> list[float]:
         return [effect for effect in (self.alone, self.last) if effect is not None]
 
 

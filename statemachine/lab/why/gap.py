@@ -180,7 +180,7 @@ class Ruler:
         """Return what is measured only where it is asked for, of a robot that floats."""
         return () if self._places[0].base is None else ASKED
 
-    def named(self, words: str) -> str:
+    def quantity_of(self, words: str) -> str:
         """Return the quantity that a table calls so: "torso rotation", "torso position"."""
         places = {f"{name} position": name for name in self.units}
         known = places | {name.replace(",", ""): name for name in self.units}

@@ -161,7 +161,7 @@ def _by_integrator(
     integrator: str,
     without: frozenset[str],
     share: float,
-    rest: float,
+    gap: float,
     is_setting: bool,
 ) -> Localisation:
     """Return the part of a gap that goes when both sides run with one integrator."""
@@ -176,7 +176,7 @@ def _by_integrator(
         values=(setup.integrator_of(0), setup.integrator_of(1)),
         share=share,
         alone=None if gap_alone is None else 1.0 - gap_alone / remainder.gap,
-        gap=rest,
+        gap=gap,
         is_still=remainder.is_still(without),
         side=side,
     )

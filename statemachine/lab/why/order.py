@@ -151,7 +151,7 @@ def _by_number(values: Array, slots: list[tuple[int, int]], start: Array) -> Arr
 
 
 def _elements(
-    shown: Model, matched: Matched, mocap_in_order: bool
+    view: Model, matched: Matched, mocap_in_order: bool
 ) -> dict[str, list[tuple[int, int]]]:
     """Return pairs of ids, or of places in an array, by kind: of the left, and of the right."""
     right = matched.right
@@ -173,6 +173,6 @@ def _elements(
     }
     if not mocap_in_order:
         for part, size in (("mocap_pos", 3), ("mocap_quat", 4)):
-            count = size * min(shown.nmocap, right.nmocap)
+            count = size * min(view.nmocap, right.nmocap)
             elements[part] = [(k, k) for k in range(count)]
-    return elements | raw_engine_of(DEFAULT).shown_elements(shown.compiled, right.compiled, matched)
+    return elements | raw_engine_of(DEFAULT).shown_elements(view.compiled, right.compiled, matched)

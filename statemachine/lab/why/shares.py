@@ -130,17 +130,17 @@ def pair_mean(game: Game, active: Sequence[str], pair: tuple[Order, Order]) -> l
     return [sums[cause] / 2 for cause in active]
 
 
-def range_of(share: float, error: float, seen: Iterable[float]) -> Range | None:
+def range_of(share: float, error: float, effects: Iterable[float]) -> Range | None:
     """Return between what a share lies; None where nothing is known of it.
 
     Args:
         share: The share; NaN where it is not known.
         error: Its standard error; 0 where it is no estimate.
-        seen: What the cause takes away in some orders; NaN where that is not known.
+        effects: What the cause takes away in some orders; NaN where that is not known.
     """
     if not math.isnan(share) and math.isfinite(error):
         return share - _SURE * error, share + _SURE * error
-    values = [value for value in (share, *seen) if not math.isnan(value)]
+    values = [value for value in (share, *effects) if not math.isnan(value)]
     return (min(values), max(values)) if values else None
 
 

@@ -98,7 +98,7 @@ class Trials:
             rerun = self.setup.rerun(run, self.setup.models[run.side])
             traces.append(rerun.record(progress=deadline.check))
         # What is derived is read from a second run: so four were made.
-        self._took = (time.perf_counter() - began) / 4
+        self._seconds_of_run = (time.perf_counter() - began) / 4
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(matched, traces[0], traces[1], request.quantity)
         self.ended, self._repeated = "", 0
@@ -196,7 +196,7 @@ class Trials:
                 self.ran()
 
             work = [partial(self.trial_of, run) for run in new]
-            in_forks(work, jobs, ended, self._took, self._deadline.check)
+            in_forks(work, jobs, ended, self._seconds_of_run, self._deadline.check)
             for run in new:
                 self._trials.setdefault(run, Trial(None, _LOST))
 
@@ -207,7 +207,7 @@ class Trials:
         """
         if self._jobs is None and self.setup.scenario.is_user_function:
             return 1
-        return forks_for(number, self._took, self._jobs)
+        return forks_for(number, self._seconds_of_run, self._jobs)
 
     def _curves(self, run: RunKey) -> Curves | None:
         """Return a run; None, with a reason in `ended`, if it did not reach the end."""
@@ -287,7 +287,7 @@ class Trials:
         ]
         jobs = self._forks_for(len(work))
         if jobs > 1:
-            in_forks(work, jobs, ended, self._took, self._deadline.check)
+            in_forks(work, jobs, ended, self._seconds_of_run, self._deadline.check)
         else:
             for number, call in enumerate(work):
                 self._deadline.check()

@@ -61,7 +61,7 @@ def sides_of(row: Share, most: int = _SHOWN) -> tuple[str, str]:
     if not row.values:
         return NO_NUMBER, NO_NUMBER
     values = _largest_first(distinct(row.values), most)
-    pairs = [_named(value, is_only=len(values) == 1) for value in values[:most]]
+    pairs = [_named_texts(value, is_only=len(values) == 1) for value in values[:most]]
     left, right = zip(*pairs, strict=True)
     more = len(values) - most
     sides: list[str] = []
@@ -85,7 +85,7 @@ def _largest_first(values: Sequence[DifferingQuantity], most: int) -> list[Diffe
     return sorted(values, key=relative_difference, reverse=True)
 
 
-def _named(value: DifferingQuantity, is_only: bool) -> tuple[str, str]:
+def _named_texts(value: DifferingQuantity, is_only: bool) -> tuple[str, str]:
     """Return the texts of a quantity with its name, which one that is alone does not need.
 
     A side without it among others has "".

@@ -99,19 +99,19 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Wri
     """
     left_elements, right_elements = _elements_of_mjcf(left), _elements_of_mjcf(right)
     for cause in causes:
-        yield _written(cause, left_elements, right_elements)
+        yield _written_cause(cause, left_elements, right_elements)
 
 
 def _elements_of_mjcf(path: Path) -> list[_Element]:
     return list(_elements(path)) if path.suffix in (".xml", ".mjcf") else []
 
 
-def _written(
+def _written_cause(
     cause: Cause, left_elements: Sequence[_Element], right_elements: Sequence[_Element]
 ) -> WrittenCause:
     """Return one cause as the right's file has it."""
     rows = cause.differences
-    places = {element.place for element in right_elements if _says(element, cause)}
+    places = {element.place for element in right_elements if _declares(element, cause)}
     if _is_moved_mass(cause):
         masses = [row for row in rows if row.subject == "mass"]
         return _of_rows(
@@ -186,7 +186,7 @@ def _weights(elements: Sequence[_Element]) -> list[_Weight]:
     ]
 
 
-def _says(element: _Element, cause: Cause) -> bool:
+def _declares(element: _Element, cause: Cause) -> bool:
     """Tell whether an element says what a side has of a cause."""
     names = {row.where for row in cause.differences}
     is_owned = element.in_default if len(names) > 1 else bool(names & element.owners)

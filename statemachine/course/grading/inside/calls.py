@@ -31,9 +31,9 @@ class FaultError(Exception):
         written: False if the function is still to be written.
     """
 
-    def __init__(self, text: str, written: bool = True) -> None:
+    def __init__(self, text: str, is_written: bool = True) -> None:
         super().__init__(text)
-        self.written = written
+        self.written = is_written
 
 
 def load_file(path: Path) -> dict[str, Any]:
@@ -141,7 +141,7 @@ def call(function: Function, world: AnyWorld) -> Any:
             answer = encode(answer_of(result, watch, changed))
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
-            raise FaultError(f"not written yet. {error}".strip(), written=False) from None
+            raise FaultError(f"not written yet. {error}".strip(), is_written=False) from None
         raise FaultError(_remark(error, file, world.model)) from error
     if result is None:
         raise FaultError("it returns nothing: print shows a result, `return` hands it over")

@@ -122,7 +122,7 @@ class StudentWatch:
         self._nudge = nudge
         self._current: dict[int, EngineRun] = {}
 
-    def meet(self, data: Any) -> int:
+    def number_of(self, data: Any) -> int:
         """Return the number of a Data; the engine's own object behind a known one is no other.
 
         Raises:
@@ -139,11 +139,11 @@ class StudentWatch:
     def recomputed(self, data: Any) -> None:
         """Note that what is derived was."""
         if len(self.forwards) < _MOST:
-            self.forwards.append(inputs_of(self.meet(data), data))
+            self.forwards.append(inputs_of(self.number_of(data), data))
 
     def step(self, model: Any, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
         """Let `advance` move `data`, and note where from and where to."""
-        now = inputs_of(self.meet(data), data)
+        now = inputs_of(self.number_of(data), data)
         run = self._current.get(now.data)
         if run is None or not _is_same_state(now, run.end):  # somebody touched the state
             run = EngineRun(self._origin_of(model) == self._origin, now, now)
@@ -204,8 +204,8 @@ def engine_watched(backend: str) -> Iterator[None]:
         yield
 
 
-def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> AbstractContextManager[Any]:
-    return mock.patch.object(owner, name, seen(vars(owner)[name]))
+def _replaced(owner: Any, name: str, wrapper: Callable[[Any], Any]) -> AbstractContextManager[Any]:
+    return mock.patch.object(owner, name, wrapper(vars(owner)[name]))
 
 
 def _seen_data(reporting_backend: str | None, original: Callable[..., None]) -> Callable[..., None]:
@@ -220,7 +220,7 @@ def _seen_data(reporting_backend: str | None, original: Callable[..., None]) -> 
             advance = _seen_step(advance, (model, data))
         original(data, model, advance, *more)
         if _watch is not None:
-            _watch.meet(data)
+            _watch.number_of(data)
 
     return seen
 

@@ -106,7 +106,7 @@ class Judgement:
     judged: bool = True
 
 
-def judged(
+def judgement_of(
     function: str,
     worlds: Sequence[AnyWorld],
     rights: Sequence[Any],

@@ -82,7 +82,7 @@ def answer(request: ConvergeRequest, reporter: Reporter = QUIET) -> ConvergeResu
         if times > 1:
             what = f"converge, steps {times} times finer"
         began = time.monotonic()
-        with reporter.stage(what, takes=_expected(durations)) as progress:
+        with reporter.stage(what, expected_seconds=_expected(durations)) as progress:
             traces = run_sides(request.with_finer_steps(times), progress).traces
         durations.append(time.monotonic() - began)
         return traces
