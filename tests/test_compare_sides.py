@@ -525,6 +525,7 @@ def test_a_recorded_run_on_one_robot_twice_is_the_same(files: Path, recorded: Pa
     assert largest(compare(same.left, same.right)) == 0
 
 
+@any_start
 def test_seconds_of_a_recorded_run_are_refused(files: Path, recorded: Path) -> None:
     sides = (Side(str(files / "arm.xml")),) * 2
     request = partial(Request, (str(recorded),), sides=sides, seconds=1.0)

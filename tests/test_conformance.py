@@ -69,7 +69,7 @@ def load_limp(path: Path, defaults: str = "model") -> ExampleModel:
     return _without(limp, "actuation", "position servo")
 
 
-def _without(model: ExampleModel, option: str, *behaviours: str) -> ExampleModel:
+def _without(model: sm.Model, option: str, *behaviours: str) -> ExampleModel:
     record = model.capabilities
     lacking = dict.fromkeys(behaviours, Behaviour("unsupported", "it has none"))
     return _with_record(

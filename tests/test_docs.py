@@ -26,7 +26,7 @@ from statemachine.show import terminal
 from statemachine.show.blocks import Heading, Page, Printed, Question, Table, Text
 from statemachine.show.charts import drawn
 from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Label
-from statemachine.show.pictures import Diagram, Picture, Traces
+from statemachine.show.pictures import Diagram, Traces
 from tools.docs_pages import make_path
 
 from .support.claims import assert_in, refused
@@ -37,7 +37,7 @@ from .support.requirements import ROOT, need_engine
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 
 
-PICTURES: dict[str, Callable[[], Picture]] = {
+PICTURES: dict[str, Callable[[], Traces | Diagram]] = {
     "curve": lambda: Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
     "curves on a logarithmic axis": lambda: Traces(
         "t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True

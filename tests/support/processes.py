@@ -61,14 +61,15 @@ def run_main(*words: object) -> subprocess.CompletedProcess[str]:
     Returns:
         Its exit code, and what it printed.
     """
+    texts = [str(word) for word in words]
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main([str(word) for word in words])
+        code = main(texts)
     printed: list[str] = []
     for stream in (out, err):
         stream.seek(0)
         printed.append(stream.read())
-    return subprocess.CompletedProcess(words, code, printed[0], without_estimates(printed[1]))
+    return subprocess.CompletedProcess(texts, code, printed[0], without_estimates(printed[1]))
 
 
 def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
