@@ -162,7 +162,7 @@ def test_its_traces_are_played_shown_and_compared(said: Said) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine")
-def test_its_traces_are_drawn(said: Said) -> None:
+def test_traces_of_another_package_s_engine_are_drawn(said: Said) -> None:
     pytest.importorskip("PIL")
     said("trace", "record", "hold", "--out", "a.npz", *SHORT, *ON)
     for words in (("plot", "a.npz", "--out", "a.svg"),
@@ -174,5 +174,5 @@ def test_its_traces_are_drawn(said: Said) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine", "viser")
 @pytest.mark.parametrize("ghost", [(), ("--backend", "mujoco")])
-def test_it_is_viewed(said: Said, ghost: tuple[str, ...]) -> None:
+def test_the_engine_of_another_package_is_viewed(said: Said, ghost: tuple[str, ...]) -> None:
     assert "http://" in said("view", *ON, *ghost, "--seconds", "0.3")

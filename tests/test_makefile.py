@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import re
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -14,10 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from .support.project import makefile_text, project_table
 from .support.requirements import ROOT
 
-MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OURS = ("statemachine", "examples", "tests", "tools")
 # What an option of our command imports only when it is given, and the extra that brings it.
 EXTRA_OF_AN_OPTION = {"--html": "plot"}
@@ -65,7 +63,7 @@ def installed_by(target: str, targets: dict[str, Target]) -> set[str]:
             distributions |= installed_by(need, targets)
     for line in rule.recipe:
         for extras in re.findall(r"\$\(PIP\).*-e '\.\[([\w,]+)\]'", line):
-            distributions |= distributions_of(PROJECT["dependencies"])
+            distributions |= distributions_of(project_table()["dependencies"])
             for extra in extras.split(","):
                 distributions |= distributions_of_extra(extra)
     return distributions
@@ -73,7 +71,7 @@ def installed_by(target: str, targets: dict[str, Target]) -> set[str]:
 
 def distributions_of_extra(extra: str) -> set[str]:
     """Return the distributions that an extra brings, those of extras that it names too."""
-    return distributions_of(PROJECT["optional-dependencies"][extra])
+    return distributions_of(project_table()["optional-dependencies"][extra])
 
 
 def distributions_of(requirements: list[str]) -> set[str]:
@@ -82,7 +80,7 @@ def distributions_of(requirements: list[str]) -> set[str]:
     for requirement in requirements:
         match = re.match(r"([\w.-]+)(?:\[([\w,]+)\])?", requirement)
         assert match
-        if match[1] == PROJECT["name"]:
+        if match[1] == project_table()["name"]:
             for extra in match[2].split(","):
                 found |= distributions_of_extra(extra)
         else:
@@ -182,12 +180,14 @@ def modules_needed_by(program: Path) -> set[str]:
     return {name for name in needed if name not in sys.stdlib_module_names}
 
 
-TARGETS = targets_in(MAKEFILE)
-PROGRAMS = [(rule.name, program) for rule in TARGETS.values() for program in programs_of(rule)]
+@pytest.fixture(scope="module")
+def targets() -> dict[str, Target]:
+    """Return the rules of the Makefile by their names."""
+    return targets_in(makefile_text())
 
 
-def test_programs_of_the_makefile_are_found() -> None:
-    names = {name for name, _ in PROGRAMS}
+def test_programs_of_the_makefile_are_found(targets: dict[str, Target]) -> None:
+    names = {rule.name for rule in targets.values() if list(programs_of(rule))}
     assert names >= {
         *("bench", "fuzz", "mutate", "reference", "picture", "urdf", "traces", "notebook"),
         *("student-kit", "autograder"),
@@ -196,32 +196,35 @@ def test_programs_of_the_makefile_are_found() -> None:
     assert "coverage" in modules_needed_by(ROOT / "tools" / "mutants" / "__main__.py")
 
 
-@pytest.mark.parametrize(("target", "program"), PROGRAMS, ids=[name for name, _ in PROGRAMS])
-def test_a_target_installs_what_its_program_imports(target: str, program: Path) -> None:
+def test_a_target_installs_what_its_programs_import(targets: dict[str, Target]) -> None:
     here = packages_distributions()
-    installed = installed_by(target, TARGETS)
-    missing = []
-    for module in sorted(modules_needed_by(program)):
-        bringing = DISTRIBUTIONS.get(module) or {name.lower() for name in here.get(module, ())}
-        if not bringing & installed:
-            missing.append(module)
-    assert not missing, f"make {target} does not install {missing}"
+    missing: list[tuple[str, str]] = []
+    for rule in targets.values():
+        for program in programs_of(rule):
+            installed = installed_by(rule.name, targets)
+            for module in sorted(modules_needed_by(program)):
+                names = {name.lower() for name in here.get(module, ())}
+                if not DISTRIBUTIONS.get(module, names) & installed:
+                    missing.append((rule.name, module))
+    assert missing == []
 
 
-def test_a_target_installs_what_the_options_of_its_command_need() -> None:
-    for rule in TARGETS.values():
+def test_a_target_installs_what_the_options_of_its_command_need(
+    targets: dict[str, Target],
+) -> None:
+    for rule in targets.values():
         for line in rule.recipe:
             for option, extra in EXTRA_OF_AN_OPTION.items():
                 if f"{option} " in line and "$(BIN)/statemachine" in line:
-                    assert distributions_of_extra(extra) <= installed_by(rule.name, TARGETS)
+                    assert distributions_of_extra(extra) <= installed_by(rule.name, targets)
 
 
-def test_every_tool_of_a_target_is_installed_by_it() -> None:
+def test_every_tool_of_a_target_is_installed_by_it(targets: dict[str, Target]) -> None:
     """Programs of the environment, such as ruff, by the names of their distributions."""
-    for rule in TARGETS.values():
+    for rule in targets.values():
         tools = set(re.findall(r"\$\(BIN\)/([a-z-]+)", " ".join(rule.recipe)))
         tools |= set(re.findall(r"\$\(BIN\)/python -m ([a-z]+)", " ".join(rule.recipe)))
-        installed = installed_by(rule.name, TARGETS) if tools else set()
+        installed = installed_by(rule.name, targets) if tools else set()
         for tool in tools - {"python", "pip", "statemachine", "activate", *OURS}:
             distribution = {"lint-imports": "import-linter"}.get(tool, tool)
             assert distribution in installed, f"make {rule.name} does not install {tool}"

@@ -155,7 +155,7 @@ def test_what_a_urdf_cannot_say_is_not_zero(pair: Pair) -> None:
     }
 
 
-def test_the_public_pair(pair: Pair) -> None:
+def test_the_public_urdf_and_mjcf_of_the_arm_differ_in_what_is_known(pair: Pair) -> None:
     """The differences that the two public descriptions of the SO-101 have."""
     in_urdf = {
         "roll_low": -2.841,
@@ -216,7 +216,7 @@ def test_rounded_figures_are_equal_and_the_largest_is_stated(tmp_path: Path, dig
     assert not compare(rounded, file, digits=digits + 3).equal
 
 
-def test_digits() -> None:
+def test_a_gap_is_told_by_the_digits_that_agree() -> None:
     for gap, digits in ((0.0, 17), (2.7e-6 / 2.7438473, 6), (2e-6 / 1.2345, 6), (1.0, 0)):
         assert digits_of(gap) == digits, gap
 
@@ -318,7 +318,7 @@ def test_a_joint_without_a_name_is_told_as_one_types_it(tmp_path: Path) -> None:
     assert "--map 'the joint of arm=NAME'" in pair.suggestion
 
 
-def test_joints_of_other_names(pair: Pair, tmp_path: Path) -> None:
+def test_joints_of_other_names_are_matched_by_their_places(pair: Pair, tmp_path: Path) -> None:
     one, two = pair()
     for old, new in (
         *(('"shoulder"', '"1"'), ('"elbow"', '"2"'), ('"wrist_roll"', '"3"')),
@@ -576,7 +576,7 @@ def test_what_the_engines_make_of_a_urdf() -> None:
     assert {d.subject for d in _differ(result)} >= {"inertia", "contact", "settings"}
 
 
-def test_what_an_import_drops() -> None:
+def test_an_import_of_a_urdf_drops_speeds_and_the_mass_of_the_root() -> None:
     """MuJoCo's import of a URDF: no speed, no mass of the root."""
     path = models_dir() / "so101" / "so101.urdf"
     result = compare(path, path, engines=(None, "mujoco"))
@@ -588,7 +588,7 @@ def test_what_an_import_drops() -> None:
     assert "frames" not in notes  # those of fixed links are sites
 
 
-def test_frames_that_were_given(pair: Pair) -> None:
+def test_frames_of_other_names_are_compared_where_they_are_named(pair: Pair) -> None:
     one, two = pair({"tool_pos": "0.08 0 0.01"})
     written(two, two.read_text().replace("gripperframe", "tcp"))
     assert compare(one, two).equal  # nobody said that they are one

@@ -17,6 +17,7 @@ from statemachine.show.blocks import Text
 from .support.claims import assert_has
 from .support.files import written, written_all
 from .support.processes import Cli
+from .support.two_files import compared_texts
 
 SERVO = """<mujoco><compiler angle="radian"/><option timestep="0.001"/>
   <worldbody><body name="arm"><joint name="joint" {joint} damping="0.1"/>
@@ -26,12 +27,6 @@ SERVO = """<mujoco><compiler angle="radian"/><option timestep="0.001"/>
 </mujoco>"""
 HINGE, SLIDE = 'axis="0 1 0"', 'type="slide" axis="0 0 1"'
 ON_JOINT, ON_TENDON = 'joint="joint"', 'tendon="cable"'
-
-
-def _listed(folder: Path, left: str, right: str, suffix: str = "xml") -> ModelsComparison:
-    """Return what two texts of models differ in."""
-    ours = written(folder / f"left.{suffix}", left)
-    return compare(ours, written(folder / f"right.{suffix}", right))
 
 
 def _row(result: ModelsComparison, quantity: str) -> ListedDifference:
@@ -65,7 +60,7 @@ def test_a_servo_sags_by_what_a_run_of_the_engine_shows_gear_included(
     kinds = {"joint": joint, "drives": drives, "coef": arm}
     left = SERVO.format(kp=stiffness, kv=stiffness / 20, gear=1, **kinds)
     right = SERVO.format(kp=stiffness / 4, kv=stiffness / 80, gear=2, **kinds)
-    row = _row(_listed(tmp_path, left, right), "gear")
+    row = _row(compared_texts(tmp_path, left, right), "gear")
     sags = [abs(_settled(text)) for text in (left, right)]
     assert sags[0] == pytest.approx(sags[1], rel=1e-6)
     factor = 180 / math.pi if unit == "°" else 1000.0
@@ -82,7 +77,7 @@ def test_the_damping_ratio_has_the_moment_arm_in_it(tmp_path: Path) -> None:
     right = SERVO.format(kp=40, kv=3, gear=2, **kinds)
     inertia = 0.01 + 0.5 * 0.3**2
     ratios = [(4 * kv + 0.1) / (2 * math.sqrt(4 * 40 * inertia)) for kv in (2, 3)]
-    effect = _row(_listed(tmp_path, left, right), "kv").effect
+    effect = _row(compared_texts(tmp_path, left, right), "kv").effect
     assert effect == " / ".join(f"damping ratio {ratio:.4g}" for ratio in ratios)
 
 
@@ -105,7 +100,7 @@ def test_a_nameless_geom_is_found_by_its_place_on_the_body(tmp_path: Path) -> No
 <body name="b" pos="1 0 0"><joint axis="0 1 0"/>
 <geom size="0.2"/></body>
 <geom size="{}" pos="0 0 1" mass="0"/></body></worldbody></mujoco>"""
-    row = _row(_listed(tmp_path, text.format(0.3), text.format(0.4)), "size")
+    row = _row(compared_texts(tmp_path, text.format(0.3), text.format(0.4)), "size")
     assert (row.left_line.line, row.right_line.line) == (5, 5)
 
 
@@ -132,7 +127,7 @@ def _urdf(**changes: Any) -> str:
 
 def test_an_inertia_that_is_no_solids_is_compared_as_it_is_stated(tmp_path: Path) -> None:
     bad = _urdf(ixx=0.01, iyy=0.01, izz=0.04)
-    result = _listed(tmp_path, bad, _urdf(ixx=0.01, iyy=0.01, izz=0.02), "urdf")
+    result = compared_texts(tmp_path, bad, _urdf(ixx=0.01, iyy=0.01, izz=0.02), "urdf")
     (fault,) = result.faults
     spec = mujoco.MjSpec.from_string(bad)
     spec.compiler.balanceinertia = True
@@ -158,39 +153,41 @@ def test_a_mended_inertia_weighs_what_a_run_feels_of_it(tmp_path: Path) -> None:
         full = np.zeros((1, 1))
         mujoco.mj_fullM(raw, data, full)
         felt.append(float(full[0, 0]))
-    row = _row(_listed(tmp_path, bad, good, "urdf"), "moments")
+    row = _row(compared_texts(tmp_path, bad, good, "urdf"), "moments")
     assert row.share == pytest.approx((felt[0] - felt[1]) / felt[0])
     assert "as mended" in row.effect
 
 
 def test_two_inertias_that_are_mended_to_one_differ_as_stated_alone(tmp_path: Path) -> None:
     bad = _urdf(ixx=0.1, iyy=0.02, izz=0.02)
-    row = _row(_listed(tmp_path, bad, _urdf(ixx=0.02, iyy=0.11, izz=0.01), "urdf"), "moments")
+    row = _row(
+        compared_texts(tmp_path, bad, _urdf(ixx=0.02, iyy=0.11, izz=0.01), "urdf"), "moments"
+    )
     assert row.share == pytest.approx(0.0, abs=1e-12)
 
 
 def test_moments_of_a_fault_stand_in_the_order_of_its_row(tmp_path: Path) -> None:
-    result = _listed(tmp_path, _urdf(iyy=0.5), _urdf(), "urdf")
+    result = compared_texts(tmp_path, _urdf(iyy=0.5), _urdf(), "urdf")
     (fault,) = result.faults
     assert fault.stated == pytest.approx((0.02, 0.5, 0.04))
     assert fault.stated == pytest.approx(_row(result, "moments").left)
 
 
 def test_principal_moments_stand_in_the_order_of_the_file(tmp_path: Path) -> None:
-    result = _listed(tmp_path, _urdf(), _urdf(iyy=0.05, izz=0.045), "urdf")
+    result = compared_texts(tmp_path, _urdf(), _urdf(iyy=0.05, izz=0.045), "urdf")
     row = _row(result, "moments")
     assert row.left == pytest.approx((0.02, 0.03, 0.04))
     assert row.right == pytest.approx((0.02, 0.05, 0.045))
 
 
 def test_an_effort_of_zero_is_not_one_that_is_not_said(tmp_path: Path) -> None:
-    result = _listed(tmp_path, _urdf(limit='effort="0"'), _urdf(), "urdf")
+    result = compared_texts(tmp_path, _urdf(limit='effort="0"'), _urdf(), "urdf")
     row = _row(result, "effort")
     assert_has(row, left=0.0, right=None, matters=False)
 
 
 def test_a_damping_that_is_not_said_is_not_zero(tmp_path: Path) -> None:
-    result = _listed(tmp_path, _urdf(), _urdf(dynamics='<dynamics damping="0.5"/>'), "urdf")
+    result = compared_texts(tmp_path, _urdf(), _urdf(dynamics='<dynamics damping="0.5"/>'), "urdf")
     row = _row(result, "damping")
     assert_has(row, left=None, right=0.5, matters=True)
 
@@ -201,7 +198,7 @@ def test_transmissions_are_compared_for_the_record(tmp_path: Path) -> None:
         "<mechanicalReduction>{}</mechanicalReduction></actuator></transmission>"
     )
     left, right = (_urdf(more=text.format(reduction)) for reduction in (1, 50))
-    row = _row(_listed(tmp_path, left, right, "urdf"), "mechanicalReduction")
+    row = _row(compared_texts(tmp_path, left, right, "urdf"), "mechanicalReduction")
     assert_has(row, left=1.0, right=50.0, matters=False)
     assert row.left_line is not None
 
@@ -225,12 +222,12 @@ def test_the_mass_of_a_base_that_may_float_counts(tmp_path: Path, other: str) ->
 def test_a_box_whose_axes_go_by_other_names_is_the_same_in_two_mjcf(tmp_path: Path) -> None:
     text = '<mujoco><worldbody><geom type="box" {}/></worldbody></mujoco>'
     turned = text.format('size="0.2 0.1 0.3" euler="0 0 90"')
-    assert _listed(tmp_path, text.format('size="0.1 0.2 0.3"'), turned).equal
+    assert compared_texts(tmp_path, text.format('size="0.1 0.2 0.3"'), turned).equal
 
 
 def test_two_models_with_nothing_that_moves_are_compared(tmp_path: Path) -> None:
     text = '<mujoco><worldbody><geom size="{}"/></worldbody></mujoco>'
-    result = _listed(tmp_path, text.format(0.1), text.format(0.2))
+    result = compared_texts(tmp_path, text.format(0.1), text.format(0.2))
     assert [row.quantity for row in result.differences] == ["size"]
     assert result.posed.joints == 0
     assert np.isfinite(result.posed.distance)
@@ -255,14 +252,14 @@ def test_a_coupling_that_only_one_file_has_is_told_in_words(tmp_path: Path) -> N
     )
     mimic = '<mimic joint="j" multiplier="-2" offset="0.5"/>'
     texts = _urdf(more=more.format(mimic)), _urdf(more=more.format(""))
-    row = _row(_listed(tmp_path, *texts, suffix="urdf"), "equality")
+    row = _row(compared_texts(tmp_path, *texts, suffix="urdf"), "equality")
     assert (row.left, row.right) == ("k is -2 j +0.5", "nothing")
 
 
 def test_the_verdict_tells_why_not_all_was_compared(tmp_path: Path) -> None:
     shape = '<collision><geometry><mesh filename="gone.stl"/></geometry></collision>'
     text = _urdf(more=f'<link name="c">{shape}</link>{FIXED}')
-    result = _listed(tmp_path, text, text, suffix="urdf")
+    result = compared_texts(tmp_path, text, text, suffix="urdf")
     why = result.skipped[0]
     headline = page(result).headline
     assert headline is not None
@@ -300,7 +297,7 @@ def _joints(**changes: Any) -> str:
 def test_each_number_of_a_positive_solref_has_its_unit(
     tmp_path: Path, left: str, right: str, figures: dict[str, Any]
 ) -> None:
-    result = _listed(tmp_path, _joints(solref=left), _joints(solref=right))
+    result = compared_texts(tmp_path, _joints(solref=left), _joints(solref=right))
     values: dict[str, Any] = {}
     for row in result.differences:
         values[row.quantity.removeprefix("solref").strip()] = (row.left, row.right, row.unit)
@@ -310,24 +307,24 @@ def test_each_number_of_a_positive_solref_has_its_unit(
 def test_the_solref_of_a_stop_is_a_time(tmp_path: Path) -> None:
     stop = 'range="-1 1" limited="true" solreflimit="{} 1"'
     sides = (_joints(stop=stop.format(time)) for time in (0.02, 0.03))
-    row = _row(_listed(tmp_path, *sides), "solref timeconst")
+    row = _row(compared_texts(tmp_path, *sides), "solref timeconst")
     assert_has(row, left=0.02, right=0.03, unit="s")
 
 
 def test_the_damping_of_a_free_joint_has_the_units_of_both_motions(tmp_path: Path) -> None:
-    row = _row(_listed(tmp_path, _joints(), _joints(free=2)), "damping")
+    row = _row(compared_texts(tmp_path, _joints(), _joints(free=2)), "damping")
     assert_has(row, element="free", unit="N·s/m and N·m·s", effect="")
 
 
 def test_every_joint_that_is_compared_is_counted(tmp_path: Path) -> None:
-    result = _listed(tmp_path, _joints(), _joints(ball=5))
+    result = compared_texts(tmp_path, _joints(), _joints(ball=5))
     dampings = [row for row in result.agreements if row.subject == "damping"]
     assert sum(row.compared for row in dampings) == 4
     assert sum(row.count for row in dampings) == 3
 
 
 def test_one_joint_is_one_joint(tmp_path: Path) -> None:
-    result = _listed(tmp_path, _urdf(), _urdf(), "urdf")
+    result = compared_texts(tmp_path, _urdf(), _urdf(), "urdf")
     assert result.posed.joints == 1
     texts = [block.text for block in page(result, details=True).blocks if isinstance(block, Text)]
     assert any("of 1 joint put" in text for text in texts)

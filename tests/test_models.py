@@ -33,7 +33,9 @@ from .support.small_models import MOTORS, PACKAGED_URDF, model_of
 ONE_JOINT = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 
 
-def test_names_and_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_is_found_by_its_name_or_its_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     arm = models_dir() / "so101" / "so101.xml"
     own = written(tmp_path / "a.xml", "<mujoco/>")
     monkeypatch.chdir(tmp_path)
@@ -42,7 +44,9 @@ def test_names_and_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert {name: resolve(name) for name in files} == files
 
 
-def test_a_menagerie_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_is_found_in_a_menagerie_or_in_one_of_its_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     home = tmp_path / "robotstudio_so101"
     written_all(home, {"so101.xml": "<mujoco/>", "scene.xml": "<mujoco/>"})
     for root in (tmp_path, home):
@@ -65,7 +69,7 @@ def test_a_menagerie_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert resolve("so101/scene") == models_dir() / "so101" / "scene.xml"
 
 
-def test_no_such_model(tmp_path: Path) -> None:
+def test_what_is_no_model_is_refused(tmp_path: Path) -> None:
     files = ["", " ", "\0", "a\0.xml", "nowhere.xml", "nowhere/so101.xml"]
     names = ["so101/scen", "so10", "scene", "../so101", "so101/../so101"]
     text = written(tmp_path / "robot.txt", "hello")
@@ -97,7 +101,9 @@ def test_an_mjcf_may_say_so_in_its_name(tmp_path: Path) -> None:
      "\x00\x01\x02", "<mujoco><include file='gone.xml'/></mujoco>",
      "<mujoco><asset><mesh file='gone.stl'/></asset></mujoco>"],
 )  # fmt: skip
-def test_malformed_files(tmp_path: Path, content: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_malformed_file_is_refused_without_a_word_of_the_engine(
+    tmp_path: Path, content: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     file = written(tmp_path / "bad.xml", content)
     refused((errors.ModelError, re.escape(str(file)), lambda: sm.load(file)))
     assert capfd.readouterr() == ("", "")

@@ -18,9 +18,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.engines.records import ModelDifference
 from statemachine.lab.compare.matching import match_models
-from statemachine.lab.model_differences import compare
 from statemachine.lab.why.causes import built, causes, differences_of
 
 from .support.rich_model import RICH, raw_states
@@ -34,6 +32,7 @@ from .support.schema import (
     restated_edits,
 )
 from .support.small_models import model_of
+from .support.two_files import causes_of_texts, compared_texts
 
 SEED, COUNT = 47, 78
 FURTHER_SEEDS = (3,)  # 1 and 2 were run when the rules were written; any other one may be
@@ -108,10 +107,7 @@ def _effect(text: str) -> EditEffect:
 
 def _listed_of_files(text: str, folder: Path) -> tuple[str, ...]:
     """Return what the list of RICH and another text says; both are written into a folder."""
-    paths = folder / "left.xml", folder / "right.xml"
-    for path, written in zip(paths, (RICH, text), strict=True):
-        path.write_text(written, encoding="utf-8")
-    result = compare(*paths)
+    result = compared_texts(folder, RICH, text)
     listed = [f"{row.cause}: {row.quantity}" for row in result.differences if row.matters]
     listed += [note for note in result.notes if "put elsewhere on the same solid" in note]
     return tuple(listed)
@@ -243,15 +239,11 @@ def _models(folder: Path, right: str) -> tuple[sm.Model, sm.Model]:
     return model_of(folder, RICH, "left.xml"), model_of(folder, right, "right.xml")
 
 
-def _listed(left: sm.Model, right: sm.Model) -> list[ModelDifference]:
-    return list(differences_of(left, right, match_models(left, right)))
-
-
 @pytest.mark.parametrize("way", SAID_OTHERWISE)
 def test_what_says_the_same_is_not_listed(way: str, tmp_path: Path) -> None:
     old, new = SAID_OTHERWISE[way]
     assert RICH.count(old) == 1
-    assert _listed(*_models(tmp_path, RICH.replace(old, new))) == []
+    assert causes_of_texts(tmp_path, RICH, RICH.replace(old, new)) == ()
 
 
 # What no edit of a compiled model can undo: the text of the right without it has the left's bits.
@@ -287,7 +279,7 @@ def _driven(raw: mujoco.MjModel) -> np.ndarray:
 @pytest.mark.parametrize("name", COMPILED_ANEW)
 def test_what_is_compiled_anew_moves_as_the_left_to_the_last_bit(name: str, tmp_path: Path) -> None:
     left, right = _models(tmp_path, COMPILED_ANEW[name].applied(RICH))
-    found = causes(_listed(left, right))
+    found = causes(differences_of(left, right, match_models(left, right)))
     assert not any(cause.refused for cause in found)
     edits = tuple(edit for cause in found for edit in cause.edits(1))
     spec_edits = tuple(edit for cause in found for edit in cause.spec_edits(1))
@@ -314,11 +306,12 @@ PAIR = """<mujoco><compiler angle="radian"/><option gravity="3 0 -9.81"/><worldb
 </worldbody><equality><joint {}/></equality></mujoco>"""
 
 
-def _couplings(folder: Path, left: str, right: str) -> tuple[sm.Model, sm.Model]:
+def _couplings(left: str, right: str) -> tuple[str, str]:
     """Return PAIR with b coupled to a by these coefficients, and with a coupled to b."""
-    texts = _polycoef("a", "b", left), _polycoef("b", "a", right)
-    left_text, right_text = (PAIR.format(text) for text in texts)
-    return model_of(folder, left_text, "left.xml"), model_of(folder, right_text, "right.xml")
+    return (
+        PAIR.format(_polycoef("a", "b", left)),
+        PAIR.format(_polycoef("b", "a", right)),
+    )
 
 
 # Coefficients of b by a, of a by b, and what is listed. With a factor other than 1 MuJoCo softens
@@ -333,17 +326,17 @@ COUPLINGS = {
 @pytest.mark.parametrize("case", COUPLINGS)
 def test_what_is_listed_of_a_coupling_said_the_other_way_round(case: str, tmp_path: Path) -> None:
     left, right, listed = COUPLINGS[case]
-    models = _couplings(tmp_path, left, right)
-    assert [row.subject for row in _listed(*models)] == listed
+    rows = causes_of_texts(tmp_path, *_couplings(left, right))
+    assert [row.subject for row in rows] == listed
 
 
 @pytest.mark.parametrize("case", COUPLINGS)
-def test_a_coupling_that_is_listed_moves_otherwise(case: str, tmp_path: Path) -> None:
+def test_a_coupling_that_is_listed_moves_otherwise(case: str) -> None:
     left, right, listed = COUPLINGS[case]
-    models = _couplings(tmp_path, left, right)
     ends = []
-    for model in models:
-        data = mujoco.MjData(model.compiled)
-        mujoco.mj_step(model.compiled, data, 500)
+    for text in _couplings(left, right):
+        raw = mujoco.MjModel.from_xml_string(text)
+        data = mujoco.MjData(raw)
+        mujoco.mj_step(raw, data, 500)
         ends.append(np.array(data.qpos))
     assert np.allclose(*ends, rtol=0, atol=1e-9) is not bool(listed)

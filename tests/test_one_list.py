@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
-from statemachine.lab.model_differences import ListedDifference, compare
-
 from .support.claims import assert_has
 from .support.explained import ALONE, ARM, Case, changed
-from .support.files import written_all
 from .support.processes import Cli
-
-
-def _listed(folder: Path, right: str, left: str = ARM) -> list[ListedDifference]:
-    written_all(folder, {"left.xml": left, "right.xml": right})
-    rows = compare(folder / "left.xml", folder / "right.xml").differences
-    return [row for row in rows if row.matters]
+from .support.two_files import differences_that_matter, written_sides
 
 
 @pytest.mark.parametrize("name", [name for name in ALONE if name != "start"])
 def test_each_difference_is_told_once_by_the_name_of_its_cause(name, tmp_path):
     case = ALONE[name]
-    rows = _listed(tmp_path, changed(ARM, case))
+    rows = differences_that_matter(tmp_path, ARM, changed(ARM, case))
     assert {row.cause for row in rows} == {case.cause}
     figures = [row.quantity for row in rows]
     # A medium has a density and a viscosity, a filter two masks; a box has other sizes than a
@@ -37,7 +28,7 @@ def test_each_difference_is_told_once_by_the_name_of_its_cause(name, tmp_path):
 def test_the_words_are_those_of_two_sides(here: Cli, tmp_path):
     right = ARM.replace('"elbow"', '"e"').replace('name="shoulder"', 'name="s"')
     right = right.replace('joint="shoulder"', 'joint="s"')
-    _listed(tmp_path, changed(right, Case('range="-2 2"', 'range="-2 0.4"', "")))
+    written_sides(tmp_path, ARM, changed(right, Case('range="-2 2"', 'range="-2 0.4"', "")))
     words = ("left.xml", "right.xml", "--map", "elbow=e", "--map", "shoulder=s", "--json")
     found = json.loads(here("compare", "--models", *words).stdout)["differences"]
     assert [row["cause"] for row in found] == ["range of shoulder"]
@@ -71,7 +62,7 @@ _ELBOW_DRIVE = '<position name="elbow" joint="elbow" kp="20" kv="1"/>'
     ],
 )
 def test_a_row_names_what_differs_and_never_two_equal_values(left, right, figure, values, tmp_path):
-    rows = _listed(tmp_path, ARM.replace(*right), ARM.replace(*left))
+    rows = differences_that_matter(tmp_path, ARM.replace(*left), ARM.replace(*right))
     assert (figure, values) in [(row.quantity, (row.left, row.right)) for row in rows]
     assert all(row.left != row.right for row in rows)
 
@@ -82,7 +73,9 @@ def test_what_is_carried_by_another_part_cannot_be_brought_over(tmp_path):
     ball = ARM[start:end].replace('<freejoint name="ball"/>', '<joint name="ball" axis="0 1 0"/>')
     left = (ARM[:start] + ball + ARM[end:]).replace("0.6 0 0.2 1 0 0 0", "0")
     right = left.replace(ball, "").replace('<site name="tip"', f'{ball}<site name="tip"')
-    (row,) = [row for row in _listed(tmp_path, right, left) if row.quantity == "parent"]
+    (row,) = [
+        row for row in differences_that_matter(tmp_path, left, right) if row.quantity == "parent"
+    ]
     assert_has(
         row,
         left="world",
@@ -99,7 +92,7 @@ def test_a_part_that_is_cut_otherwise_tells_each_figure(tmp_path):
     left = '<body name="p" pos="0.1 0 0">' + piece.format("0.1")
     right = '<body name="q" pos="0.2 0 0">' + piece.format("0.1")
     texts = [ARM.replace(inertial, f"{inertial}{body}") for body in (left, right)]
-    rows = {row.subject: row for row in _listed(tmp_path, texts[1], texts[0])}
+    rows = {row.subject: row for row in differences_that_matter(tmp_path, *texts)}
     assert rows.keys() == {"centre of mass", "inertia"}
     assert rows["centre of mass"].size == pytest.approx(0.1 * 0.1 / 0.4)
     assert {row.cause for row in rows.values()} == {"centre of mass of lower"}

@@ -23,6 +23,7 @@ from statemachine.show.blocks import Code, Page, Table
 
 from .support.claims import assert_has, refused
 from .support.pages import blocks, shown
+from .support.requirements import need_engine
 from .support.small_models import LINKS_AND_BALL, TWO_LINKS, model_of
 
 CHANGES = {
@@ -173,22 +174,39 @@ def test_models_without_a_common_joint_are_refused(tmp_path: Path) -> None:
     refused((BadInputError, "no joint in common", lambda: stepped(tmp_path, "<mujoco/>")))
 
 
-@pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("order", [("mujoco", "pybullet"), ("pybullet", "mujoco")])
-def test_the_engines_are_alike_until_something_touches(order: tuple[str, str]) -> None:
+@pytest.fixture(
+    scope="module",
+    params=[("mujoco", "pybullet"), ("pybullet", "mujoco")],
+    ids=lambda order: " and ".join(order),
+)
+def engines(request: pytest.FixtureRequest) -> Any:
+    """Return one step of hold on both engines; the first of them leads."""
+    need_engine("pybullet")
     hold = scenario("hold")
-    one, two = (sm.load(hold.model, backend=name) for name in order)
-    found: Any = one_step(rerun_of(hold, one, seconds=0.5), two)
-    # PyBullet pushes when the stud is 0.7 mm above the floor; where it touches, it is as deep.
-    assert first(found) == "contact force"
-    assert gap_of(found, "contacts found").worst < 1e-6
-    assert found.first.first == pytest.approx(0.27, abs=0.011)
-    assert "gripper on floor" in found.first.where
-    # Before, all is rounding, mass matrices that each engine computes itself included.
-    began = found.first.first or 0.0
-    assert all((gap.first or 1.0) >= began for gap in found.stages)
-    assert {gap.stage for gap in found.stages if gap.is_available} == set(STAGES)
-    assert any("by construction" in note for note in found.notes)
+    one, two = (sm.load(hold.model, backend=name) for name in request.param)
+    return one_step(rerun_of(hold, one, seconds=0.5), two)
+
+
+def test_the_engines_differ_first_in_the_force_of_the_gripper_on_the_floor(engines: Any) -> None:
+    """PyBullet pushes when the stud is 0.7 mm above the floor."""
+    assert first(engines) == "contact force"
+    assert engines.first.first == pytest.approx(0.27, abs=0.011)
+    assert "gripper on floor" in engines.first.where
+
+
+def test_the_engines_see_a_contact_in_the_same_depth(engines: Any) -> None:
+    assert gap_of(engines, "contacts found").worst < 1e-6
+
+
+def test_before_the_first_touch_all_stages_of_the_engines_are_alike(engines: Any) -> None:
+    """But for rounding, mass matrices that each engine computes itself included."""
+    began = engines.first.first or 0.0
+    assert all((gap.first or 1.0) >= began for gap in engines.stages)
+
+
+def test_all_stages_of_the_engines_are_compared(engines: Any) -> None:
+    assert {gap.stage for gap in engines.stages if gap.is_available} == set(STAGES)
+    assert any("by construction" in note for note in engines.notes)
 
 
 @pytest.mark.usefixtures("bullet")
@@ -216,7 +234,9 @@ def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
 
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("order", [("mujoco", "pybullet"), ("pybullet", "mujoco")])
-def test_activations_are_given_on(order: tuple[str, str], tmp_path: Path) -> None:
+def test_one_step_starts_the_second_file_with_the_activations_of_the_first(
+    order: tuple[str, str], tmp_path: Path
+) -> None:
     """They act on; the second file has its actuators in another order, one of another kind."""
     drives = [
         '<general name="a" joint="shoulder" dyntype="filter" dynprm="0.2" gainprm="3"/>',

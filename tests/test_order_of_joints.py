@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
 
-from statemachine import load
-from statemachine.engines.records import ModelDifference
-from statemachine.lab.compare.matching import match_models
-from statemachine.lab.model_differences import ListedDifference, ModelsComparison, compare
+from statemachine.lab.model_differences import ListedDifference, ModelsComparison
 from statemachine.lab.runs.scenarios import SCENARIOS
-from statemachine.lab.why.causes import differences_of
 
 from .support.explained import explained
 from .support.files import written
 from .support.processes import Cli
+from .support.two_files import causes_of_texts, compared_texts
 
 X_HINGE = '<joint name="a" axis="1 0 0"/>'
 Y_HINGE = '<joint name="b" axis="0 1 0"/>'
@@ -40,10 +35,6 @@ def _model(joints: tuple[str, ...], child: str = "", actuators: str = "") -> str
     body = f'<body name="p">{"".join(joints)}{shape}{child}</body>'
     world = f"<worldbody>{body}</worldbody>"
     return f"<mujoco>{world}<actuator>{actuators}</actuator></mujoco>"
-
-
-def _compared(folder: Path, left: str, right: str) -> ModelsComparison:
-    return compare(written(folder / "left.xml", left), written(folder / "right.xml", right))
 
 
 def _orders(comparison: ModelsComparison) -> list[ListedDifference]:
@@ -92,7 +83,7 @@ def _largest_gap_of_poses(left: str, right: str) -> float:
 def test_an_order_of_joints_is_told_where_mujoco_moves_the_body_otherwise(tmp_path, joints, order):
     left, right = _model(joints), _model(tuple(joints[k] for k in order))
     moves_otherwise = _largest_gap_of_poses(left, right) > 1e-9
-    comparison = _compared(tmp_path, left, right)
+    comparison = compared_texts(tmp_path, left, right)
     assert bool(_orders(comparison)) == moves_otherwise
     gap = comparison.posed
     assert (max(gap.distance, gap.angle) > 1e-6) == moves_otherwise
@@ -100,7 +91,7 @@ def test_an_order_of_joints_is_told_where_mujoco_moves_the_body_otherwise(tmp_pa
 
 def test_the_row_says_which_joint_hangs_on_which(tmp_path):
     left, right = _model((X_HINGE, Y_HINGE)), _model((Y_HINGE, X_HINGE))
-    (row,) = _orders(_compared(tmp_path, left, right))
+    (row,) = _orders(compared_texts(tmp_path, left, right))
     assert (row.subject, row.element, row.matters) == ("structure", "b", True)
     assert (row.left, row.right) == ("b hangs on a", "a hangs on b")
     assert row.cause == "order of the joints a, b of p"
@@ -109,7 +100,7 @@ def test_the_row_says_which_joint_hangs_on_which(tmp_path):
 def test_only_the_joints_that_changed_places_are_told(tmp_path):
     left = _model((X_HINGE, Y_HINGE, Z_HINGE))
     right = _model((X_HINGE, Z_HINGE, Y_HINGE))
-    (row,) = _orders(_compared(tmp_path, left, right))
+    (row,) = _orders(compared_texts(tmp_path, left, right))
     assert (row.left, row.right) == ("c hangs on b", "b hangs on c")
 
 
@@ -123,7 +114,7 @@ def test_files_whose_joints_come_in_another_order_differ(here: Cli, tmp_path):
 def test_what_hangs_on_the_body_still_hangs_on_it(tmp_path, wrist):
     left = _model((X_HINGE, Y_HINGE), CHILD)
     right = _model((Y_HINGE, X_HINGE), CHILD.replace("wrist", wrist))
-    comparison = _compared(tmp_path, left, right)
+    comparison = compared_texts(tmp_path, left, right)
     causes = {row.cause for row in comparison.differences if row.cause}
     assert causes == {"order of the joints a, b of p"}
 
@@ -165,14 +156,6 @@ def _motion(text: str) -> np.ndarray:
     return np.array(rows)
 
 
-def _rows(folder: Path, left: str, right: str) -> tuple[ModelDifference, ...]:
-    models = [
-        load(written(folder / f"{side}.xml", text))
-        for side, text in (("left", left), ("right", right))
-    ]
-    return differences_of(models[0], models[1], match_models(models[0], models[1]))
-
-
 @pytest.mark.parametrize(("joint", "name"), [(X_HINGE, "a"), (X_SLIDE, "f"), (BALL, "q")])
 def test_a_motor_in_the_parents_frame_differs_only_where_mujoco_moves_otherwise(
     tmp_path, joint, name
@@ -180,5 +163,5 @@ def test_a_motor_in_the_parents_frame_differs_only_where_mujoco_moves_otherwise(
     left, right = (_motor(joint, name, reference) for reference in ("joint", "jointinparent"))
     is_one_motion = bool((_motion(left) == _motion(right)).all())
     assert is_one_motion == (joint != BALL)
-    titles = [row.title for row in _rows(tmp_path, left, right)]
+    titles = [row.title for row in causes_of_texts(tmp_path, left, right)]
     assert titles == ([] if is_one_motion else ["transmission of m"])

@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 import zipfile
 from pathlib import Path
 
@@ -15,9 +14,8 @@ import pytest
 from statemachine import __version__
 
 from .support.claims import assert_in
+from .support.project import makefile_text, project_table
 from .support.requirements import ROOT
-
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
 def _run(*command: str | Path, cwd: Path) -> str:
@@ -95,7 +93,8 @@ def test_the_installed_wheel_runs_a_lesson_from_another_folder(wheel: Path, tmp_
 def test_constraints_pin_every_dependency_without_addresses() -> None:
     text = (ROOT / "constraints.txt").read_text()
     assert "://" not in text
-    asked = PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()
+    project = project_table()
+    asked = project["dependencies"], *project["optional-dependencies"].values()
     names = {re.split(r"[\[><=;\s]", line)[0].lower() for lines in asked for line in lines}
     assert names - {"statemachine-sim"} <= set(re.findall(r"^(\S+?)==", text, re.MULTILINE))
 
@@ -124,7 +123,7 @@ def test_no_machine_path_and_no_address_is_committed() -> None:
 
 
 def test_every_target_of_the_makefile_that_is_documented_exists() -> None:
-    text = (ROOT / "Makefile").read_text()
+    text = makefile_text()
     targets = set(" ".join(re.findall(r"^([a-z][a-z -]*):", text, re.MULTILINE)).split())
     assert {"lesson", "test", "check", "bench", "test-slow", "test-newest", "picture"} <= targets
     assert set(re.findall(r"^# make ([a-z-]+)", text, re.MULTILINE)) <= targets

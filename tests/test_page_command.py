@@ -62,21 +62,28 @@ def typed_anew(
     return type_anew
 
 
+def compare_request(options: argparse.Namespace) -> CompareRequest:
+    """Return the request of a command for a gap."""
+    request = request_of(options)
+    assert isinstance(request, CompareRequest)
+    return request
+
+
 def test_what_is_typed_anew_has_the_same_tolerances(typed_anew) -> None:
-    assert request_of(typed_anew(EXACT)).tolerances == pytest.approx(TOLERANCES)
+    assert compare_request(typed_anew(EXACT)).tolerances == pytest.approx(TOLERANCES)
 
 
 @pytest.mark.parametrize("name", UNCERTAINTIES)
 def test_what_is_typed_anew_has_the_same_uncertainty(typed_anew, name: str) -> None:
     uncertainty = UNCERTAINTIES[name]
-    again = request_of(typed_anew(uncertainty)).uncertainty
+    again = compare_request(typed_anew(uncertainty)).uncertainty
     assert (again is None) is (uncertainty is None)
     if uncertainty is not None:
         assert vars(again) == pytest.approx(vars(uncertainty))
 
 
 def test_what_is_typed_anew_runs_the_same_sides(typed_anew, run: Request) -> None:
-    again = request_of(typed_anew(EXACT)).run
+    again = compare_request(typed_anew(EXACT)).run
     assert [side.options for side in again.sides] == [side.options for side in run.sides]
     assert [side.engine for side in again.sides] == ["mujoco", "pybullet"]
     assert (again.names, again.seconds) == (run.names, run.seconds)
@@ -84,7 +91,7 @@ def test_what_is_typed_anew_runs_the_same_sides(typed_anew, run: Request) -> Non
 
 def test_what_is_typed_anew_asks_for_the_causes_of_the_same_quantity(typed_anew) -> None:
     options = typed_anew(EXACT)
-    assert explain_request_of(options, request_of(options).run).quantity == "ball"
+    assert explain_request_of(options, compare_request(options).run).quantity == "ball"
 
 
 def test_what_is_typed_anew_writes_the_same_page(typed_anew) -> None:

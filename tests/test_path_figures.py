@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -40,7 +41,7 @@ def test_another_library_computes_the_same_fingertip() -> None:
     assert found.witness.fingertip == pytest.approx(found.second, abs=1e-12)
 
 
-def test_what_the_servos_exert() -> None:
+def test_what_the_servos_exert_is_what_plain_mujoco_gives() -> None:
     torques = lesson_result("hold", sm.load("so101/scene")).torques
     model, data = _raw("scene")
     data.ctrl[:] = _HOLD
@@ -165,7 +166,7 @@ def test_the_time_in_sleep_is_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None
     assert found.waited <= found.paced
 
 
-def test_time_is_a_sum() -> None:
+def test_the_time_of_the_lesson_is_a_sum_of_timesteps() -> None:
     found = lesson_result("time", sm.load("so101/scene_box"), steps=400)
     model, data = _raw("scene_box")
     for _ in range(400):
@@ -174,18 +175,33 @@ def test_time_is_a_sum() -> None:
     assert (found.passed, found.moved, found.exact, found.identical) == (0, False, True, True)
 
 
-def test_the_summary_shows_what_each_lesson_did() -> None:
-    found = lesson_result("summary", sm.load("so101/scene_box"))
+@pytest.fixture(scope="module")
+def summary() -> Any:
+    """Return the result of the summary on the arm with a box."""
+    return lesson_result("summary", sm.load("so101/scene_box"))
+
+
+def test_the_summary_has_a_line_for_each_lesson_of_the_path(summary: Any) -> None:
+    path = "nowhere objects state forward hold gravity reset replay time"
+    assert list(summary.lines) == path.split()
+
+
+def test_how_far_the_arm_sags_in_the_summary_is_what_plain_mujoco_gives(summary: Any) -> None:
     model, data = _raw("scene_box")
     mujoco.mj_step(model, data, 100)
-    assert found.sagged == data.qpos[1]
-    assert (found.nq, found.nv) == (model.nq, model.nv) == (13, 12)
-    assert found.restart == model.key_time[0] == 6.0
-    path = "nowhere objects state forward hold gravity reset replay time"
-    assert list(found.lines) == path.split()
-    assert found.lines["gravity"].startswith(f"{np.degrees(data.qpos[1]):.3f} degrees")
-    assert found.same
-    assert set(found.changed) <= {"time"}
+    assert summary.sagged == data.qpos[1]
+    assert summary.lines["gravity"].startswith(f"{np.degrees(data.qpos[1]):.3f}")
+
+
+def test_the_sizes_and_the_restart_of_the_summary_are_those_of_the_model(summary: Any) -> None:
+    model, _ = _raw("scene_box")
+    assert (summary.nq, summary.nv) == (model.nq, model.nv) == (13, 12)
+    assert summary.restart == model.key_time[0] == 6.0
+
+
+def test_the_replay_of_the_summary_is_the_same_run(summary: Any) -> None:
+    assert summary.same
+    assert set(summary.changed_lines) <= {"time"}
 
 
 def test_what_is_slow_to_load_is_counted() -> None:

@@ -260,7 +260,7 @@ def film(sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer, tmp_
     )
 
 
-def test_webp(film: Any, pillow: Any) -> None:
+def test_a_film_is_a_webp_with_its_pictures_and_their_lengths(film: Any, pillow: Any) -> None:
     from PIL import ImageSequence
 
     told: list[float] = []
@@ -476,7 +476,9 @@ def test_a_png_is_a_picture_with_both_sides_in_it(
         assert (np.abs(pixels - colour).max(axis=2) < 12).sum() > 500
 
 
-def test_who_touches_when(compared: tuple[Trace, Trace, Any]) -> None:
+def test_a_figure_has_the_spans_in_which_each_side_touches(
+    compared: tuple[Trace, Trace, Any],
+) -> None:
     *traces, found = compared
     sides = of_comparison(found).touches["gripper on floor"]
     for spans, trace in zip(sides, traces, strict=True):
@@ -509,6 +511,8 @@ def test_nothing_is_cut_off_at_the_edges(
 
 
 @pytest.mark.usefixtures("matplotlib")
-def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
+def test_the_figure_of_one_trace_names_its_joints_and_its_command(
+    compared: tuple[Trace, Trace, Any],
+) -> None:
     text = _texts(drawn(of_trace(compared[1]), "svg"))
     assert_in(text, compared[1].header.label, *compared[1].header.joints, "the command", "energy")

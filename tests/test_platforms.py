@@ -7,7 +7,6 @@ import json
 import os
 import platform as machine
 import re
-import tomllib
 from collections.abc import Iterable
 from itertools import product
 from pathlib import Path
@@ -26,10 +25,9 @@ from statemachine.installed import ENGINES, engine_version
 from .support.claims import assert_in, refused
 from .support.files import distribution
 from .support.processes import Cli, of_python
+from .support.project import pinned_lines, project_table
 from .support.requirements import ROOT
 
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] != "#"]
 NAMES = {"mujoco", "pybullet", "pybullet-arm64", "pin"}
 
 LINUX, LINUX_ARM = "x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"
@@ -87,10 +85,10 @@ def versions(platform: str, python: str) -> dict[str, str]:
 
 @pytest.mark.parametrize(("platform", "python"), PLATFORMS)
 def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -> None:
-    found = asked(platform, python, PROJECT["dependencies"])
+    found = asked(platform, python, project_table()["dependencies"])
     wanted = versions(platform, python)
     assert set(found) & NAMES == {"mujoco", *wanted}
-    pinned = asked(platform, python, PINS)
+    pinned = asked(platform, python, pinned_lines())
     for name, version in wanted.items():
         assert version in str(pinned[name].specifier)
         assert pinned[name].specifier.contains(version or "4.1.0")
@@ -102,7 +100,7 @@ def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -
 def test_what_the_engines_say_to_install_is_what_the_markers_take(
     platform: str, minor: int
 ) -> None:
-    found = asked(platform, f"3.{minor}", PROJECT["dependencies"])
+    found = asked(platform, f"3.{minor}", project_table()["dependencies"])
     for engine in ENGINES.values():
         said = [wheel for wheel in engine.wheels if wheel.fits(*_machine(platform), minor)]
         assert {wheel.distribution for wheel in said} == set(found) & set(engine.distributions)
@@ -221,7 +219,7 @@ def test_each_machine_requires_the_engines_that_it_gets(job: dict[str, Any]) -> 
     assert set(required) == set(matrix["os"]) == set(RUNNERS)
     assert matrix["python"] == ["3.11", "3.12", "3.13"]
     for runner, python in product(matrix["os"], matrix["python"]):
-        installed = asked(RUNNERS[runner], python, PROJECT["dependencies"])
+        installed = asked(RUNNERS[runner], python, project_table()["dependencies"])
         engines = {name for name, e in ENGINES.items() if installed.keys() & set(e.distributions)}
         assert required[runner] - {"render", "browser"} == engines, (runner, python)
     assert job["env"]["STATEMACHINE_REQUIRE"] == "${{ matrix.require }}"

@@ -64,7 +64,7 @@ def mjcf(folder: Path, inside: str, name: str = "m.xml") -> Path:
         (False, (0.0,) * 6, 40, "golden_gravity_off", 1e-4),  # 8e-7 was measured
     ],
 )
-def test_until_the_first_contact(
+def test_until_the_first_contact_it_moves_as_the_golden_run(
     golden: Golden, actuation: bool, ctrl: tuple[float, ...], steps: int, table: str, most: float
 ) -> None:
     with opened(load("so101/scene", actuation=actuation), ctrl=ctrl) as (model, data):
@@ -283,7 +283,7 @@ except sm.errors.StateMachineError as error:
 _as_it_comes = partial(load, "so101/scene", defaults="engine")
 
 
-def test_engine_frictions_are_pybullets() -> None:
+def test_frictions_of_the_engine_as_it_comes_are_pybullet_s() -> None:
     """The rest of what it comes with shows bit for bit in the run of a script of its own."""
     from statemachine.backends.bullet.client import pb
 

@@ -207,7 +207,7 @@ def test_trees_that_are_tied_move_as_on_mujoco(tmp_path: Path, tie: str, integra
             assert np.abs(ours - theirs).max() < 1e-5 * max(1.0, np.abs(theirs).max()), name
 
 
-def test_the_tie_is_felt(tmp_path: Path) -> None:
+def test_without_its_coupling_a_finger_falls_alone(tmp_path: Path) -> None:
     """A test of the tests above: without the coupling the right finger falls alone."""
     world, rest = TIED["mimic"]
     ends = []

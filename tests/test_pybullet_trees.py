@@ -115,7 +115,7 @@ def test_a_tree_moves_as_on_mujoco(tmp_path: Path, tie: str, base: str, integrat
 
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("tie", ["weld", "mocap first"])
-def test_a_mocap_body_leads(tmp_path: Path, tie: str, base: str) -> None:
+def test_a_mocap_body_leads_as_on_mujoco(tmp_path: Path, tie: str, base: str) -> None:
     """From where a keyframe has it; what is written acts, and is in a State and in worlds."""
     key = '<keyframe><key mpos=".4 .4 1.1" mquat="1 .2 .2 .1"/></keyframe>'
     world, runs, states = TREE.format(base=BASES[base]), [], []
@@ -212,7 +212,9 @@ def test_what_acts_on_each_body(tmp_path: Path, medium: str, base: str) -> None:
 @pytest.mark.filterwarnings(
     "ignore:.*settotalmass. is deprecated:statemachine.errors.EngineWarning"
 )
-def test_a_tree_of_milligrams(tmp_path: Path, base: str) -> None:
+def test_the_mass_of_a_base_does_not_count_in_a_tree_of_milligrams(
+    tmp_path: Path, base: str
+) -> None:
     """What the engine's base weighs does not count, whatever the tree weighs."""
     laws = r'(armature|damping|stiffness|frictionloss)="[^"]*"'
     world = re.sub(laws, "", TREE.format(base=BASES[base]))

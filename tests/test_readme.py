@@ -74,7 +74,7 @@ SAYS_NO = (
 DIFFERS = re.compile(r"statemachine compare (hold(?!.*--why)|models/(?!.*--why)|--models)")
 
 
-def test_there_are_commands() -> None:
+def test_commands_and_outputs_of_the_guides_are_found() -> None:
     assert len(COMMANDS) >= 40
     assert set(SAYS_NO) <= set(COMMANDS)
     assert len(SHOWN) == sum(len(blocks(page, "text")) for page in PAGES.values()) >= 5
@@ -92,7 +92,7 @@ def test_readme_and_guides_are_short() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command(
+def test_a_command_of_the_guides_ends_as_it_should(
     here: Cli, cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
     words = shlex.split(command)[1:]
@@ -181,7 +181,7 @@ def test_times_of_the_readme_are_those_of_the_model(mujoco_box: Model) -> None:
     assert int(begin) + int(steps) * int(timestep) / 1000 == pytest.approx(float(end))
 
 
-def test_python_block(tmp_path: Path) -> None:
+def test_the_code_of_the_readme_prints_what_it_says(tmp_path: Path) -> None:
     out = of_python("-c", PYTHON["README.md"], folder=tmp_path, code=0).stdout
     (time,) = re.findall(r"It prints (\d+\.\d+)", README)
     assert out.startswith(f"{time} ")
@@ -249,7 +249,7 @@ def test_the_output_that_is_shown(cli: Cli, words: list[str], shown: str) -> Non
     assert shown in cli(*words).stdout
 
 
-def test_what_is_counted() -> None:
+def test_counts_in_the_guides_are_those_of_the_package() -> None:
     names = "one two three four five six seven eight nine ten eleven twelve thirteen fourteen"
     word = dict(enumerate(names.split(), start=1))
     counted = {

@@ -15,7 +15,6 @@ from .support.files import distribution, written_all
 from .support.processes import of_python
 from .support.requirements import ROOT, need_engine
 
-RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in _KINDS": how the line of the file begins after which its lines go.
 PLACES = {
     "statemachine/course/lessons/__init__.py, in _LESSONS": "_LESSONS = (",
@@ -28,7 +27,8 @@ PLACES = {
 
 def recipe(title: str) -> str:
     """Return one section of CONTRIBUTING."""
-    return RECIPES.split(f"## {title}\n")[1].split("\n## ")[0]
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    return text.split(f"## {title}\n")[1].split("\n## ")[0]
 
 
 def code(text: str, kinds: str = "python|markdown") -> list[str]:
@@ -80,7 +80,7 @@ def copy(tmp_path: Path) -> Copy:
 
 
 @pytest.mark.slow
-def test_a_lesson(copy: Copy) -> None:
+def test_the_recipe_for_a_lesson_gives_a_lesson(copy: Copy) -> None:
     copy.follow("Add a lesson")
     assert 0 < json.loads(copy.run("lesson", "coast", "--json"))["mujoco"]["angle"] < 1
     assert "A push and nothing else" in copy.run("lesson", "--help")
@@ -92,7 +92,7 @@ def test_a_lesson(copy: Copy) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
-def test_a_quantity(copy: Copy) -> None:
+def test_the_recipe_for_a_quantity_gives_a_compared_quantity(copy: Copy) -> None:
     copy.follow("Add a compared quantity")
     assert_in(copy.run("compare", "hold", "--seconds", "0.5", code=1), "rad/s", "gripper speed")
     given = ("--tolerance", "joint-speed=100rad/s", "--json", "--html", "hold.html")
@@ -104,7 +104,7 @@ def test_a_quantity(copy: Copy) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
-def test_a_convention(copy: Copy) -> None:
+def test_the_recipe_for_a_convention_gives_a_question(copy: Copy) -> None:
     copy.follow("Add a convention")
     found = copy.run("conventions", "precision")
     assert "How precisely does the engine keep a position?" in found
@@ -112,7 +112,7 @@ def test_a_convention(copy: Copy) -> None:
 
 
 @pytest.mark.slow
-def test_a_backend(copy: Copy) -> None:
+def test_the_recipe_for_a_backend_gives_one_that_keeps_the_contract(copy: Copy) -> None:
     text = (ROOT / "tests" / "support" / "hidden_world.py").read_text()
     backend = text.replace('backend="hidden"', 'backend="mine"')
     package = written_all(copy.folder / "my_package", {"backend.py": backend, "__init__.py": ""})
@@ -133,7 +133,7 @@ def test_a_backend(copy: Copy) -> None:
 
 
 @pytest.mark.slow
-def test_the_first_hour(copy: Copy) -> None:
+def test_the_change_of_the_first_hour_passes_its_test(copy: Copy) -> None:
     copy.follow("A first hour")
     here = {"PYTHONPATH": str(copy.folder)}
     of_python("-m", "pytest", "-q", "tests/test_micrometres.py", folder=copy.folder, code=0, **here)

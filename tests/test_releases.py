@@ -87,7 +87,9 @@ def test_what_is_not_here_is_one_line(name: str, error: type[Exception], says: s
     refused((error, says, lambda: sm.load("so101", backend=name)))
 
 
-def test_commands_without_any(nothing: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_exit_codes_of_commands_without_any_release(
+    nothing: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     asked = {
         "engines": 0,
         "engines --json": 0,
@@ -501,7 +503,7 @@ class TestReleases:
         # What is there is counted, too.
         assert resident_memory() > 1e6 * memory_of(os.getpid()) + sizes[2] / 2
 
-    def test_worlds_of_it(self) -> None:
+    def test_worlds_of_a_release_are_its_data(self) -> None:
         model = sm.load("so101", backend=OLD)
         with make_worlds(model, 3, workers=2) as worlds:
             worlds.ctrl[:] = HOLD

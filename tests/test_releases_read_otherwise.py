@@ -89,7 +89,7 @@ def test_it_moves_as_plain_mujoco_of_that_release(gripper: Path) -> None:
     assert np.abs(ours - installed).max() > 0.1, "the coupling is felt"
 
 
-def test_an_edit_reaches_it(gripper: Path) -> None:
+def test_an_edit_reaches_the_model_that_the_release_reads(gripper: Path) -> None:
     """By the fields of what the release reads, not of what the installed one does."""
     with warnings.catch_warnings(action="ignore", category=EngineWarning):
         model = sm.load(gripper, backend=OLD)
@@ -122,7 +122,9 @@ def test_nothing_is_said_of_two_releases_that_read_alike(
     assert pair.comparison.notes == ()
 
 
-def test_models_list_it(gripper: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_compare_models_lists_what_a_release_reads_otherwise(
+    gripper: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     sides = (f"{gripper}@{OLD}", f"{gripper}@mujoco")
     assert main(["compare", "--models", *sides, "--json"]) == SAYS_NO
     found = json.loads(capsys.readouterr().out)

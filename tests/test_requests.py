@@ -38,47 +38,50 @@ from .support.processes import of_python
 HOLD = Request(("hold",))
 FINE = Side("so101", options={"timestep": 0.002})
 TWO_SIDES = Request(("hold",), sides=(FINE, Side("so101", "pybullet")))
-TYPED = [
-    ("conventions gravity", ConventionsRequest(("gravity",))),
-    ("conventions --calls --backend mujoco", CallsRequest(("mujoco",))),
-    ("robots models --seconds 5 --quick", RobotsRequest(("models",), seconds=5.0, quick=True)),
-    ("fingertip --poses 20 --seed 3", FingertipRequest(poses=20, seed=3)),
-    ("engines", ReleasesRequest()),
-    ("check step_loop.py --time-limit 2", CheckRequest("step_loop.py", time_limit=2.0)),
+TYPED: list[tuple[str, Callable[[], object]]] = [
+    ("conventions gravity", lambda: ConventionsRequest(("gravity",))),
+    ("conventions --calls --backend mujoco", lambda: CallsRequest(("mujoco",))),
+    (
+        "robots models --seconds 5 --quick",
+        lambda: RobotsRequest(("models",), seconds=5.0, quick=True),
+    ),
+    ("fingertip --poses 20 --seed 3", lambda: FingertipRequest(poses=20, seed=3)),
+    ("engines", lambda: ReleasesRequest()),
+    ("check step_loop.py --time-limit 2", lambda: CheckRequest("step_loop.py", time_limit=2.0)),
     (
         "lesson hold --seconds 0.3",
-        LessonRequest(
+        lambda: LessonRequest(
             "hold", "so101/scene", options={"seconds": 0.3, "ctrl": None, "further": False}
         ),
     ),
     (
         "sweep hold --vary kp=1,2 --out d --jobs 2",
-        SweepRequest(Sweep("hold", ["kp=1,2"]), "d", jobs=2),
+        lambda: SweepRequest(Sweep("hold", ["kp=1,2"]), "d", jobs=2),
     ),
-    ("view --keyframe held", SimulationRequest(keyframe="held")),
-    ("view a.npz b.npz so101", RecordingRequest(("a.npz", "b.npz"), "so101")),
-    ("compare hold", CompareRequest(HOLD)),
-    ("compare hold --tolerance tip=2mm", CompareRequest(HOLD, {"tip": 0.002})),
-    ("compare hold --no-chaos", CompareRequest(HOLD, uncertainty=None)),
-    ("compare hold --why --time-limit 7", ExplainRequest(HOLD, time_limit=7.0)),
-    ("compare hold --one-step", OneStepRequest(HOLD)),
-    ("compare hold --converge", ConvergeRequest(HOLD)),
-    ("compare hold --versions 3.3.7", VersionsRequest(HOLD, "3.3.7")),
-    ("compare --models so101 so101/scene", ModelsRequest(("so101", "so101/scene"))),
-    ("compare hold so101 timestep=0.002 so101@pybullet", CompareRequest(TWO_SIDES)),
+    ("view --keyframe held", lambda: SimulationRequest(keyframe="held")),
+    ("view a.npz b.npz so101", lambda: RecordingRequest(("a.npz", "b.npz"), "so101")),
+    ("compare hold", lambda: CompareRequest(HOLD)),
+    ("compare hold --tolerance tip=2mm", lambda: CompareRequest(HOLD, {"tip": 0.002})),
+    ("compare hold --no-chaos", lambda: CompareRequest(HOLD, uncertainty=None)),
+    ("compare hold --why --time-limit 7", lambda: ExplainRequest(HOLD, time_limit=7.0)),
+    ("compare hold --one-step", lambda: OneStepRequest(HOLD)),
+    ("compare hold --converge", lambda: ConvergeRequest(HOLD)),
+    ("compare hold --versions 3.3.7", lambda: VersionsRequest(HOLD, "3.3.7")),
+    ("compare --models so101 so101/scene", lambda: ModelsRequest(("so101", "so101/scene"))),
+    ("compare hold so101 timestep=0.002 so101@pybullet", lambda: CompareRequest(TWO_SIDES)),
 ]
 
 
-@pytest.mark.parametrize(("typed", "request_made"), TYPED, ids=[typed for typed, _ in TYPED])
+@pytest.mark.parametrize(("typed", "make"), TYPED, ids=[typed for typed, _ in TYPED])
 def test_what_is_typed_is_a_request(
-    typed: str, request_made: object, monkeypatch: pytest.MonkeyPatch
+    typed: str, make: Callable[[], object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("MENAGERIE", raising=False)
     words = typed.split()
     options = cli.options_of_words(words)
     command = importlib.import_module(f"statemachine.cli.{words[0]}")
     requests = importlib.import_module(command.run.__module__)
-    assert requests.request_of(options) == request_made
+    assert requests.request_of(options) == make()
 
 
 REFUSED: list[tuple[Callable[[], object], str]] = [

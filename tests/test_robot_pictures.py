@@ -48,14 +48,21 @@ def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> N
         assert cli.options_of_words(words).run
 
 
-def test_they_show_what_they_say() -> None:
+def test_the_picture_of_gravity_has_an_arm_that_sinks_and_one_that_is_held() -> None:
     lift = 1  # shoulder_lift in qpos
     limp, held = PICTURES["gravity"].poses()
     assert limp[-1, lift] > 0.4
+    assert held is not None
     assert abs(held[:, lift]).max() < 0.001
+
+
+def test_the_ghost_of_the_picture_of_forward_has_one_joint_elsewhere() -> None:
     solid, ghost = PICTURES["forward"].poses()
     assert ghost is not None
     assert (ghost - solid).tolist() == [[0, 0.8, 0, 0, 0, 0]]
+
+
+def test_the_picture_of_replay_has_two_runs_of_the_same_bits() -> None:
     one, two = PICTURES["replay"].poses()
     assert two is not None
     assert np.array_equal(one, two)

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -86,34 +86,42 @@ if "statemachine.lab.robots.examine" in " ".join(sys.orig_argv):
 """
 
 
+TEXTS = {
+    "good.xml": GOOD,
+    "arm.urdf": URDF,
+    "broken.xml": "<mujoco><worldbody><body></worldbody>",
+    "scene.xml": "<mujoco><include file='parts/hand.xml'/></mujoco>",
+    "parts/hand.xml": mjcf("<body><geom size='.1' material='m'/></body>"),
+    "parts/colours.xml": "<mujoco><asset/></mujoco>",
+    "tendon.xml": TENDON,
+    "package.xml": "<package/>",
+    "binary.mjb": "\0",
+    ".git/old.xml": GOOD,
+    "notes.txt": "none",
+}
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    texts = {
-        "good.xml": GOOD,
-        "arm.urdf": URDF,
-        "broken.xml": "<mujoco><worldbody><body></worldbody>",
-        "scene.xml": "<mujoco><include file='parts/hand.xml'/></mujoco>",
-        "parts/hand.xml": mjcf("<body><geom size='.1' material='m'/></body>"),
-        "parts/colours.xml": "<mujoco><asset/></mujoco>",
-        "tendon.xml": TENDON,
-        "package.xml": "<package/>",
-        "binary.mjb": "\0",
-        ".git/old.xml": GOOD,
-        "notes.txt": "none",
-    }
-    return written_all(tmp_path / "robots", texts)
+    """Return a folder with models, parts of models, and what is neither."""
+    return written_all(tmp_path / "robots", TEXTS)
+
+
+def sabotaged(folder: Path, patch: pytest.MonkeyPatch) -> Path:
+    """Let models of some names go wrong; return the file in which the others are noted."""
+    patch.syspath_prepend(written_all(folder / "site", {"sitecustomize.py": SABOTAGE}))
+    log = written(folder / "examined.txt", "")
+    patch.setenv("EXAMINED", str(log))
+    return log
 
 
 @pytest.fixture
 def sabotage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Let models of some names go wrong; return the file in which the others are noted."""
-    monkeypatch.syspath_prepend(written_all(tmp_path / "site", {"sitecustomize.py": SABOTAGE}))
-    log = written(tmp_path / "examined.txt", "")
-    monkeypatch.setenv("EXAMINED", str(log))
-    return log
+    return sabotaged(tmp_path, monkeypatch)
 
 
-def test_what_is_a_model(folder: Path) -> None:
+def test_models_in_a_folder_are_found_without_their_parts(folder: Path) -> None:
     found = {each.name: each for each in find([folder])}
     assert list(found) == [
         "arm.urdf", "broken.xml", "good.xml", "parts/hand.xml", "scene.xml", "tendon.xml"
@@ -202,7 +210,7 @@ def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
     assert not other.is_rounding
 
 
-def test_files_are_named_too(folder: Path) -> None:
+def test_models_are_found_by_their_files_too(folder: Path) -> None:
     good, binary = folder / "good.xml", folder / "binary.mjb"
     (folder / "empty").mkdir()
     assert [each.path for each in find([good, binary, good])] == [good, binary]
@@ -213,51 +221,109 @@ def test_files_are_named_too(folder: Path) -> None:
     )
 
 
+ENDS = {
+    "crash.xml": "it crashed the process (SIGABRT)",
+    "hang.xml": "it took longer than 40 s",
+    "memory.xml": "it asks for more memory",
+}
+
+
+@dataclass(frozen=True)
+class TwoSurveys:
+    """A survey of models of which some go wrong, and that of the same folder typed again.
+
+    Attributes:
+        first: What was found first.
+        again: What was found once one of its models had changed.
+        examined: Files that were examined for the second, in a Python that goes wrong no more.
+    """
+
+    first: Survey
+    again: Survey
+    examined: list[str]
+
+    def rows(self) -> dict[str, ExaminedModel]:
+        """Return the models of the first survey by their files."""
+        return {row.file: row for row in self.first.models}
+
+
+@pytest.fixture(scope="module")
+def surveys(tmp_path_factory: pytest.TempPathFactory) -> TwoSurveys:
+    """Return the surveys of a folder with every kind of trouble, and of what changed in it."""
+    need_engine("pybullet")
+    place = tmp_path_factory.mktemp("surveys")
+    folder = written_all(place / "robots", TEXTS | dict.fromkeys(ENDS, GOOD))
+    table = place / "table.json"
+    with pytest.MonkeyPatch.context() as patch:
+        log = sabotaged(place, patch)
+        first = examine_all(find([folder]), quick=True, seconds=40, jobs=3, table=table)
+        log.write_text("")
+        (folder / "good.xml").write_text(GOOD.replace("0.05", "0.06"))
+        again = examine_all(find([folder]), quick=True, seconds=41, jobs=3, table=table)
+        return TwoSurveys(first, again, log.read_text().split())
+
+
 @pytest.mark.slow
-@pytest.mark.usefixtures("bullet")
-def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
-    written_all(folder, dict.fromkeys(("crash.xml", "hang.xml", "memory.xml"), GOOD))
-    table = tmp_path / "table.json"
-    survey = examine_all(find([folder]), quick=True, seconds=60, jobs=3, table=table)
-    rows = {row.file: row for row in survey.models}
-    assert list(rows) == [
-        "arm.urdf", "broken.xml", "crash.xml", "good.xml", "hang.xml", "memory.xml", "scene.xml",
-        "tendon.xml",
-    ]  # fmt: skip
-    assert [row.file for row in survey.parts] == ["parts/hand.xml"]
-    assert_has(rows["good.xml"], nq=2, nv=2, nu=1, faults=())
-    mujoco, pybullet = (rows["good.xml"].backends[name] for name in ("mujoco", "pybullet"))
-    assert_has(mujoco, equals_engine=True, restores=True, scenarios={})  # quick
-    assert_has(pybullet, restores=True, equals_engine=None)
-    gap = pybullet.without_contacts
+def test_a_survey_has_a_row_for_each_model_and_counts_parts_apart(surveys: TwoSurveys) -> None:
+    whole = {"arm.urdf", "broken.xml", "good.xml", "scene.xml", "tendon.xml"}
+    assert list(surveys.rows()) == sorted(whole | set(ENDS))
+    assert [row.file for row in surveys.first.parts] == ["parts/hand.xml"]
+
+
+@pytest.mark.slow
+def test_a_row_has_the_sizes_of_its_model(surveys: TwoSurveys) -> None:
+    assert_has(surveys.rows()["good.xml"], nq=2, nv=2, nu=1, faults=())
+    assert surveys.rows()["arm.urdf"].nv == 1
+
+
+@pytest.mark.slow
+def test_a_good_model_restores_on_both_engines_and_has_mujoco_s_bits(surveys: TwoSurveys) -> None:
+    backends = surveys.rows()["good.xml"].backends
+    assert_has(backends["mujoco"], equals_engine=True, restores=True, scenarios={})  # quick
+    assert_has(backends["pybullet"], restores=True, equals_engine=None)
+
+
+@pytest.mark.slow
+def test_a_good_model_has_no_gap_without_contacts(surveys: TwoSurveys) -> None:
+    gap = surveys.rows()["good.xml"].backends["pybullet"].without_contacts
+    assert gap is not None
     assert_has(gap, hinge=pytest.approx(0, abs=1e-9), slide=None)
     assert gap.moved > 0.1
-    tendon = rows["tendon.xml"].backends
+
+
+@pytest.mark.slow
+def test_what_an_engine_lacks_is_its_refusal_alone(surveys: TwoSurveys) -> None:
+    tendon = surveys.rows()["tendon.xml"].backends
     assert tendon["pybullet"].features == ("tendon between trees",)
     assert "tendon" in tendon["pybullet"].refusal
     assert tendon["mujoco"].equals_engine
-    assert "cannot read" in rows["broken.xml"].backends["mujoco"].refusal
-    assert rows["arm.urdf"].nv == 1
-    ends = {
-        "crash.xml": "it crashed the process (SIGABRT)",
-        "hang.xml": "it took longer than 60 s",
-        "memory.xml": "it asks for more memory",
-    }
-    for name, says in ends.items():
-        assert rows[name].ended.startswith(says)
-    assert set(survey.wrong) == ends.keys()
-    assert not page(survey).holds
-    # Typed again: only what ended otherwise than it should is tried again, and what is new.
-    sabotage.write_text("")
-    (folder / "good.xml").write_text(GOOD.replace("0.05", "0.06"))
-    again = examine_all(find([folder]), quick=True, seconds=61, jobs=3, table=table)
-    assert sabotage.read_text().split() == ["good.xml"]
-    kept = {row.file: row for row in again.models}
-    assert list(kept) == list(rows)
-    assert kept["tendon.xml"] == rows["tendon.xml"]
+    assert "cannot read" in surveys.rows()["broken.xml"].backends["mujoco"].refusal
 
 
-def test_scenarios_and_costs(folder: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ENDS)
+def test_a_model_that_ends_its_process_is_a_row_that_says_how(
+    name: str, surveys: TwoSurveys
+) -> None:
+    assert surveys.rows()[name].ended.startswith(ENDS[name])
+
+
+@pytest.mark.slow
+def test_a_survey_holds_only_without_models_that_end(surveys: TwoSurveys) -> None:
+    assert set(surveys.first.wrong) == set(ENDS)
+    assert not page(surveys.first).holds
+
+
+@pytest.mark.slow
+def test_a_survey_typed_again_tries_only_what_changed_or_ended(surveys: TwoSurveys) -> None:
+    # The names of those that ended let them end again, before they are noted.
+    assert surveys.examined == ["good.xml"]
+    again = {row.file: row for row in surveys.again.models}
+    assert list(again) == list(surveys.rows())
+    assert again["tendon.xml"] == surveys.rows()["tendon.xml"]
+
+
+def test_a_row_has_the_scenarios_that_run_and_what_a_step_costs(folder: Path) -> None:
     (row,) = examine_all(find([folder / "good.xml"])).models
     for backend in row.backends.values():
         assert backend.scenarios.keys() == {"hold", "gravity", "droop", "waves"}
@@ -321,7 +387,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path, suffix: str) -> None:
     refused((BadInputError, "is not a table", lambda: read_table(target)))
 
 
-def test_what_is_wrong() -> None:
+def test_a_row_tells_what_is_wrong_with_an_engine() -> None:
     def wrong(row: ExaminedModel = ROW, **changes: object) -> str:
         backend = replace(ROW.backends["pybullet"], restores=True, **changes)
         return " ".join(replace(row, faults=(), backends={"pybullet": backend}).wrong("mujoco"))

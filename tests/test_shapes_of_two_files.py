@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import permutations, product
 from pathlib import Path
 
@@ -30,6 +31,7 @@ ORIGIN, UPRIGHT = np.zeros(3), np.eye(3)
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
+@cache
 def _rotations_of_a_cube() -> list[Array]:
     turns: list[Array] = []
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
@@ -37,9 +39,6 @@ def _rotations_of_a_cube() -> list[Array]:
         if np.linalg.det(matrix) > 0:
             turns.append(matrix)
     return turns
-
-
-TURNS = _rotations_of_a_cube()
 
 
 def _numbers(values: Array) -> str:
@@ -115,7 +114,7 @@ def _corners(raw: mujoco.MjModel) -> Array:
 @pytest.mark.parametrize("number", range(24))
 @pytest.mark.parametrize("kind", ["box", "ellipsoid"])
 def test_each_frame_of_a_solid_is_no_difference(kind, number, tmp_path):
-    turn, matrix = TURNS[number], _turned("x", 20) @ _turned("z", 30)
+    turn, matrix = _rotations_of_a_cube()[number], _turned("x", 20) @ _turned("z", 30)
     right = _shape(kind, np.abs(turn).T @ SIZES, ORIGIN, matrix @ turn)
     assert _compared(tmp_path, _shape(kind, SIZES, ORIGIN, matrix), right).rows == ()
 
@@ -123,7 +122,7 @@ def test_each_frame_of_a_solid_is_no_difference(kind, number, tmp_path):
 @pytest.mark.parametrize("off", [0.0005, 0.001, 0.002])
 @pytest.mark.parametrize("number", range(24))
 def test_a_box_of_other_axes_differs_by_what_it_is_larger(number, off, tmp_path):
-    turn = TURNS[number]
+    turn = _rotations_of_a_cube()[number]
     larger = SIZES + np.array([off, 0, 0])
     right = _shape("box", np.abs(turn).T @ larger, ORIGIN, turn)
     result = _compared(tmp_path, _shape("box", SIZES), right)
@@ -138,7 +137,7 @@ def test_a_box_of_other_axes_differs_by_what_it_is_larger(number, off, tmp_path)
 @pytest.mark.parametrize("number", range(24))
 def test_a_box_of_other_axes_is_given_the_lefts_corners(number, tmp_path):
     """By its size and by its place, each in the terms of the right; bounds follow."""
-    turn, tilt = TURNS[number], _turned("y", 2)
+    turn, tilt = _rotations_of_a_cube()[number], _turned("y", 2)
     sizes, pos = SIZES + np.array([0.001, 0.0005, -0.001]), np.array([0.002, 0, 0.001])
     right = _shape("box", np.abs(turn).T @ sizes, pos, tilt @ turn)
     result = _compared(tmp_path, _shape("box", SIZES), right)
@@ -221,7 +220,7 @@ def _inertia(moments: Array, matrix: Array) -> str:
 
 @pytest.mark.parametrize("number", range(24))
 def test_axes_of_inertia_that_go_by_other_names_are_no_difference(number, tmp_path):
-    turn = TURNS[number]
+    turn = _rotations_of_a_cube()[number]
     box = _shape("box", SIZES)
     inertia = _inertia(MOMENTS, UPRIGHT), _inertia(np.abs(turn).T @ MOMENTS, turn)
     assert _compared(tmp_path, box, box, inertia=inertia).rows == ()
@@ -231,7 +230,7 @@ def test_axes_of_inertia_that_go_by_other_names_are_no_difference(number, tmp_pa
 def test_a_moment_is_set_against_that_of_the_nearest_axis(number, tmp_path):
     """The largest and the next are exchanged by 1 %, and so are the axes that they go by."""
     near = np.array([0.01, 0.0099, 0.004])
-    turn, box = TURNS[number], _shape("box", SIZES)
+    turn, box = _rotations_of_a_cube()[number], _shape("box", SIZES)
     other = near[[1, 0, 2]] * 1.001
     inertia = _inertia(near, UPRIGHT), _inertia(np.abs(turn).T @ other, turn)
     (row,) = _compared(tmp_path, box, box, inertia=inertia).listed

@@ -489,10 +489,9 @@ def test_a_record_of_runs_that_never_were_does_not_pass(tmp_path: Path) -> None:
     grade = exercise.run(written(tmp_path / "step_loop.py", FORGED))
     judgement = grade.functions[-1]
     assert not judgement.passed
-    assert judgement.remarks == (
-        "first run: it did not end where 600 steps under this command take this arm: nothing "
-        "but ctrl may act on it",
-    )
+    (remark,) = judgement.remarks
+    assert remark.startswith("first run:")
+    assert "600 steps" in remark
 
 
 def test_a_record_of_his_own_making_with_the_right_numbers_passes(tmp_path: Path) -> None:
@@ -602,8 +601,7 @@ def test_a_link_that_leads_out_is_refused_unread(
     ann = found["ann"]
     assert ann.path is None
     assert any(
-        ann.refusal.startswith(f"{name} is a link to {target}, which was not handed in with it")
-        for name, target in links.items()
+        ann.refusal.startswith(f"{name} is a link to {target},") for name, target in links.items()
     ), ann.refusal
     (entry,) = judge_all([ann], "mujoco")
     assert (entry.judged, entry.refusal, entry.tests, entry.predictions) == (
@@ -612,7 +610,7 @@ def test_a_link_that_leads_out_is_refused_unread(
     assert not [file for file in unread if file.name in ("answers.py", "passwd")]
     # And where the folder is the one of one student.
     refused(
-        (BadInputError, "which was not handed in with it", lambda: exercise.run(
+        (BadInputError, "is a link to", lambda: exercise.run(
             folder / "bob" / "step_loop.py", folder=folder / "ann")),
     )  # fmt: skip
 
@@ -626,13 +624,13 @@ def test_a_file_or_a_folder_that_is_itself_a_link_is_refused(tmp_path: Path) -> 
     found = {each.name: each for each in submissions([folder])}
     for name in ("cy", "dee.py", "eve.py"):
         assert found[name].path is None, name
-        assert f"{name} is a link to " in found[name].refusal
+        assert name in found[name].refusal
     assert found["bob"].path is not None
     named = submissions([folder / "dee.py", folder / "bob" / "step_loop.py"])
     assert [each.path is None for each in named] == [True, False]
     refused(
-        (BadInputError, "eve.py is a link to bob", lambda: exercise.run(folder / "eve.py")),
-        (BadInputError, "eve.py is a link to bob", lambda: examine(folder / "eve.py")),
+        (BadInputError, "eve.py is a link", lambda: exercise.run(folder / "eve.py")),
+        (BadInputError, "eve.py is a link", lambda: examine(folder / "eve.py")),
     )
 
 
@@ -654,7 +652,7 @@ def test_a_named_link_beside_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "ann" / "table.csv").symlink_to("../far/table.csv")
     (tmp_path / "ann" / "far").symlink_to("../far")  # a folder that is not given along
     refused(
-        (BadInputError, "table.csv is a link to", lambda: exercise.run(
+        (BadInputError, "table.csv is a link", lambda: exercise.run(
             tmp_path / "ann" / "step_loop.py")),
     )  # fmt: skip
 

@@ -62,7 +62,7 @@ def test_every_engine_that_is_required_is_here() -> None:
         require(name)
 
 
-def test_everything_promised_is_there() -> None:
+def test_every_public_name_is_there() -> None:
     for name in sm.__all__:
         assert getattr(sm, name) is not None
     assert set(sm.__all__) <= set(dir(sm))

@@ -144,7 +144,7 @@ def test_what_a_comparison_is_not_of_is_said(note: str, box: Trace) -> None:
     assert any(note in line for line in compare(box, NOTED[note](box)).notes)
 
 
-def test_time_goes_on() -> None:
+def test_a_run_whose_time_goes_back_is_no_trace() -> None:
     def back(_model: sm.Model, data: sm.Data) -> None:
         data.time = 0.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import tomllib
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -15,7 +16,11 @@ from statemachine.interface.records import READ_OPTIONS
 
 from .support.requirements import ROOT
 
-SURFACE = tomllib.loads((ROOT / "surface.toml").read_text("utf-8"))
+
+@pytest.fixture(scope="module")
+def surface() -> dict[str, Any]:
+    """Return what surface.toml says."""
+    return tomllib.loads((ROOT / "surface.toml").read_text("utf-8"))
 
 
 def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
@@ -28,22 +33,24 @@ def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
             yield max(action.option_strings, key=len)
 
 
-def test_the_commands_are_those_of_the_surface() -> None:
-    assert list(SURFACE["options"]) == sorted(cli.COMMANDS)
+def test_the_commands_are_those_of_the_surface(surface: dict[str, Any]) -> None:
+    assert list(surface["options"]) == sorted(cli.COMMANDS)
 
 
-@pytest.mark.parametrize("command", SURFACE["options"])
-def test_a_command_has_as_many_options_as_the_surface_says(command: str) -> None:
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_a_command_has_as_many_options_as_the_surface_says(
+    command: str, surface: dict[str, Any]
+) -> None:
     parser = cli.parser_of([command])
     (commands,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
     names = {*options_of(commands.choices[command])} - {"--help", "--help-all"}
-    assert len(names) == SURFACE["options"][command], sorted(names)
+    assert len(names) == surface["options"][command], sorted(names)
 
 
-def test_a_side_has_as_many_options_as_the_surface_says() -> None:
+def test_a_side_has_as_many_options_as_the_surface_says(surface: dict[str, Any]) -> None:
     options = (*OPTIONS, *READ_OPTIONS)
-    assert len(options) == SURFACE["side"]["options"], options
+    assert len(options) == surface["side"]["options"], options
 
 
-def test_the_public_names_are_those_of_the_surface() -> None:
-    assert SURFACE["names"]["public"] == sorted(dir(sm))
+def test_the_public_names_are_those_of_the_surface(surface: dict[str, Any]) -> None:
+    assert surface["names"]["public"] == sorted(dir(sm))

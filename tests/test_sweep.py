@@ -52,6 +52,7 @@ from .support.claims import assert_has, assert_in, refused
 from .support.files import written
 from .support.processes import files_below, in_its_own_python, soon, without_estimates
 from .support.requirements import ROOT
+from .support.sweeps import rows_of
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("joblib")
@@ -92,13 +93,6 @@ def policy(tmp_path: Path) -> str:
 def small(what: str, *vary: str, **others: Any) -> Sweep:
     given = {"backends": ("mujoco",), "seconds": 0.05, "model": "so101", **others}
     return Sweep(what, vary=vary, **given)
-
-
-def in_process(sweep: Sweep) -> list[dict[str, Any]]:
-    """Return the rows of a sweep, run here one after the other."""
-    ready = prepare_sweep(sweep)
-    cells = [cell for name in ready.backends for cell in ready.cells(name)]
-    return run_batch(ready, cells, False)
 
 
 def values(folder: Path) -> Any:
@@ -165,7 +159,7 @@ def start(tmp_path: Path) -> Start:
         ("gain=1", (1.0,), False),
     ],
 )
-def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
+def test_values_that_are_typed_are_read(word: str, values: tuple[Any, ...], times: bool) -> None:
     options = ("timestep", "damping", "contacts", "integrator")
     (vary,) = resolve_kinds(parse_vary([word]), VariableNames(options, parameters=("gain",)))
     assert_has(vary, values=values, times=times, bounds=None, numeric=isinstance(values[0], float))
@@ -289,7 +283,7 @@ def test_how_a_file_is_read_is_varied_where_it_is_loaded(tmp_path: Path) -> None
     model = str(written(tmp_path / "odd.xml", MOTOR.replace('<geom name="rod"', inertial)))
     sweep = small("gravity", "balance_inertia=on,off", model=model)
     with pytest.warns(EngineWarning, match="balance_inertia: link had moments"):
-        rows = {row["vary.balance_inertia"]: row for row in in_process(sweep)}
+        rows = {row["vary.balance_inertia"]: row for row in rows_of(sweep)}
     assert (rows[True]["status"], rows[False]["status"]) == ("done", "failed")
     assert rows[False]["error_class"] == "ModelError"
 
@@ -333,7 +327,7 @@ def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
 
 def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
     sweep = Sweep("hold", ("timestep=0.004", "damping=0.5x"), (backend,), seconds=0.4)
-    (row,) = in_process(sweep)
+    (row,) = rows_of(sweep)
     options = {"timestep": 0.004, "damping": 0.5 * scene.dof_damping}
     trace = record_scenario(scenario("hold"), scene, seconds=0.4, options=options)
     assert row["status"] == "done", row
@@ -366,9 +360,9 @@ def test_a_cell_does_not_depend_on_the_one_before(backend: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_a_seed_draws_the_same_start_everywhere() -> None:
     sweep = Sweep("hold", backends=("mujoco", "pybullet"), seeds=3, seconds=0.005, moments=1)
-    rows = {(row["backend"], row["seed"]): np.array(row["qpos"]) for row in in_process(sweep)}
+    rows = {(row["backend"], row["seed"]): np.array(row["qpos"]) for row in rows_of(sweep)}
     one, two = rows["mujoco", 1], rows["pybullet", 1]
-    still = in_process(Sweep("hold", backends=("mujoco",), seeds=2, seconds=0.005, spread="0"))
+    still = rows_of(Sweep("hold", backends=("mujoco",), seeds=2, seconds=0.005, spread="0"))
     assert np.array_equal(rows["mujoco", 0], still[0]["qpos"])
     assert still[0]["qpos"] == still[1]["qpos"]
     assert 1e-3 < np.abs(one - rows["mujoco", 0]).max() < np.deg2rad(1.1)
@@ -377,7 +371,7 @@ def test_a_seed_draws_the_same_start_everywhere() -> None:
 
 def test_a_start_a_place_and_a_parameter(policy: str) -> None:
     vary = ("qpos[elbow_flex]=0.5", "gravity[z]=0", "gain=1,2")
-    rows = in_process(small(f"{policy}:still", *vary, seconds=0.005))
+    rows = rows_of(small(f"{policy}:still", *vary, seconds=0.005))
     names = ("vary.qpos[elbow_flex]", "vary.gravity[z]", "vary.gain")
     assert [tuple(row[name] for name in names) for row in rows] == [(0.5, 0, 1), (0.5, 0, 2)]
     elbow = sm.load("so101").joint_id("elbow_flex")
@@ -388,10 +382,10 @@ def test_a_start_a_place_and_a_parameter(policy: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_a_cell_that_fails_is_a_row(policy: str) -> None:
     both = Sweep("hold", ("integrator=euler",), ("mujoco", "pybullet"), seconds=0.05)
-    rows = {row["backend"]: row for row in in_process(both)}
-    fast, fine = in_process(small("hold", "qvel[elbow_flex]=1e9,0"))
-    (late,) = in_process(small("hold", "timestep=1e-4", timeout=1e-6))
-    good, wrong = in_process(small(f"{policy}:fails", "gain=1,2"))
+    rows = {row["backend"]: row for row in rows_of(both)}
+    fast, fine = rows_of(small("hold", "qvel[elbow_flex]=1e9,0"))
+    (late,) = rows_of(small("hold", "timestep=1e-4", timeout=1e-6))
+    good, wrong = rows_of(small(f"{policy}:fails", "gain=1,2"))
     failed = rows["pybullet"], fast, late, wrong
     assert {row["status"] for row in (rows["mujoco"], fine, good)} == {"done"}
     assert [row["error_class"] for row in failed] == [
@@ -650,7 +644,7 @@ def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> 
 @pytest.mark.usefixtures("bullet")
 def test_jobs_do_not_change_results(tmp_path: Path) -> None:
     sweep = Sweep("hold", ("timestep=0.005,0.01", "damping=1x,2x"), seeds=2, seconds=0.1)
-    serial = sorted(in_process(sweep), key=lambda row: row["cell"])
+    serial = sorted(rows_of(sweep), key=lambda row: row["cell"])
     for jobs, ran in ((1, 16), (2, 16), (2, 0)):
         summary = run_sweep(sweep, tmp_path / str(jobs), jobs=jobs)
         assert_has(summary, cells=16, done=16, ran=ran, missing=0)
@@ -689,9 +683,12 @@ def test_without_an_alarm_a_function_that_hangs_ends_its_process(tmp_path: Path)
     assert in_its_own_python(NO_ALARM, tmp_path).returncode == 1
 
 
+CELLS = 30  # of which a worker does two or three in a second
+
+
 def slow_sweep(policy: str, *more: str) -> list[str]:
     """Return the command of a sweep that takes some seconds."""
-    words = ["sweep", f"{policy}:slow", "so101", "--vary", "gain=1:60:60"]
+    words = ["sweep", f"{policy}:slow", "so101", "--vary", f"gain=1:{CELLS}:{CELLS}"]
     return [*words, "--seconds", "0.1", "--backend", "mujoco", "--out", "out", *more]
 
 
@@ -763,7 +760,7 @@ def test_a_sweep_that_is_stopped_or_killed_keeps_what_was_done_and_goes_on(
     assert driver.returncode in codes
     assert how == "SIGKILL" or said == ["", STOPPED if how.startswith("SIGINT") else ""]
     before = dict(iter_cell_outcomes(out))
-    assert len(before) < 60
+    assert len(before) < CELLS
     assert before or begun == "sweep.json"
     assert soon(lambda: not _group(driver.pid), 120 if how == "SIGKILL" else 10)
     if begun == "sweep.json":
@@ -771,50 +768,88 @@ def test_a_sweep_that_is_stopped_or_killed_keeps_what_was_done_and_goes_on(
     second = start(*words)  # on the same workers, if they are Dask's
     told, error = second.communicate(timeout=120)
     assert second.returncode == 0, error
-    assert_has(json.loads(told), done=60, missing=0, ran=60 - len(before))
+    assert_has(json.loads(told), done=CELLS, missing=0, ran=CELLS - len(before))
     cells = [cell for cell, _ in iter_cell_outcomes(out)]
-    sweep = small(f"{policy}:slow", "gain=1:60:60", seconds=0.1)
+    sweep = small(f"{policy}:slow", f"gain=1:{CELLS}:{CELLS}", seconds=0.1)
     assert sorted(cell.id for cell in prepare_sweep(sweep).cells("mujoco")) == sorted(cells)
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
-def test_cells_that_failed_are_run_again_if_asked(
-    policy: str, tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    mended = tmp_path / "mended"
-    monkeypatch.setenv("MENDED", str(mended))
-    words = ["sweep", f"{policy}:mended", "so101", "--vary", "gain=1:8:8", "--json"]
-    words += ["--seconds", "0.05", "--backend", "mujoco", "--jobs", "1", "--out", "out"]
+@dataclasses.dataclass(frozen=True)
+class FailingSweep:
+    """A sweep of eight cells whose function fails for six gains until it is mended.
 
-    def run(*more: str) -> dict[str, Any]:
-        told, error = (driver := start(*words, *more)).communicate(timeout=120)
+    Attributes:
+        words: The command.
+        out: Its folder.
+        mended: The function fails no more where this file is.
+        start: Starts the command with further words.
+    """
+
+    words: list[str]
+    out: Path
+    mended: Path
+    start: Start
+
+    def run(self, *more: str) -> dict[str, Any]:
+        """Return the summary of a run, whose exit code tells whether a cell failed."""
+        driver = self.start(*self.words, *more)
+        told, error = driver.communicate(timeout=120)
         summary: dict[str, Any] = json.loads(told)
         assert driver.returncode == bool(summary["failed"]), error
         return summary
 
-    first = run()
+    def outcomes(self) -> Counter[str]:
+        """Count the cells of the folder by their outcomes."""
+        return Counter(dict(iter_cell_outcomes(self.out)).values())
+
+
+@pytest.fixture
+def failing(
+    policy: str, tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> FailingSweep:
+    """Return a sweep of which six of eight cells have failed."""
+    mended = tmp_path / "mended"
+    monkeypatch.setenv("MENDED", str(mended))
+    words = ["sweep", f"{policy}:mended", "so101", "--vary", "gain=1:8:8", "--json"]
+    words += ["--seconds", "0.05", "--backend", "mujoco", "--jobs", "1", "--out", "out"]
+    sweep = FailingSweep(words, tmp_path / "out", mended, start)
+    first = sweep.run()
     assert (first["done"], first["failed"], first["ran"]) == (2, {"BadInputError": 6}, 8)
     mended.touch()
-    assert run()["ran"] == 0
-    # A refused request touches nothing.
-    assert start(*words, "--retry-failed", "--seeds", "2").wait() == 2
-    assert Counter(dict(iter_cell_outcomes(tmp_path / "out")).values())["BadInputError"] == 6
-    # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
-    code = (
-        "import os, signal, sys; import statemachine.lab.sweep\n"
-        "sweep = sys.modules['statemachine.lab.sweep']\n"
-        "from statemachine.cli import main\n"
-        "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
-        "main(sys.argv[1:])"
-    )
-    assert start("--retry-failed", program=["-c", code, *words]).wait() == -signal.SIGKILL
-    assert list(dict(iter_cell_outcomes(tmp_path / "out")).values()) == ["done", "done"]
-    last = run("--retry-failed")
-    assert (last["done"], last["failed"], last["ran"]) == (8, {}, 6)
-    cells = [cell for cell, _ in iter_cell_outcomes(tmp_path / "out")]
-    assert len(cells) == len(set(cells)) == 8
-    assert read_cells(tmp_path / "out")["error"].null_count == 8
+    return sweep
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
+class TestCellsThatFailed:
+    def test_are_left_as_they_are_where_nobody_asks(self, failing: FailingSweep) -> None:
+        assert failing.run()["ran"] == 0
+
+    def test_stay_where_the_request_is_refused(self, failing: FailingSweep) -> None:
+        assert failing.start(*failing.words, "--retry-failed", "--seeds", "2").wait() == 2
+        assert failing.outcomes() == {"done": 2, "BadInputError": 6}
+
+    def test_are_run_again_where_somebody_asks(self, failing: FailingSweep) -> None:
+        last = failing.run("--retry-failed")
+        assert (last["done"], last["failed"], last["ran"]) == (8, {}, 6)
+        cells = [cell for cell, _ in iter_cell_outcomes(failing.out)]
+        assert len(cells) == len(set(cells)) == 8
+        assert read_cells(failing.out)["error"].null_count == 8
+
+    def test_are_missing_where_it_was_killed_before_they_ran_again(
+        self, failing: FailingSweep
+    ) -> None:
+        code = (
+            "import os, signal, sys; import statemachine.lab.sweep\n"
+            "sweep = sys.modules['statemachine.lab.sweep']\n"
+            "from statemachine.cli import main\n"
+            "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+            "main(sys.argv[1:])"
+        )
+        killed = failing.start("--retry-failed", program=["-c", code, *failing.words])
+        assert killed.wait() == -signal.SIGKILL
+        assert failing.outcomes() == {"done": 2}
+        assert failing.run("--retry-failed")["ran"] == 6
 
 
 def test_the_rows_of_failed_cells_are_removed_alone(two_rows: Any, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError
-from statemachine.lab.sweep import Sweep, prepare_sweep
+from statemachine.lab.sweep import Sweep
 from statemachine.lab.sweep.analysis import MainEffect, SweepEffects
 from statemachine.lab.sweep.main_effects import LevelMean
 from statemachine.lab.sweep.page import page
@@ -24,12 +24,12 @@ from statemachine.lab.sweep.questions import (
     SweepRequest,
     answer_effects,
 )
-from statemachine.lab.sweep.worker import run_batch
 from statemachine.show.first_screen import COLUMNS, LINES, lines_of
 
 from .support.files import written
 from .support.pages import shown
 from .support.requirements import SHARED
+from .support.sweeps import rows_of
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -76,13 +76,6 @@ STILL = """
 def still(model, data):
     return [0.3]
 """
-
-
-def rows_of(sweep: Sweep) -> list[dict[str, Any]]:
-    """Return the rows of a sweep, run here one after the other."""
-    ready = prepare_sweep(sweep)
-    cells = [cell for name in ready.backends for cell in ready.cells(name)]
-    return run_batch(ready, cells, False)
 
 
 def shares_of(cube: np.ndarray) -> list[float]:

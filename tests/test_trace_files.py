@@ -35,7 +35,7 @@ from .support.claims import refused
 from .support.files import written
 from .support.patches import around
 from .support.processes import Cli
-from .support.traces import same
+from .support.traces import cut, same
 
 
 @pytest.fixture(scope="module")
@@ -264,14 +264,18 @@ def test_a_csv_and_its_contacts_are_replaced_together(
     assert seen == [{"box.csv"}, set()]  # never a new table beside old contacts
     assert "force.normal" in contacts.read_text()
 
-    before = table.read_bytes()
+
+def test_a_csv_stays_where_its_contacts_cannot_be_written(
+    box: Trace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table, contacts = export_csv(box, tmp_path / "box.csv")
+    before = table.read_bytes(), contacts.read_bytes()
     monkeypatch.setattr(
         "statemachine.lab.recordings.files.write_contacts",
         Mock(side_effect=OSError(28, "No space left on device")),
     )
-    refused((OSError, "No space", lambda: export_csv(box, table)))
-    assert table.read_bytes() == before
-    assert contacts.exists()
+    refused((OSError, "No space", lambda: export_csv(cut(box, 2), table)))
+    assert (table.read_bytes(), contacts.read_bytes()) == before
     assert sorted(file.name for file in tmp_path.iterdir()) == ["box.contacts.csv", "box.csv"]
 
 

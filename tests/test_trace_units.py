@@ -55,7 +55,7 @@ def test_a_rotation_of_qpos_has_no_unit(tmp_path: Path) -> None:
     assert unit_of(waved(written(tmp_path / "a.xml", hinge)).header, "qpos") == "rad"
 
 
-def test_the_page_shows_them(trace: Trace) -> None:
+def test_the_page_of_a_trace_shows_the_units_of_its_columns(trace: Trace) -> None:
     (table,) = [t for t in blocks(trace_page(trace, "a.npz"), Table) if "unit" in t.headers]
     shown = {row[0]: row[table.headers.index("unit")] for row in table.rows}
     assert shown["qvel"] == "rad/s, m/s"

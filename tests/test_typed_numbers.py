@@ -24,7 +24,7 @@ def test_other_digits_and_underscores_are_no_number(text: str) -> None:
     assert not is_count(text)
 
 
-def test_what_is_one() -> None:
+def test_a_number_is_typed_in_ascii_digits() -> None:
     assert [typed_float(text) for text in ("0.5", "-1e-3", " 2 ")] == [0.5, -1e-3, 2.0]
     assert [typed_int(text) for text in ("12", "-3", "+4")] == [12, -3, 4]
     assert is_count("0")

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
-import statemachine as sm
-from statemachine.engines.records import ModelDifference
-from statemachine.lab.compare.matching import match_models
-from statemachine.lab.why.causes import causes, differences_of
+from statemachine.lab.why.causes import causes
+
+from .support.two_files import causes_of_texts
 
 MODEL = """
 <mujoco><compiler angle="radian"/><worldbody>
@@ -41,19 +39,10 @@ EDITS = {
 }
 
 
-def _rows(folder: Path, left: str, right: str) -> tuple[ModelDifference, ...]:
-    models = []
-    for name, text in (("left", left), ("right", right)):
-        path = folder / f"{name}.xml"
-        path.write_text(text, encoding="utf-8")
-        models.append(sm.load(path))
-    return differences_of(models[0], models[1], match_models(models[0], models[1]))
-
-
 @pytest.mark.parametrize("name", EDITS)
 def test_each_figure_has_its_own_unit(name, tmp_path):
     slot, text, figure, value, unit = EDITS[name]
-    rows = _rows(tmp_path, MODEL.format(**SLOTS), MODEL.format(**{**SLOTS, slot: text}))
+    rows = causes_of_texts(tmp_path, MODEL.format(**SLOTS), MODEL.format(**{**SLOTS, slot: text}))
     known = {value.quantity: value for row in rows for value in row.values}
     shown, its_unit = known[figure].right, known[figure].unit
     if isinstance(value, float):
@@ -86,7 +75,7 @@ def test_rows_merge_only_if_they_share_both_values(tmp_path):
             (lambda _: 3, lambda _: 0.4),
         )
     )
-    found = causes(_rows(tmp_path, left, right))
+    found = causes(causes_of_texts(tmp_path, left, right))
     for cause in found:
         assert len({row.values for row in cause.differences}) == 1
     sizes = [len(c.differences) for c in found if c.name.startswith("friction dimensions")]

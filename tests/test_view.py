@@ -85,23 +85,32 @@ def test_a_frame_is_a_copy(session: LiveSession) -> None:
     np.testing.assert_array_equal(frame.ctrl, before[1])
 
 
-def test_commands_do_what_they_say(session: LiveSession) -> None:
-    start = session.frame()
-    assert_has(start, running=False, time=6)
+def test_a_session_begins_at_rest_in_its_keyframe(session: LiveSession) -> None:
+    assert_has(session.frame(), running=False, time=6)
     assert session.places == ("held", "pickup")
+
+
+def test_play_lets_time_go_on_and_pause_stops_it(session: LiveSession) -> None:
     session.play()
     assert session.frame().running
+    session.pause()
+    assert not session.frame().running
+
+
+def test_a_step_stops_a_session_that_many_steps_later(session: LiveSession) -> None:
+    session.play()
     session.step(7)
     later = pytest.approx(6 + 7 * session.timestep)
     assert_has(session.frame(), running=False, steps=7, time=later)
-    session.play()
-    session.pause()
-    assert not session.running
+
+
+def test_a_reset_puts_a_session_into_the_keyframe_or_to_the_start(session: LiveSession) -> None:
+    resets = session.frame().resets
     session.reset(1)
     assert_has(session.frame(), time=59.522, steps=0)
     session.reset()
     frame = session.frame()
-    assert (frame.time, frame.resets) == (0, start.resets + 2)
+    assert (frame.time, frame.resets) == (0, resets + 2)
     np.testing.assert_array_equal(frame.ctrl, 0)
 
 
@@ -206,17 +215,32 @@ def test_a_session_refuses_what_does_not_fit(mujoco_scene: sm.Model, odd: sm.Mod
     )
 
 
-def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> None:
+def test_sliders_of_an_arm_are_its_actuators_in_degrees() -> None:
     arm = controls_of(sm.load("so101"))
     assert [c.name for c in arm][:2] == ["shoulder_pan", "shoulder_lift"]
     assert {c.unit for c in arm} == {"°"}
     assert (arm[1].low, arm[1].high) == pytest.approx((-100, 100), abs=1e-3)
     assert arm[1].scale * 180 == pytest.approx(math.pi)
-    aim, push, wild, free = controls_of(odd)
-    assert (aim.low, aim.high, aim.unit) == (pytest.approx(-90), pytest.approx(90), "°")
-    assert_has(push, low=pytest.approx(-200), high=pytest.approx(300), unit="mm", name="actuator 1")
+
+
+@pytest.mark.parametrize(
+    ("number", "low", "high", "unit"),
+    [(0, -90, 90, "°"), (1, -200, 300, "mm"), (3, -1, 1, "")],
+)
+def test_a_slider_has_the_range_and_the_unit_of_what_its_actuator_drives(
+    number: int, low: float, high: float, unit: str, odd: sm.Model
+) -> None:
+    control = controls_of(odd)[number]
+    assert_has(control, low=pytest.approx(low), high=pytest.approx(high), unit=unit)
+
+
+def test_an_actuator_without_a_name_is_called_by_its_number(odd: sm.Model) -> None:
+    assert controls_of(odd)[1].name == "actuator 1"
+
+
+def test_a_slider_of_what_is_neither_angle_nor_length_has_no_unit(odd: sm.Model) -> None:
+    wild = controls_of(odd)[2]
     assert (wild.high, wild.unit, wild.scale) == (1e150, "", 1)
-    assert (free.low, free.high, free.unit) == (-1, 1, "")
 
 
 def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import warnings
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from shutil import copytree
@@ -108,7 +109,7 @@ def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
     assert result.equalized_gap == result.unexplained == 0.0
 
 
-def test_another_quantity(arm: Model) -> None:
+def test_the_gap_of_another_quantity_is_explained_where_it_is_named(arm: Model) -> None:
     two = arm.replace(armature=0.04)
     result = explain(WhyRequest(arm, two, HOLD, quantity="gripperframe", uncertain=None))
     assert_has(result, quantity="gripperframe", unit="m", gap=result.first["gripperframe"].worst)
@@ -363,10 +364,36 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
         assert apart({k: v for k, v in every.items() if k != name}) > 1e-4, name
 
 
-@pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("dial", ["damping", "limits", "surfaces"])
-def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
-    """A limp arm without joint damping, which reaches its limits and the floor."""
+@dataclass(frozen=True)
+class DialRuns:
+    """A limp arm of PyBullet as it comes, and what sets one of its dials.
+
+    Attributes:
+        fresh: The arm as it comes.
+        limp: Takes its motors off and leaves little damping.
+        own: Sets what is called the engine's own.
+        other: Sets another kind of it.
+    """
+
+    fresh: Model
+    limp: Callable[[Any], None]
+    own: Callable[[Any], None]
+    other: Callable[[Any], None]
+
+    def built(self, *acts: Callable[[Any], None]) -> Model:
+        """Return the limp arm with further settings."""
+        from statemachine.engines.pybullet import dials as module
+
+        return module.with_settings(self.fresh, [self.limp, *acts])
+
+    def path(self, *acts: Callable[[Any], None]) -> np.ndarray:
+        """Return qpos (n, nq) of the limp arm, which reaches its limits and the floor."""
+        return path_of(self.built(*acts), replace(scenario("gravity"), seconds=1.0))
+
+
+@pytest.fixture(params=["damping", "limits", "surfaces"])
+def dial(request: pytest.FixtureRequest, bullet: None) -> DialRuns:
+    """Return a limp arm, and the engine's own setting of a dial and another one."""
     from statemachine.engines.pybullet import dials as module
 
     fresh = quietly("so101/scene", defaults="engine", gravity=[0, 0, -9.81], actuation=False)
@@ -378,7 +405,6 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
             for joint in tree.joints:
                 world.change(tree.body, joint, jointDamping=0.05)
 
-    # What is called its own; and another kind of it: so it would have been seen.
     own, other = {
         "damping": (
             lambda w: module.set_damping(w, module.BODY_DAMPING, joints),
@@ -389,20 +415,22 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
             lambda w: module.set_limits(w, dict.fromkeys(range(fresh.nv), (-0.1, 0.3))),
         ),
         "surfaces": (module.harden, lambda w: w.soften()),
-    }[dial]
-    experiment = replace(scenario("gravity"), seconds=1.0)
-    plain, same, changed = (
-        path_of(module.with_settings(fresh, [limp, *acts]), experiment)
-        for acts in ([], [own], [other])
-    )
+    }[request.param]
+    return DialRuns(fresh, limp, own, other)
+
+
+def test_what_is_called_the_engines_own_changes_no_bit_of_a_run(dial: DialRuns) -> None:
+    plain = dial.path()
     assert np.abs(plain).max() > 0.35
-    np.testing.assert_array_equal(same, plain)
-    assert (changed != plain).any()
-    # Speeds after a start that is faster than the engine lets a joint be.
+    np.testing.assert_array_equal(dial.path(dial.own), plain)
+    assert (dial.path(dial.other) != plain).any()  # so it would have been seen
+
+
+def test_what_is_called_the_engines_own_keeps_the_largest_speed_of_a_joint(dial: DialRuns) -> None:
+    """After a start that is faster than the engine lets a joint be."""
     speeds = []
-    for acts in ([], [own]):
-        start = [0, 0, 0, 0, 0, 150.0]
-        with opened(module.with_settings(fresh, [limp, *acts]), qvel=start, nstep=1) as (_, data):
+    for acts in ((), (dial.own,)):
+        with opened(dial.built(*acts), qvel=[0, 0, 0, 0, 0, 150.0], nstep=1) as (_, data):
             speeds.append(data.qvel.copy())
     assert np.abs(speeds[0]).max() == pytest.approx(100.0)
     np.testing.assert_array_equal(*speeds)
@@ -477,8 +505,11 @@ def test_dials_outlive_a_reset() -> None:
     np.testing.assert_array_equal(first, path_of(model, HOLD, used=30))
 
 
+Explanations = dict[tuple[str, str], Explanation]
+
+
 @pytest.fixture(scope="module")
-def explanations() -> dict[tuple[str, str], Explanation]:
+def explanations() -> Explanations:
     """Return the explanations of three experiments, in both regimes."""
     need_engine("pybullet")
     results = {}
@@ -490,64 +521,110 @@ def explanations() -> dict[tuple[str, str], Explanation]:
     return results
 
 
-@pytest.mark.slow
-def test_contact_is_what_the_emulation_leaves(explanations: Any) -> None:
-    for name in ("hold", "gravity", "box"):
-        result = explanations[name, "model"]
-        assert [part.name for part in result.found_in] == ["contact"], name
-        assert result.located > 0.9
-        assert abs(result.unexplained) < 1e-5
-        if name != "box":
-            # In the motion as it comes: until the first touch there is no gap.
-            assert result.touch.before < 1e-12
-            assert result.touch.moments > 50
+NAMES = ("hold", "gravity", "box")
 
 
 @pytest.mark.slow
-def test_the_engine_as_it_comes_is_far_away_and_explained(explanations: Any) -> None:
-    for name in ("hold", "gravity", "box"):
-        result = explanations[name, "engine"]
-        assert {row.name for row in result.shares} <= set(TITLES.values())
-        assert {row.kind for row in result.shares} == {"engine"}
-        assert result.found_in[-1].name == "contact"
-        assert sum(shares(result).values()) == pytest.approx(result.explained, abs=1e-9)
-        total = result.explained + result.located + result.unexplained
-        assert total == pytest.approx(1.0, abs=1e-9)
-        assert abs(result.unexplained) < 1e-5
-        # Where all settings are the same, what is left is the gap of the emulated engine.
-        emulated = explanations[name, "model"].first[result.quantity].worst
-        assert 0.9 * emulated < result.equalized_gap <= emulated + 1e-12  # at fewer moments
+@pytest.mark.parametrize("name", NAMES)
+def test_contact_is_what_the_emulation_leaves(name: str, explanations: Explanations) -> None:
+    result = explanations[name, "model"]
+    assert [part.name for part in result.found_in] == ["contact"]
+    assert result.located > 0.9
+    assert abs(result.unexplained) < 1e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hold", "gravity"])
+def test_the_emulation_has_no_gap_before_the_first_touch(
+    name: str, explanations: Explanations
+) -> None:
+    touch = explanations[name, "model"].touch
+    assert touch is not None
+    assert touch.before < 1e-12
+    assert touch.moments > 50
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_causes_of_an_engine_as_it_comes_are_its_settings_and_then_contact(
+    name: str, explanations: Explanations
+) -> None:
+    result = explanations[name, "engine"]
+    assert {row.name for row in result.shares} <= set(TITLES.values())
+    assert {row.kind for row in result.shares} == {"engine"}
+    assert result.found_in[-1].name == "contact"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_gap_of_an_engine_as_it_comes_is_explained_whole(
+    name: str, explanations: Explanations
+) -> None:
+    result = explanations[name, "engine"]
+    assert sum(shares(result).values()) == pytest.approx(result.explained, abs=1e-9)
+    total = result.explained + result.located + result.unexplained
+    assert total == pytest.approx(1.0, abs=1e-9)
+    assert abs(result.unexplained) < 1e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_with_all_settings_equalized_the_gap_is_that_of_the_emulated_engine(
+    name: str, explanations: Explanations
+) -> None:
+    result = explanations[name, "engine"]
+    emulated = explanations[name, "model"].first[result.quantity].worst
+    assert 0.9 * emulated < result.equalized_gap <= emulated + 1e-12  # at fewer moments
+
+
+@pytest.mark.slow
+def test_the_servo_law_parts_an_engine_as_it_comes_by_more_than_30_degrees(
+    explanations: Explanations,
+) -> None:
     hold = explanations["hold", "engine"]
     assert np.degrees(hold.gap) > 30
     assert (hold.method, hold.shares[0].name) == ("drawn orders", "servo law")
 
 
 @pytest.mark.slow
-def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(
-    arm: sm.Model, explanations: Any
+def test_the_share_of_an_engine_s_timestep_is_that_of_runs_by_hand(
+    arm: sm.Model, explanations: Explanations
 ) -> None:
+    """Put back, it acts on the engine's motors, not on the model's law."""
     result = explanations["hold", "engine"]
     rows = {row.name: row for row in result.shares}
-    # The timestep put back, by hand: it acts on the engine's motors, not on the model's law.
     two = sm.load("so101/scene", backend="pybullet").replace(timestep=1 / 240)
     runs = [path_of(m, scenario("hold"))[::every] for m, every in ((arm, 5), (two, 6))]
     expected = (np.abs(runs[0] - runs[1]).max() - result.equalized_gap) / result.gap
     assert rows["timestep"].last == pytest.approx(expected, abs=1e-9)
     assert rows["timestep"].alone > 0.05
-    # The engine has the rotor and the friction of the model only in the model's servo law.
-    # None of its joints follows another.
+
+
+@pytest.mark.slow
+def test_only_settings_that_need_the_servo_law_cannot_be_equalized_alone(
+    explanations: Explanations,
+) -> None:
+    """The engine has rotor and friction of the model only in its servo law; no joint follows."""
+    rows = {row.name: row for row in explanations["hold", "engine"].shares}
     assert {name for name, row in rows.items() if row.alone is None} == NEEDS.keys() - {
         TITLES["equality"]
     }
 
 
 @pytest.mark.slow
-def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
+@pytest.mark.parametrize("details", [False, True])
+def test_the_pages_of_engines_fit_into_80_columns(
+    details: bool, explanations: Explanations
+) -> None:
     for result in explanations.values():
-        for details in (False, True):
-            lines = shown(report.page(result, details)).splitlines()
-            assert max(map(len, lines)) <= 80
-        json.loads(dumps(result))
+        lines = shown(report.page(result, details)).splitlines()
+        assert max(map(len, lines)) <= 80
+
+
+@pytest.mark.slow
+def test_explanations_of_engines_are_json(explanations: Explanations) -> None:
+    for result in explanations.values():
+        assert json.loads(dumps(result))["quantity"] == result.quantity
 
 
 @pytest.mark.slow
@@ -598,6 +675,3 @@ def test_files_and_settings_of_an_engine_are_explained_together(
     result = explain(WhyRequest(arm, right, HOLD, uncertain=None))
     assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
-
-
-# The command

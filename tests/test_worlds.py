@@ -302,7 +302,7 @@ def test_one_world_is_named_by_its_number(lasting: many.Worlds) -> None:
         for number in (N, -1, 0.0, None, True)
     ]
     models: list[tuple[type[Exception], str, Call]] = [
-        (BadInputError, "no world", lambda w, number=number: w.model_of(number))
+        (BadInputError, "no world", lambda w, number=number: w.model_of(number))  # pyright: ignore
         for number in (N, -1, "x", 1.5, True)
     ]
     assert_refused(lasting, *states, *models)
@@ -489,7 +489,7 @@ ROBOTS = {
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_robots_of_others(name: str) -> None:
+def test_worlds_of_public_robots_are_their_data(name: str) -> None:
     path = shared(SHARED / "robots" / "models" / ROBOTS[name])
     with worlds_of(sm.load(path), 3) as worlds:
         live(worlds, [worlds.model] * 3, 14)

@@ -424,7 +424,7 @@ def test_what_a_urdf_cannot_say_is_refused_by_name(tmp_path) -> None:
     left = sm.load(written(tmp_path / "left.xml", other))
     result, _ = rewrite(RewriteRequest(left, right, tmp_path / "fixed.urdf", sm.load, {}))
     reasons = {row.cause: row.reason for row in result.not_written}
-    assert reasons["armature of wrist"] == "no armature"
+    assert "no armature" in reasons["armature of wrist"]
 
 
 @pytest.mark.parametrize("number", [0.1, 1e-17, 45.0, -2.5e300, 1 / 3])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -77,9 +78,15 @@ def tasks(backend: str) -> Figures:
 
 
 def student_files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Yield each attempt of tests/support/exercises in a file, as a student hands it in."""
+    """Yield a wrong and a right attempt at each function in a file, as a student hands it in.
+
+    The others of tests/support/exercises are judged in `tests/test_check.py`.
+    """
     exercises = importlib.import_module("tests.support.exercises")
+    firsts: dict[tuple[str, bool], Any] = {}
     for attempt in (*exercises.WRONG, *exercises.RIGHT):
+        firsts.setdefault((attempt.solves, attempt in exercises.RIGHT), attempt)
+    for attempt in firsts.values():
         file = folder / f"{attempt.solves} {attempt.name.partition('-')[2]}.py"
         file.write_text(attempt.text, "utf-8")
         yield file.stem, file

@@ -23,9 +23,10 @@ from ...measures import QUANTITIES, common_moments, with_left_pair_names
 from ...processes.parallel import forks_for, in_forks
 from ..recordings import Rerun, Trace
 from ..runs.drive import Progress, no_progress
+from . import perturbed
 from .agreement import Agreement, Comparison
 from .outcomes import outcomes_of
-from .perturbed import EXACT, ROUNDING, RUNS, Uncertainty, perturbed_run
+from .perturbed import EXACT, ROUNDING, Uncertainty, perturbed_run
 from .series import NORMAL, at_the_end, series, touches
 
 CLEAR = 3.0  # times the floor: a larger gap is more than chance
@@ -137,7 +138,7 @@ def chaos_floor(
     Args:
         comparison: Of two traces.
         reruns: How the left and the right were run; None for a side that was not run here.
-        runs: How many perturbed runs of each side; None for `RUNS`.
+        runs: How many perturbed runs of each side; None for `perturbed.RUNS`.
         seed: Of what is drawn.
         uncertain: What the start of a real robot is uncertain by.
         jobs: How many processes make the runs; None for one a processor where that pays, and for
@@ -148,7 +149,7 @@ def chaos_floor(
         BadInputError: `runs` is less than 1, the seed is negative, or neither side was run here.
         EngineError: A process ended before its run was done, twice.
     """
-    runs = RUNS if runs is None else runs
+    runs = perturbed.RUNS if runs is None else runs
     if runs < 1:
         raise BadInputError(f"the chaos floor wants at least one run; got {runs}")
     left, right = comparison.left.trace, comparison.right.trace
