@@ -19,6 +19,7 @@ COMMANDS = {
     "sweep": "an experiment at many settings, on every engine, as a dataset",
     "robots": "any folder of models: what each does on every engine",
     "fingertip": "the engine's fingertip against an independent witness",
+    "validate": "every engine against closed forms: who is right, by how much",
     "conventions": "what each engine takes for granted, asked of the engines",
     "engines": "other releases of an engine, to run and to compare",
 }

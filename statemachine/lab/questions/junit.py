@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
-from xml.etree import ElementTree
 
 from ...measures.text import quantity
+from ...show.junit import TestSuite, junit_text
 from ..compare import Comparison
 from ..compare.stillness import nothing_moved
-
-if TYPE_CHECKING:
-    pass
 
 FAILED = "{largest} apart at {at:g} s; the tolerance is {tolerance}, {reason}"
 ENDED = "ended early: {why}"
@@ -19,25 +15,15 @@ ENDED = "ended early: {why}"
 
 def junit(comparisons: Sequence[Comparison]) -> str:
     """Return the text of the file: a suite for each comparison."""
-    root = ElementTree.Element("testsuites")
-    for comparison in comparisons:
-        left, right = comparison.left, comparison.right
-        experiment = left.trace.header.experiment
-        _add_suite(root, f"{experiment}: {left.label}, {right.label}", comparison)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+    return junit_text([_suite(comparison) for comparison in comparisons])
 
 
-def _add_suite(root: ElementTree.Element, name: str, comparison: Comparison) -> None:
-    """Add a comparison as a suite: a test for each quantity, and one for a run that ended early."""
-    failures = _failures(comparison)
-    tests = dict.fromkeys([*(agreement.name for agreement in comparison.agreements), *failures])
-    about = {"name": name, "tests": str(len(tests)), "failures": str(len(failures))}
-    suite = ElementTree.SubElement(root, "testsuite", about)
-    for test in tests:
-        case = ElementTree.SubElement(suite, "testcase", classname=name, name=test)
-        if test in failures:
-            ElementTree.SubElement(case, "failure", message=failures[test])
+def _suite(comparison: Comparison) -> TestSuite:
+    """Return a comparison as a suite: a test a quantity, and one for a run that ended early."""
+    left, right = comparison.left, comparison.right
+    experiment = left.trace.header.experiment
+    passed = {agreement.name: "" for agreement in comparison.agreements}
+    return TestSuite(f"{experiment}: {left.label}, {right.label}", passed | _failures(comparison))
 
 
 def _failures(comparison: Comparison) -> dict[str, str]:

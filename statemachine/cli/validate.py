@@ -1,0 +1,85 @@
+"""`statemachine validate`: every engine against closed forms."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ..installed import DEFAULT
+from ..typed_numbers import typed_float
+from .common import (
+    EACH_BACKEND,
+    TerminalReporter,
+    add_backend,
+    add_json,
+    file_name,
+    show,
+)
+
+if TYPE_CHECKING:
+    from ..lab.validate.battery import ValidateRequest
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add its options."""
+    parser.description = (
+        "Run cases whose answer is known on an engine, with each of its integrators, and say how "
+        "far it is from the closed form at several timesteps: who is right, by how much, and how "
+        "fast each gets better."
+    )
+    parser.epilog = (
+        "Exit code 1: an engine is worse than on record, or wrong where nothing is on record. An "
+        "error that is known, with its cause, is a fact, and no fault."
+    )
+    add_backend(parser, EACH_BACKEND)
+    parser.add_argument(
+        "--case",
+        action="append",
+        metavar="NAME",
+        help="a case or a group (motion, joints, contact); may be repeated (default: all)",
+    )
+    parser.add_argument(
+        "--timestep",
+        action="append",
+        type=typed_float,
+        metavar="S",
+        help="length of a step [s]; may be repeated (default: the case's own)",
+    )
+    parser.add_argument(
+        "--details", action="store_true", help="every case: errors, orders, causes and costs"
+    )
+    parser.add_argument(
+        "--junit", type=file_name, metavar="FILE", help="write the results as tests of JUnit"
+    )
+    add_json(parser)
+
+
+def request_of(options: argparse.Namespace) -> ValidateRequest:
+    """Return what was asked for.
+
+    Raises:
+        BadInputError: A timestep is out of range.
+        UnknownNameError: There is no such backend or case.
+    """
+    from ..lab.validate.battery import ValidateRequest
+
+    return ValidateRequest(
+        backends=tuple(options.backend or [DEFAULT]),
+        cases=tuple(options.case or ()),
+        timesteps=tuple(options.timestep or ()),
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Validate, and show."""
+    from ..atomic_files import check_place, replace_text
+    from ..lab.validate.battery import answer
+    from ..lab.validate.page import junit_of, page
+
+    request = request_of(options)
+    if options.junit is not None:
+        check_place(options.junit)
+    result = answer(request, TerminalReporter())
+    if options.junit is not None:
+        replace_text(options.junit, junit_of(result))
+    return show(page(result, options.details), result, options.json)

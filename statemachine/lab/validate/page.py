@@ -1,0 +1,293 @@
+"""Page of the battery: who is right first, then the worst rows, then every case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...measures.text import NO_NUMBER, figure, milliseconds, quantity
+from ...program import NAME
+from ...show.blocks import Page, Table
+from ...show.junit import TestSuite, junit_text
+from ...show.templates import PageContent, render
+from .battery import CaseResult, ValidateResult
+from .case import Verdict
+
+_LINES = 13  # of a terminal's page that both tables share
+_LEAST_ROWS = 4
+_MOST_ENGINES = 8
+_EXACT: tuple[Verdict, ...] = ("exact", "exact discrete form")
+_WRONG: tuple[Verdict, ...] = ("wrong", "diverges")
+_VERDICT_HEADERS = ("engine", "verdict", "cause of the error", "record")
+_SHORT = {"exact discrete form": "exact steps"}
+
+
+@dataclass(frozen=True)
+class _CasePart:
+    """What is shown of one case.
+
+    Attributes:
+        result: One of its results, which names it.
+        errors: Table of the error at each timestep, a row for each engine and integrator.
+        verdicts: Table of the verdict, its cause, and whether it is as on record.
+        work: Table of what each error costs.
+        refusals: Sentences about the engines that do not take the case.
+    """
+
+    result: CaseResult
+    errors: Table
+    verdicts: Table
+    work: Table
+    refusals: Sequence[str]
+
+    @property
+    def truth(self) -> str:
+        """The closed form, with its unit."""
+        return quantity(self.result.truth, self.result.unit)
+
+
+@dataclass(frozen=True)
+class _Nearest:
+    """The engine and integrator that is wrong in the fewest cases, then exact in most.
+
+    Attributes:
+        way: "mujoco RK4".
+        cases: Number of cases that it was asked.
+        exact: Number of cases in which it is exact.
+    """
+
+    way: str
+    cases: int
+    exact: int
+
+
+@dataclass(frozen=True)
+class ValidatePage(PageContent):
+    """What the page of the battery shows.
+
+    Attributes:
+        result: What was measured.
+        nearest: Who is nearest to the truth.
+        engines: Table with a row for each engine and integrator.
+        worst: Table of the largest errors.
+        parts: One for each case; empty without details.
+        next_command: What to type next.
+    """
+
+    template = "validate.md.j2"
+    result: ValidateResult
+    nearest: _Nearest
+    engines: Table
+    worst: Table
+    parts: Sequence[_CasePart]
+    next_command: str
+
+    @property
+    def origin(self) -> str:
+        """The engines, each with its version."""
+        versions = self.result.versions.items()
+        return ", ".join(f"{backend} ({version})" for backend, version in versions)
+
+    @property
+    def total(self) -> int:
+        """Number of results."""
+        return len(self.result.results)
+
+    @property
+    def wrong(self) -> int:
+        """Number of results that are wrong or diverge."""
+        return _count(self.result.results, _WRONG)
+
+    @property
+    def worse(self) -> list[str]:
+        """What is worse than its record, each as "case on engine"."""
+        return [_label(row) for row in self.result.results if not row.holds]
+
+    @property
+    def better(self) -> list[str]:
+        """What is better than its record, each as "case on engine"."""
+        return [_label(row) for row in self.result.results if row.status == "better"]
+
+
+def page(result: ValidateResult, details: bool = False) -> Page:
+    """Return the result as a page.
+
+    Args:
+        result: What was measured.
+        details: Whether each case is shown, with its errors at every timestep and their costs.
+    """
+    results = result.results
+    engines = _engines(results)
+    room = max(_LINES - len(engines.rows), _LEAST_ROWS)
+    parts: list[_CasePart] = []
+    names = list(dict.fromkeys(row.name for row in results))
+    if details:
+        for name in names:
+            parts.append(_part([row for row in results if row.name == name]))
+    command = _next_command(result, names, details)
+    nearest = _nearest(results)
+    return render(ValidatePage(result, nearest, engines, _worst(results, room), parts, command))
+
+
+def _label(row: CaseResult) -> str:
+    return f"{row.name} on {row.way}"
+
+
+def _count(results: Sequence[CaseResult], verdicts: Sequence[str]) -> int:
+    return sum(row.verdict in verdicts for row in results)
+
+
+def _engines(results: Sequence[CaseResult]) -> Table:
+    """Return how many cases each engine and integrator does how."""
+    headers = ("engine", "exact", "converges", "bounded", "wrong", "refused")
+    rows: list[tuple[str, ...]] = []
+    ways = dict.fromkeys(row.way for row in results)
+    for way in list(ways)[:_MOST_ENGINES]:
+        mine = [row for row in results if row.way == way]
+        counts = (
+            _count(mine, _EXACT),
+            _count(mine, ("converges",)),
+            _count(mine, ("bounded",)),
+            _count(mine, _WRONG),
+            _count(mine, ("refused",)),
+        )
+        rows.append((way, *map(str, counts)))
+    return Table(headers, rows)
+
+
+def _nearest(results: Sequence[CaseResult]) -> _Nearest:
+    """Return who is wrong or refuses in the fewest cases, then is exact in most."""
+    marks: dict[_Nearest, tuple[int, int]] = {}
+    for way in dict.fromkeys(row.way for row in results):
+        mine = [row for row in results if row.way == way]
+        exact = _count(mine, _EXACT)
+        not_right = _count(mine, (*_WRONG, "refused"))
+        marks[_Nearest(way, len(mine), exact)] = (not_right, -exact)
+    return min(marks, key=marks.__getitem__)
+
+
+def badness(row: CaseResult) -> tuple[bool, float]:
+    """Return by what results are put in order: worse than on record first, then by the error.
+
+    Args:
+        row: Its error counts in parts of what the case tolerates.
+    """
+    if row.verdict == "refused":
+        size = 0.0
+    elif row.worst is None:
+        size = math.inf
+    else:
+        size = row.worst / row.case.tolerance
+    return not row.holds, size
+
+
+def _worst(results: Sequence[CaseResult], most: int) -> Table:
+    """Return the largest errors, in parts of what their cases tolerate.
+
+    Of a case and a backend one integrator stands for all.
+    """
+    headers = ("case", "engine", "error", "order", "verdict")
+    rows: list[tuple[str, ...]] = []
+    worst: dict[tuple[str, str], CaseResult] = {}
+    for row in sorted(results, key=badness, reverse=True):
+        worst.setdefault((row.name, row.backend), row)
+    for row in list(worst.values())[:most]:
+        error = row.measurements[0].error if row.measurements else None
+        rows.append((row.name, row.way, _error(row, error), _order(row), _verdict(row)))
+    return Table(headers, rows, words=frozenset({0, 1, 4}))
+
+
+def _error(row: CaseResult, error: float | None) -> str:
+    """Return an error as it is read; a relative one in per cent where it is large enough."""
+    if error is None:
+        return NO_NUMBER
+    if math.isinf(error):
+        return "no event"
+    if row.error_unit == "" and abs(error) >= 1e-4:
+        return f"{figure(100.0 * error)} %"
+    return quantity(error, row.error_unit)
+
+
+def _order(row: CaseResult) -> str:
+    return NO_NUMBER if row.order is None else f"{row.order:.1f}"
+
+
+def _verdict(row: CaseResult) -> str:
+    verdict = _SHORT.get(row.verdict, row.verdict)
+    return verdict if row.holds else f"{verdict} (!)"
+
+
+def _part(rows: Sequence[CaseResult]) -> _CasePart:
+    """Return what is shown of one case."""
+    first = rows[0]
+    timesteps = next((row.measurements for row in rows if row.measurements), ())
+    steps = [milliseconds(measurement.timestep) for measurement in timesteps]
+    errors: list[tuple[str, ...]] = []
+    verdicts: list[tuple[str, ...]] = []
+    work: list[tuple[str, ...]] = []
+    refusals: list[str] = []
+    for row in rows:
+        if not row.measurements:
+            refusals.append(f"{row.way}: {row.refusal}")
+            continue
+        sizes = [_error(row, measurement.error) for measurement in row.measurements]
+        errors.append((row.way, *sizes, _order(row)))
+        cause = NO_NUMBER if row.cause is None else row.cause
+        verdicts.append((row.way, row.verdict, cause, row.status))
+        work.append((row.way, *_costs(row)))
+    return _CasePart(
+        result=first,
+        errors=Table(("engine", *steps, "order"), errors),
+        verdicts=Table(_VERDICT_HEADERS, verdicts, words=frozenset(range(4))),
+        work=Table(("engine", *steps), work),
+        refusals=refusals,
+    )
+
+
+def _costs(row: CaseResult) -> list[str]:
+    """Return what the run took at each timestep: steps times the wall time of one."""
+    costs: list[str] = []
+    for measurement in row.measurements:
+        if measurement.seconds_per_step is None:
+            costs.append(NO_NUMBER)
+        else:
+            costs.append(milliseconds(measurement.steps * measurement.seconds_per_step, 2))
+    return costs
+
+
+def _next_command(result: ValidateResult, names: Sequence[str], details: bool) -> str:
+    """Return what to type next: all of what was asked, or of the worst case."""
+    worst = max(result.results, key=badness)
+    words = [NAME, "validate"]
+    for backend in result.request.backends:
+        words += ["--backend", backend]
+    if details and len(names) > 1:
+        return " ".join([*words, "--case", worst.name, "--json"])
+    words += ["--case", worst.name]
+    return " ".join([*words, "--json" if details else "--details"])
+
+
+def junit_of(result: ValidateResult) -> str:
+    """Return the result as tests in JUnit's XML: a suite an engine and integrator, a test a case.
+
+    A test fails where the engine is worse than on record, or wrong without one.
+    """
+    suites: list[TestSuite] = []
+    for way in dict.fromkeys(row.way for row in result.results):
+        tests: dict[str, str] = {}
+        for row in result.results:
+            if row.way == way:
+                tests[row.name] = "" if row.holds else _failure(row)
+        suites.append(TestSuite(f"validate {way}", tests))
+    return junit_text(suites)
+
+
+def _failure(row: CaseResult) -> str:
+    """Return what a failed test says: what came of it, and what is on record."""
+    sizes = ", ".join(_error(row, measurement.error) for measurement in row.measurements)
+    record = "nothing"
+    if row.expectation is not None:
+        within = quantity(row.expectation.within, row.error_unit)
+        record = f"{row.expectation.verdict}, within {within}"
+    return f"{row.verdict} (errors {sizes}, order {_order(row)}); on record: {record}"

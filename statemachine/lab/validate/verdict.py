@@ -1,0 +1,130 @@
+"""How an engine does in a case: one function makes every verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from .case import Case, Expectation, Verdict
+
+# The least size of an error of which an order is observed: below it is rounding.
+SMALLEST_OF_ORDER = 1e-11
+LEAST_ORDER = 0.5  # a smaller one is no convergence
+_ORDER_SLACK = 0.4  # what an observed order may be below the expected one
+_RANKS: tuple[Verdict, ...] = get_args(Verdict)
+
+Status = Literal["as expected", "better", "worse", "not on record"]
+
+
+@dataclass(frozen=True)
+class CaseMeasurement:
+    """What a case gave at one timestep.
+
+    Attributes:
+        timestep: [s].
+        measured: The number [unit of the case]; None if the run diverged.
+        error: How far it is from the truth [unit of the case's error]; None likewise.
+        discrete_error: How far it is from the exact discrete truth [unit of the case's error];
+            None without one.
+        steps: Number of steps of the run.
+        seconds_per_step: Wall time of a step, reading included [s]; None if the run diverged.
+    """
+
+    timestep: float
+    measured: float | None
+    error: float | None
+    discrete_error: float | None
+    steps: int
+    seconds_per_step: float | None
+
+
+def observed_order(case: Case, measurements: Sequence[CaseMeasurement]) -> float | None:
+    """Return with which power of the timestep the error vanishes, by least squares.
+
+    Only the first errors count that are above rounding and get smaller. None where fewer than two
+    are left, or where the end of the run is chaotic.
+    """
+    if case.is_chaotic:
+        return None
+    floor = max(SMALLEST_OF_ORDER, case.rounding)
+    lengths: list[float] = []
+    sizes: list[float] = []
+    for measurement in measurements:
+        error = measurement.error
+        if error is None or not floor < abs(error) < math.inf:
+            break
+        lengths.append(measurement.timestep)
+        sizes.append(abs(error))
+    if len(sizes) < 2:
+        return None
+    slope, _ = np.polyfit(np.log(lengths), np.log(sizes), 1)
+    return float(slope)
+
+
+def verdict_of(case: Case, measurements: Sequence[CaseMeasurement]) -> Verdict:
+    """Return how an engine does, from what was measured at each timestep.
+
+    Args:
+        case: Whose tolerances count.
+        measurements: From the longest timestep to the shortest; empty if it was refused.
+    """
+    if not measurements:
+        return "refused"
+    errors: list[float] = []
+    for measurement in measurements:
+        if measurement.error is None or math.isnan(measurement.error):
+            return "diverges"
+        errors.append(abs(measurement.error))
+    if max(errors) <= case.rounding:
+        return "exact"
+    discrete = [measurement.discrete_error for measurement in measurements]
+    if all(error is not None and abs(error) <= case.rounding for error in discrete):
+        return "exact discrete form"
+    order = observed_order(case, measurements)
+    if order is not None and order >= LEAST_ORDER and errors[-1] <= case.tolerance:
+        return "converges"
+    if max(errors) <= case.tolerance:
+        return "bounded"
+    return "wrong"
+
+
+def status_of(
+    case: Case,
+    measurements: Sequence[CaseMeasurement],
+    expectation: Expectation | None,
+) -> Status:
+    """Tell whether an engine does as its record says.
+
+    Args:
+        case: Whose longest timestep the record is of.
+        measurements: As of `verdict_of`.
+        expectation: The record; None if there is none.
+    """
+    if expectation is None:
+        return "not on record"
+    verdict = verdict_of(case, measurements)
+    order = observed_order(case, measurements)
+    expected = expectation.verdict
+    shows_no_order = len(measurements) == 1 and expected in ("converges", "wrong", "bounded")
+    if shows_no_order and verdict in ("bounded", "wrong"):
+        verdict = expected  # the size of the error tells then
+    if verdict != expected:
+        return "better" if _RANKS.index(verdict) < _RANKS.index(expected) else "worse"
+    if not measurements or measurements[0].error is None:
+        return "as expected"
+    if abs(measurements[0].error) > _bound(case, expectation, measurements[0].timestep):
+        return "worse"
+    if order is not None and expectation.order is not None:
+        return "as expected" if order >= expectation.order - _ORDER_SLACK else "worse"
+    return "as expected"
+
+
+def _bound(case: Case, expectation: Expectation, timestep: float) -> float:
+    """Return the largest error that is expected at a timestep, which may be a longer one."""
+    longer = max(timestep / case.timesteps[0], 1.0)
+    order = 1.0 if expectation.order is None else max(expectation.order, 1.0)
+    return expectation.within * longer**order

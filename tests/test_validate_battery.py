@@ -1,0 +1,217 @@
+"""The core of the battery: a case as a record, how it is run, and the one function of verdicts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from statemachine.backends import parse_backend
+from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.lab.validate.battery import ValidateRequest, answer, run_case
+from statemachine.lab.validate.case import (
+    Case,
+    Expectation,
+    Verdict,
+    bounded,
+    converges,
+    diverges,
+    exact,
+    exact_steps,
+    wrong,
+)
+from statemachine.lab.validate.cases import CASES, cases_of
+from statemachine.lab.validate.run import Run, Samples, zero_crossings
+from statemachine.lab.validate.variants import Variant, variants_of
+from statemachine.lab.validate.verdict import (
+    CaseMeasurement,
+    Status,
+    observed_order,
+    status_of,
+    verdict_of,
+)
+
+from .support.requirements import need_engine
+
+STEPS = (0.004, 0.002, 0.001)  # [s]
+_SLIDE = (
+    '<worldbody><body><joint type="slide" axis="0 0 1"/>'
+    '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
+)
+
+
+def height_after_a_tenth(run: Run) -> float:
+    run.advance(0.1)
+    return float(run.data.qpos[0])
+
+
+def fall(**changes: Any) -> Case:
+    """A case of our own: a weight on a slide falls for 0.1 s."""
+    case = Case(
+        name="fall",
+        group="motion",
+        description="A weight falls.",
+        mjcf=_SLIDE,
+        measure=height_after_a_tenth,
+        truth=lambda: -9.81 * 0.01 / 2.0,
+        unit="m",
+        source="any",
+        expected={"*": converges(1.0, 0.002)},
+        timesteps=STEPS,
+    )
+    return replace(case, **changes)
+
+
+def measured(*errors: float | None, discrete: float | None = None) -> list[CaseMeasurement]:
+    pairs = zip(STEPS, errors, strict=False)
+    return [CaseMeasurement(step, error, error, discrete, 10, 1e-6) for step, error in pairs]
+
+
+@pytest.mark.parametrize(
+    ("errors", "discrete", "verdict"),
+    [
+        ((1e-13, -1e-12, 0.0), None, "exact"),
+        ((0.004, 0.002, 0.001), 1e-14, "exact discrete form"),
+        ((0.004, 0.002, 0.001), 0.001, "converges"),
+        ((4.0, 2.0, 1.0), None, "wrong"),
+        ((0.01, 0.011, 0.01), None, "bounded"),
+        ((0.3, 0.3, 0.31), None, "wrong"),
+        ((0.3, None, 0.31), None, "diverges"),
+        ((0.3, math.nan, 0.31), None, "diverges"),
+        ((), None, "refused"),
+    ],
+)
+def test_verdict_follows_the_errors(
+    errors: tuple[float | None, ...], discrete: float | None, verdict: Verdict
+) -> None:
+    assert verdict_of(fall(), measured(*errors, discrete=discrete)) == verdict
+
+
+@pytest.mark.parametrize("power", [1, 2, 4])
+def test_order_is_the_power_of_the_timestep(power: int) -> None:
+    errors = [300.0 * step**power for step in STEPS]
+    assert observed_order(fall(rounding=0.0), measured(*errors)) == pytest.approx(power)
+
+
+def test_no_order_is_observed_of_rounding() -> None:
+    assert observed_order(fall(rounding=0.0), measured(4e-12, 2e-12, 1e-12)) is None
+
+
+def test_no_order_is_observed_of_a_chaotic_end() -> None:
+    assert observed_order(fall(is_chaotic=True), measured(0.4, 0.2, 0.1)) is None
+
+
+@pytest.mark.parametrize(
+    ("expectation", "errors", "status"),
+    [
+        (converges(1.0, 0.004), (0.004, 0.002, 0.001), "as expected"),
+        (converges(1.0, 0.003), (0.004, 0.002, 0.001), "worse"),
+        (converges(2.0, 0.004), (0.004, 0.002, 0.001), "worse"),
+        (converges(1.0, 0.004), (0.004, 0.001, 0.00025), "as expected"),
+        (converges(1.0, 0.004), (1e-12, 1e-12, 1e-12), "better"),
+        (exact(), (0.004, 0.002, 0.001), "worse"),
+        (exact_steps(0.004), (0.004, 0.002, 0.001), "worse"),
+        (bounded(0.01, "contact model"), (0.01, 0.01, 0.01), "as expected"),
+        (wrong(0.5, "engine's own"), (0.01, 0.01, 0.01), "better"),
+        (diverges("engine's own"), (None, None, None), "as expected"),
+        (None, (0.01, 0.01, 0.01), "not on record"),
+    ],
+)
+def test_status_compares_with_the_record(
+    expectation: Expectation | None, errors: tuple[float | None, ...], status: Status
+) -> None:
+    assert status_of(fall(), measured(*errors), expectation) == status
+
+
+def test_one_timestep_shows_no_order_and_is_held_by_the_size_of_its_error() -> None:
+    assert status_of(fall(), measured(0.004), converges(1.0, 0.004)) == "as expected"
+    assert status_of(fall(), measured(0.006), converges(1.0, 0.004)) == "worse"
+
+
+def test_a_record_is_found_by_engine_and_integrator_before_integrator_alone() -> None:
+    records = {"mujoco Euler": exact(), "Euler": converges(1.0, 1.0), "*": exact(1.0)}
+    case = fall(expected=records | {"mujoco==3.3.7 *": exact(2.0)})
+    assert case.expectation("mujoco", "Euler") == exact()
+    assert case.expectation("mujoco==3.4.0", "Euler") == exact()
+    assert case.expectation("mujoco==3.3.7", "Euler") == exact(2.0)
+    assert case.expectation("pybullet", "Euler") == converges(1.0, 1.0)
+    assert case.expectation("pybullet", "RK4") == exact(1.0)
+    assert fall(expected={"RK4": exact()}).expectation("mujoco", "Euler") is None
+
+
+def test_zero_crossings_are_those_of_a_sine() -> None:
+    times = np.arange(0.0, 7.0, 0.01)
+    samples = Samples(times, np.sin(times - 1.0))
+    np.testing.assert_allclose(zero_crossings(samples, rising=False), [1 + math.pi], atol=1e-9)
+    np.testing.assert_allclose(zero_crossings(samples, rising=True), [1.0], atol=1e-9)
+
+
+def test_a_release_lacks_an_integrator_that_came_later() -> None:
+    need_engine("mujoco")
+    names = [variant.integrator for variant in variants_of(parse_backend("mujoco"))]
+    assert {"Euler", "implicit", "implicitfast", "RK4"} <= set(names)
+
+
+def test_an_integrator_that_acts_as_another_is_left_out() -> None:
+    need_engine("pybullet")
+    names = [variant.integrator for variant in variants_of(parse_backend("pybullet"))]
+    assert names == ["Euler", "implicitfast"]
+
+
+def test_an_engine_as_it_comes_steps_in_one_way() -> None:
+    assert [str(v) for v in variants_of(parse_backend("pybullet:engine"))] == ["pybullet:engine"]
+
+
+def test_a_fall_is_measured_at_each_timestep() -> None:
+    need_engine("mujoco")
+    result = run_case(fall(), Variant(parse_backend("mujoco"), "Euler"))
+    # Semi-implicit: the velocity first, so each step falls g h² k, and n of them g h² n (n+1) / 2.
+    for measurement in result.measurements:
+        steps = round(0.1 / measurement.timestep)
+        height = -9.81 * measurement.timestep**2 * steps * (steps + 1) / 2.0
+        assert measurement.measured == pytest.approx(height, rel=1e-12)
+        assert measurement.steps == steps
+    assert result.verdict == "converges"
+    assert result.status == "as expected"
+    assert result.order == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_refused_model_is_a_verdict_and_no_error() -> None:
+    need_engine("mujoco")
+    broken = fall(mjcf="<worldbody><nothing/></worldbody>")
+    result = run_case(broken, Variant(parse_backend("mujoco"), "Euler"))
+    assert result.verdict == "refused"
+    assert result.refusal
+    assert not result.holds
+
+
+def test_the_battery_holds_where_all_is_as_recorded() -> None:
+    need_engine("mujoco")
+    result = answer(ValidateRequest(cases=("free-fall",), timesteps=(0.01, 0.005)))
+    assert result.holds
+    assert {row.name for row in result.results} == {"free-fall"}
+    assert list(result.versions) == ["mujoco"]
+
+
+def test_a_group_stands_for_its_cases() -> None:
+    assert {case.group for case in cases_of(("motion",))} == {"motion"}
+    assert cases_of(()) == list(CASES.values())
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ({"backends": ()}, BadInputError),
+        ({"backends": ("mujcoo",)}, UnknownNameError),
+        ({"cases": ("fre-fall",)}, UnknownNameError),
+        ({"timesteps": (0.0,)}, BadInputError),
+        ({"timesteps": (math.nan,)}, BadInputError),
+        ({"timesteps": (1.0,)}, BadInputError),
+    ],
+)
+def test_bad_requests_are_refused(words: dict[str, Any], error: type[Exception]) -> None:
+    with pytest.raises(error):
+        ValidateRequest(**words)

@@ -1,0 +1,142 @@
+"""`statemachine validate`: its page, JSON, JUnit and exit codes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from statemachine.backends import parse_backend
+from statemachine.cli import main
+from statemachine.lab.validate.battery import (
+    CaseResult,
+    ValidateRequest,
+    ValidateResult,
+    answer,
+    run_case,
+)
+from statemachine.lab.validate.case import exact
+from statemachine.lab.validate.cases import CASES
+from statemachine.lab.validate.page import badness, junit_of, page
+from statemachine.lab.validate.variants import Variant
+
+from .support.pages import shown
+from .support.requirements import need_engine
+
+SPRING = "spring-energy"
+
+
+@pytest.fixture(scope="module")
+def spring() -> ValidateResult:
+    need_engine("mujoco")
+    return answer(ValidateRequest(cases=(SPRING, "free-fall")))
+
+
+def of(result: ValidateResult, name: str, integrator: str) -> CaseResult:
+    rows = [row for row in result.results if (row.name, row.integrator) == (name, integrator)]
+    assert len(rows) == 1
+    return rows[0]
+
+
+def unexpected(result: ValidateResult) -> ValidateResult:
+    """The same result with a record that nothing on Euler keeps."""
+    results: list[CaseResult] = []
+    for row in result.results:
+        is_worse = row.name == SPRING and row.integrator == "Euler"
+        changed = replace(row, status="worse", expectation=exact()) if is_worse else row
+        results.append(changed)
+    return replace(result, results=tuple(results))
+
+
+def test_a_spring_loses_its_energy_with_discrete_at_every_timestep(spring: ValidateResult) -> None:
+    row = of(spring, SPRING, "discrete")
+    errors = [measurement.error for measurement in row.measurements]
+    assert errors == pytest.approx([-0.993, -0.865, -0.632, -0.393], abs=0.001)
+    assert row.verdict == "wrong"
+    assert row.holds  # it is on record
+
+
+def test_a_spring_keeps_its_energy_with_euler_to_the_first_order(spring: ValidateResult) -> None:
+    row = of(spring, SPRING, "Euler")
+    assert row.verdict == "converges"
+    assert row.order == pytest.approx(1.0, abs=0.05)
+    assert row.worst == pytest.approx(0.0256, abs=0.0003)
+
+
+@pytest.mark.slow
+def test_a_release_turns_bodies_to_the_second_order_with_rk4() -> None:
+    need_engine("mujoco==3.3.7")
+    row = run_case(CASES["chain-momentum"], Variant(parse_backend("mujoco==3.3.7"), "RK4"))
+    assert row.order == pytest.approx(2.0, abs=0.05)
+    now = run_case(CASES["chain-momentum"], Variant(parse_backend("mujoco"), "RK4"))
+    assert now.verdict == "exact"
+
+
+def test_the_page_fits_a_terminal(spring: ValidateResult) -> None:
+    text = shown(page(spring)).strip("\n")
+    assert len(text.splitlines()) <= 24
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_the_worst_row_is_the_first_on_the_page(spring: ValidateResult) -> None:
+    worst = max(spring.results, key=badness)
+    assert (worst.name, worst.integrator) == (SPRING, "discrete")
+
+
+def test_details_show_every_case_that_the_page_leaves_out(spring: ValidateResult) -> None:
+    source = CASES["free-fall"].source
+    assert source in " ".join(shown(page(spring, details=True)).split())
+    assert source not in " ".join(shown(page(spring)).split())
+
+
+def test_what_is_worse_than_on_record_comes_before_larger_errors(spring: ValidateResult) -> None:
+    worst = max(unexpected(spring).results, key=badness)
+    assert worst.integrator == "Euler"
+
+
+def test_a_result_that_is_worse_than_on_record_does_not_hold(spring: ValidateResult) -> None:
+    assert spring.holds
+    assert page(spring).holds
+    assert not unexpected(spring).holds
+    assert not page(unexpected(spring)).holds
+
+
+def test_junit_has_a_suite_for_each_way_of_stepping(spring: ValidateResult) -> None:
+    root = ElementTree.fromstring(junit_of(spring).split("\n", 1)[1])
+    names = [suite.get("name") for suite in root]
+    assert names == [f"validate {way}" for way in dict.fromkeys(r.way for r in spring.results)]
+    assert root.findall(".//failure") == []
+
+
+def test_a_failed_test_says_what_was_measured_and_what_is_on_record(
+    spring: ValidateResult,
+) -> None:
+    root = ElementTree.fromstring(junit_of(unexpected(spring)).split("\n", 1)[1])
+    failures = root.findall(".//testcase/failure")
+    assert len(failures) == 1
+    message = failures[0].get("message") or ""
+    assert "2.56 %" in message
+    assert "exact, within" in message
+
+
+def test_the_command_writes_tests_and_prints_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    need_engine("mujoco")
+    file = tmp_path / "tests.xml"
+    words = ["validate", "--case", "free-fall", "--timestep", "0.01", "--timestep", "0.005"]
+    assert main([*words, "--json", "--junit", str(file)]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["schema"] == 1
+    assert {row["name"] for row in result["results"]} == {"free-fall"}
+    timesteps = [entry["timestep"] for entry in result["results"][0]["measurements"]]
+    assert timesteps == [0.01, 0.005]
+    assert len(ElementTree.parse(file).getroot()) == len(result["results"])
+
+
+def test_an_unknown_case_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "--case", "fre-fall"]) == 2
+    assert "free-fall" in capsys.readouterr().err
