@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...errors import check_name
-from . import joints, limits, loops, motion, pendulums, rotation, tops
+from . import contact, joints, limits, loops, motion, pendulums, rotation, tops
 from .case import Case
 
 # A file of cases is added here.
@@ -17,6 +17,7 @@ _FILES = (
     joints.CASES,
     limits.CASES,
     loops.CASES,
+    contact.CASES,
 )
 CASES: dict[str, Case] = {case.name: case for cases in _FILES for case in cases}
 

@@ -1,0 +1,72 @@
+"""A wrong parameter is noticed by its case, on each engine that reads it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from statemachine.backends import parse_backend
+from statemachine.lab.validate.battery import CaseResult, run_case
+from statemachine.lab.validate.cases import CASES
+from statemachine.lab.validate.variants import Variant, variants_of
+from tools.validate_faults.__main__ import blind, nowhere
+from tools.validate_faults.matrix import Cell, outcome_of
+from tools.validate_faults.table import FAULTS, Fault
+
+NAMES = [fault.name for fault in FAULTS]
+
+
+@cache
+def sound(name: str, variant: Variant) -> CaseResult:
+    """Return what a case gives without a wrong parameter."""
+    return run_case(CASES[name], variant)
+
+
+def outcomes(fault: Fault, engine: str) -> set[str]:
+    """Return what its case does with a wrong parameter, on each variant of an engine."""
+    case = CASES[fault.case]
+    variants = variants_of(parse_backend(engine))
+    return {outcome_of(fault, case, each, sound(case.name, each)) for each in variants}
+
+
+def test_there_are_thirty_wrong_parameters_with_a_name_each() -> None:
+    assert len(set(NAMES)) == len(NAMES) >= 30
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
+def test_case_of_a_wrong_parameter_has_that_parameter(fault: Fault) -> None:
+    case = CASES[fault.case]
+    assert fault.change(case) is not case
+
+
+def test_no_wrong_parameter_is_on_record_as_missed() -> None:
+    records = {fault.on_pybullet for fault in FAULTS} | {fault.as_it_comes for fault in FAULTS}
+    assert records == {"noticed", "not read", "wrong anyway", "refused"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
+def test_wrong_parameter_is_noticed_with_each_integrator_of_mujoco(fault: Fault) -> None:
+    assert outcomes(fault, "mujoco") == {"noticed"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
+def test_wrong_parameter_is_noticed_on_pybullet_if_it_is_read(fault: Fault) -> None:
+    assert outcomes(fault, "pybullet") == {fault.on_pybullet}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
+def test_wrong_parameter_is_not_missed_where_pybullet_as_it_comes_is_right(fault: Fault) -> None:
+    assert outcomes(fault, "pybullet:engine") == {fault.as_it_comes}
+
+
+def test_a_case_that_notices_nothing_is_reported() -> None:
+    seen = Cell("gravity", "fall", "mujoco Euler", "noticed")
+    missed = Cell("gravity", "roll", "mujoco Euler", "missed")
+    unread = Cell("friction", "fall", "pybullet Euler", "not read")
+    cells = [seen, missed, unread]
+    assert blind(cells) == [("roll", "mujoco Euler")]
+    assert nowhere(cells) == ["roll"]

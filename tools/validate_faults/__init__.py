@@ -1,0 +1,1 @@
+"""Wrong parameters, and which cases of `statemachine validate` notice them."""
