@@ -574,6 +574,7 @@ def test_with_all_settings_equalized_the_gap_is_that_of_the_emulated_engine(
 ) -> None:
     result = explanations[name, "engine"]
     emulated = explanations[name, "model"].first[result.quantity].worst
+    assert result.equalized_gap is not None
     assert 0.9 * emulated < result.equalized_gap <= emulated + 1e-12  # at fewer moments
 
 
