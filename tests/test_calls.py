@@ -562,7 +562,7 @@ def test_code_of_another_engine_is_refused() -> None:
 
 def test_a_recording_in_a_recording_is_refused() -> None:
     nested = 'from statemachine.lab.probes.calls import record\nrecord("", "mujoco")'
-    assert isinstance(record(nested, "mujoco").error, BadInputError)
+    assert "cannot record another" in str(record(nested, "mujoco").error)
 
 
 FUNCTION = "@lambda f: f\ndef g():\n    return '''\n  x'''"

@@ -42,10 +42,10 @@ from statemachine.errors import BadInputError, StateMachineError, UnknownNameErr
 from statemachine.lab.recordings import record_scenario
 from statemachine.lab.runs.interleaved_timing import Ratio
 from statemachine.lab.runs.scenarios import SCENARIOS
-from statemachine.show import progress_bar as bar
 from statemachine.show import terminal
 from statemachine.show.blocks import Code, Heading, Page, Printed, Question, Table, Text, Verdict
 from statemachine.show.pictures import Traces
+from statemachine.show.progress import progress
 
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
@@ -249,7 +249,10 @@ _BELIED: dict[str, tuple[str, Change]] = {
         lambda r: with_figures(r, written=with_figures(r.written, in_engine=0.0)),
     ),
     "an array is made anew": ("forward", lambda r: with_figures(r, further=_anew(r.further))),
-    "a program prints something else": ("summary", lambda r: with_figures(r, changed=("replay",))),
+    "a program prints something else": (
+        "summary",
+        lambda r: with_figures(r, changed_lines=("replay",)),
+    ),
     "readings 3 and 4 are equal": ("forward", lambda r: with_figures(r, equal=((2, 3),))),
     "a step leaves what is new": (
         "forward",
@@ -302,7 +305,7 @@ _QUIET = Ratio("null", 1.0, 0.99, 1.01, 20)
         ("nowhere", lambda _: {}, 0),
         ("nowhere", lambda result: {"first": result.second}, 1),
         ("summary", lambda _: {}, 1),
-        ("summary", lambda _: {"changed": ("replay", "time")}, None),
+        ("summary", lambda _: {"changed_lines": ("replay", "time")}, None),
         ("time", lambda _: {"passed": 0.2}, 1),
         ("gravity", lambda _: {}, 2),
         ("gravity", lambda result: {"servos_on": result.servos_off}, 0),
@@ -750,8 +753,8 @@ def test_a_bar_of_progress_takes_nothing_of_what_is_printed(
 ) -> None:
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.setattr(bar, "_PATIENCE", -1.0)
-    with bar.progress("x") as report:
+    monkeypatch.setattr("statemachine.show.progress_bar.PATIENCE", -1.0)
+    with progress("x") as report:
         with contextlib.redirect_stdout(io.StringIO()) as printed:
             report(0.5)
             print("hello")

@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from statemachine.show import progress as bar
+from statemachine.show import waiting
+from statemachine.show.progress import progress
 from statemachine.show.remaining import LONG, RemainingTime, in_words
 
 from .support.processes import without_estimates
@@ -119,12 +120,12 @@ def test_a_time_is_said_to_two_digits(seconds: float, words: str) -> None:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(bar.time, "monotonic", clock)
+    monkeypatch.setattr(waiting.time, "monotonic", clock)
     return clock
 
 
 def _told(clock: Clock, seconds: float, runs: int, **how: int) -> None:
-    with bar.progress("why: shares", **how) as report:
+    with progress("why: shares", **how) as report:
         for done in range(1, runs + 1):
             clock.now += seconds
             report(done / runs)
@@ -156,7 +157,7 @@ def test_nothing_is_said_of_what_is_not_made_of_runs(
 def test_what_was_measured_before_is_said_at_once(
     clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with bar.progress("converge, steps 4 times finer", expected_seconds=40.0):
+    with progress("converge, steps 4 times finer", expected_seconds=40.0):
         assert capsys.readouterr().err == "converge, steps 4 times finer: about 40 s more\n"
 
 

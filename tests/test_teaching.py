@@ -150,17 +150,17 @@ PROOFS = {
         "test_check.test_a_file_that_sleeps_is_ended_by_the_clock",
     ),
     "| the verdict |": (
-        "test_check.test_it_reaches_neither_us_nor_the_files",
+        "test_check.test_what_reaches_out_does_not_pass",
         "test_shut_in.test_a_record_of_runs_that_never_were_does_not_pass",
     ),
     "Where the last column holds, the page says so": (
         "test_shut_in.test_the_table_says_where_reading_is_only_watched",
     ),
     'is "not graded", with the name of that file': (
-        "test_check.test_what_reads_somebody_s_answers_is_not_graded",
+        "test_check.test_what_reads_somebody_s_answers_is_not_graded_but_told_the_file",
     ),
     "A file outside, but for the system's (`/etc`, `/usr`)": (
-        "test_check.test_what_reads_somebody_s_answers_is_not_graded",
+        "test_check.test_what_reads_somebody_s_answers_is_not_graded_but_told_the_file",
         "test_shut_in.test_a_file_of_the_system_is_no_reason_to_look",
     ),
     "to import a judge, to start a program, to use the network or to look into another process": (

@@ -109,6 +109,8 @@ class PlacedBlocks:
         asked, listed, quoted = _nodes(caller())
         text, because = typed_text(_inline(asked)), typed_text(_inline(quoted.children[0]))
         choices = [typed_text(_inline(item.children[0])) for item in listed.children]
+        if undecided:
+            right = None
         return self._mark([Question(text, choices, right, because, always, undecided)])
 
     def written_table(self, title: str, caller: Callable[[], str]) -> Markdown:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .waiting import Wait
 
-_PATIENCE = 0.5  # seconds without a bar
+PATIENCE = 0.5  # seconds without a bar
 _PACE = 0.1  # seconds between two pictures of it
 
 
@@ -43,7 +43,7 @@ def shown_bar(what: str, wait: Wait) -> Iterator[Callable[[float], None]]:
         nonlocal started, drawn
         wait.ended(fraction)
         now = time.monotonic()
-        if not started and now - began > _PATIENCE:
+        if not started and now - began > PATIENCE:
             bar.start()
             started = True
         bar.update(task, completed=fraction, left=wait.words())

@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 class Wait:
     """What is known of how long it still takes."""
 
-    def __init__(self, runs_at_once: int, takes: float | None) -> None:
+    def __init__(self, runs_at_once: int, expected_seconds: float | None) -> None:
         self._measured: RemainingTime | None = None
         if runs_at_once:
             from .remaining import RemainingTime  # here, for most work is too short to measure
 
             self._measured = RemainingTime(runs_at_once)
-        self._takes, self._began = takes, time.monotonic()
+        self._expected_seconds, self._began = expected_seconds, time.monotonic()
 
     def ended(self, fraction: float) -> None:
         """Note what is done by now."""
@@ -28,8 +28,8 @@ class Wait:
     @property
     def seconds(self) -> float | None:
         """Return how long it still takes [s]; None where that is not known."""
-        if self._takes is not None:
-            return max(0.0, self._takes - (time.monotonic() - self._began))
+        if self._expected_seconds is not None:
+            return max(0.0, self._expected_seconds - (time.monotonic() - self._began))
         return None if self._measured is None else self._measured.seconds
 
     def words(self) -> str:

@@ -161,11 +161,13 @@ def _further_tables(results: Results[ForwardResult]) -> FurtherTables:
         return FurtherTables(Table((), ()), (), (), (), ())
     first = next(iter(further.values()))
     answers = {name: each.itself for name, each in further.items()}
+    changes = {name: each.changes for name, each in further.items()}
+    lag = {name: each.lag for name, each in further.items()}
     return FurtherTables(
         refused=refusals(first.effects),
-        changes=change_tables({name: each.changes for name, each in further.items()}, _SAY),
+        changes=change_tables(changes, _SAY),
         own_write=own_tables(answers, "write", _SAY),
-        lag=lag_tables({name: each.lag for name, each in further.items()}, _SAY),
+        lag=lag_tables(lag, _SAY),
         own_step=own_tables(answers, "step", _SAY),
     )
 

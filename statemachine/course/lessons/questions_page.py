@@ -107,15 +107,20 @@ def contents(results: Results[QuestionsResult], frame: LessonFrame) -> dict[str,
 def _content(result: QuestionsResult, frame: LessonFrame) -> QuestionsPage:
     """Return what the page shows of one engine."""
     answers = result.answers
+    has_two_addresses = _fails_behind_crate(answers.state, result.behind_crate)
+    repeats = _repeats_without_being_true(answers.replay)
+    is_held = _servo_carries_the_load(answers.gravity)
+    is_shared = _worlds_share_a_model(answers.objects)
+    is_still = _waiting_changes_nothing(answers.time)
     return QuestionsPage(
         lesson=frame,
         result=result,
         forward=_choice("forward", _waits_for_forward(answers.forward)),
-        state=_choice("state", _fails_behind_crate(answers.state, result.behind_crate)),
-        replay=_choice("replay", _repeats_without_being_true(answers.replay)),
-        gravity=_choice("gravity", _servo_carries_the_load(answers.gravity)),
-        objects=_choice("objects", _worlds_share_a_model(answers.objects)),
-        time=_choice("time", _waiting_changes_nothing(answers.time)),
+        state=_choice("state", has_two_addresses),
+        replay=_choice("replay", repeats),
+        gravity=_choice("gravity", is_held),
+        objects=_choice("objects", is_shared),
+        time=_choice("time", is_still),
     )
 
 
