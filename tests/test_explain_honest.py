@@ -97,7 +97,7 @@ def test_engine_settings_do_not_pay_for_another_file(
     typed = [
         f"{side}@pybullet:engine" if k == of_the_engine else side for k, side in enumerate(sides)
     ]
-    code, found = asked(capsys, "f.py:none", *typed, "--why", "--seconds", "0.3")
+    code, found = asked(capsys, "f.py:none", *typed, "--why", "--seconds", "0.6")
     assert code == 1
     assert found["unexplained"] > 0.9
 

@@ -26,8 +26,6 @@ from statemachine.lab.validate.contact import CASES as CONTACT
 from statemachine.lab.validate.soft_contact import SoftContact, Spring
 from statemachine.lab.validate.variants import Variant
 
-TIGHT = {"rtol": 1e-12, "atol": 1e-14}
-
 
 def integrated(
     slope: Callable[[float, np.ndarray], list[float]],
@@ -38,8 +36,10 @@ def integrated(
 ) -> tuple[float, np.ndarray]:
     """Return the time and the state at the event, or at the end without one."""
     if event is not None:
-        event.terminal = True
-    solution = solve_ivp(slope, (0.0, until), start, events=event, max_step=longest, **TIGHT)
+        event.terminal = True  # pyright: ignore[reportFunctionMemberAccess] (SciPy looks for it)
+    solution = solve_ivp(
+        slope, (0.0, until), start, events=event, max_step=longest, rtol=1e-12, atol=1e-14
+    )
     return float(solution.t[-1]), solution.y[:, -1]
 
 
@@ -223,7 +223,7 @@ def test_rocking_time_is_that_of_its_equation_of_motion() -> None:
 
 def test_rocking_frequency_is_that_of_the_inertia_about_the_edge() -> None:
     wide, tall = contact_tipping.WIDTH, contact_tipping.HEIGHT
-    inertia, _ = dblquad(lambda z, x: x**2 + z**2, 0.0, 2.0 * wide, 0.0, 2.0 * tall)
+    inertia = dblquad(lambda z, x: x**2 + z**2, 0.0, 2.0 * wide, 0.0, 2.0 * tall)[0]
     inertia /= 4.0 * wide * tall
     arm = math.hypot(wide, tall)
     assert contact_tipping.frequency() == pytest.approx(math.sqrt(GRAVITY * arm / inertia))
@@ -235,10 +235,9 @@ def test_rebound_keeps_the_angular_momentum_about_the_new_edge() -> None:
 
     def about(edge: float, centre: float) -> float:
         """Return the angular momentum about an edge of a turn about another, for 1 rad/s."""
-        value, _ = dblquad(
-            lambda z, x: (x - edge) * (x - centre) + z**2, -wide, wide, 0.0, 2.0 * tall
-        )
-        return value
+        return dblquad(lambda z, x: (x - edge) * (x - centre) + z**2, -wide, wide, 0.0, 2.0 * tall)[
+            0
+        ]
 
     kept = about(-wide, wide) / about(-wide, -wide)
     arm = GRAVITY * math.hypot(wide, tall)

@@ -5,9 +5,9 @@ what a student types for a Model, where `load` is the call that loads it; and
 `run(play, options, progress)`, which calls `play` (a `session.CodeRun`) once, looks on, and returns
 what was measured, a dataclass. One that draws a diagram also has `diagram(model)`; one whose
 options depend on the robot has `fit(model, options)`, which gives them back with nothing left open.
-`NAME_page.py` has `contents(results, frame)`: of the results by backend, and of what every lesson
+NAME_page.py has `contents(results, frame)`: of the results by backend, and of what every lesson
 shows (`frame`), it makes a `PageContent` for each backend. The template `NAME.md.j2` says it (see
-`show/templates.py`); labels of tables are macros in `NAME_labels.md.j2`. Terminal, documentation
+`show/templates.py`); labels of tables are macros in NAME_labels.md.j2. Terminal, documentation
 and notebook show the same page.
 """
 
