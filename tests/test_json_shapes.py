@@ -29,6 +29,7 @@ COMMANDS = [
     "conventions quaternion gravity --backend mujoco",
     "conventions --calls --backend mujoco",
     "fingertip --poses 5",
+    "validate --case free-fall --timestep 0.005",
     f"compare hold {ITSELF}",
     f"compare hold {ITSELF} --why",
     f"compare hold {ITSELF} --one-step",
