@@ -140,3 +140,11 @@ def test_the_command_writes_tests_and_prints_json(
 def test_an_unknown_case_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "--case", "fre-fall"]) == 2
     assert "free-fall" in capsys.readouterr().err
+
+
+def test_the_nearest_of_one_case_has_the_smallest_error() -> None:
+    need_engine("mujoco")
+    result = answer(ValidateRequest(cases=("bounce",)))
+    rows = [row for row in result.results if row.verdict != "wrong" and row.worst is not None]
+    smallest = min(rows, key=lambda row: row.worst or 0.0)
+    assert f"Nearest to the truth is {smallest.way}, " in shown(page(result))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -157,13 +158,17 @@ def _engines(results: Sequence[CaseResult]) -> Table:
 
 
 def _nearest(results: Sequence[CaseResult]) -> _Nearest:
-    """Return who is wrong or refuses in the fewest cases, then is exact in most."""
-    marks: dict[_Nearest, tuple[int, int]] = {}
+    """Return who is wrong or refuses least often, then is exact most often, then errs least.
+
+    The last is the median over its cases of the error, in parts of what a case tolerates.
+    """
+    marks: dict[_Nearest, tuple[int, int, float]] = {}
     for way in dict.fromkeys(row.way for row in results):
         mine = [row for row in results if row.way == way]
         exact = _count(mine, _EXACT)
         not_right = _count(mine, (*_WRONG, "refused"))
-        marks[_Nearest(way, len(mine), exact)] = (not_right, -exact)
+        median = statistics.median(badness(row)[1] for row in mine)
+        marks[_Nearest(way, len(mine), exact)] = (not_right, -exact, median)
     return min(marks, key=marks.__getitem__)
 
 
