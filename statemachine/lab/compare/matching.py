@@ -285,14 +285,31 @@ def _frame_places(tree: GroupTree) -> list[tuple[int, Placement]]:
 
 
 def _actuators(left: Model, right: Model, joints: Pairs, names: Mapping[str, str]) -> Pairs:
-    """Return the pairs of actuators: by name, then the n-th of a joint and the n-th of its pair."""
+    """Return the pairs of actuators: by name, then the n-th of a joint and the n-th of its pair.
+
+    Those without a name that drive no joint, such as the actuator of a site, are paired in their
+    order where both sides have as many.
+    """
     of_one_joint = (
         (left_id, right_id)
         for left_id, left_joint in enumerate(left.actuator_jntid.tolist())
         for right_id, right_joint in enumerate(right.actuator_jntid.tolist())
         if (left_joint, right_joint) in joints
     )
-    return _and_further(_by_name(left.actuator_names, right.actuator_names, names), of_one_joint)
+    further = [*of_one_joint]
+    left_others, right_others = _unnamed_without_joint(left), _unnamed_without_joint(right)
+    if len(left_others) == len(right_others):
+        further += zip(left_others, right_others, strict=True)
+    return _and_further(_by_name(left.actuator_names, right.actuator_names, names), further)
+
+
+def _unnamed_without_joint(model: Model) -> list[int]:
+    """Return the actuators without a name that drive a site, a tendon or a body."""
+    return [
+        number
+        for number, joint in enumerate(model.actuator_jntid.tolist())
+        if joint < 0 and not model.actuator_names[number]
+    ]
 
 
 def _unmatched_names(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:

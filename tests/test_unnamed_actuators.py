@@ -1,0 +1,50 @@
+"""Actuators that have no name and drive no joint: which of two files' are one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import statemachine as sm
+from statemachine.lab.compare.matching import match_models
+
+from .support.files import written
+from .support.requirements import need_engine
+
+ARM = """
+<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/>
+<geom size=".1" pos=".2 0 0" mass="{mass}"/><site name="tip" pos=".2 0 0"/></body></worldbody>
+<actuator>{actuators}</actuator></mujoco>
+"""
+UP = '<general site="tip" gear="0 0 1 0 0 0"/>'
+ACROSS = '<general site="tip" gear="0 1 0 0 0 0"/>'
+OF_THE_JOINT = '<motor joint="j"/>'
+
+
+def _pairs(folder: Path, left: str, right: str) -> tuple[tuple[int, int], ...]:
+    need_engine("mujoco")
+    models = [
+        sm.load(written(folder / f"{name}.xml", ARM.format(mass=mass, actuators=actuators)))
+        for name, mass, actuators in (("left", 1.0, left), ("right", 1.2, right))
+    ]
+    return match_models(*models).actuators
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "pairs"),
+    [
+        (UP, UP, ((0, 0),)),
+        (UP + ACROSS, UP + ACROSS, ((0, 0), (1, 1))),
+        (OF_THE_JOINT + UP, UP + OF_THE_JOINT, ((0, 1), (1, 0))),
+    ],
+    ids=["one", "two", "beside one of a joint"],
+)
+def test_as_many_on_both_sides_are_paired_in_their_order(
+    tmp_path: Path, left: str, right: str, pairs: tuple[tuple[int, int], ...]
+) -> None:
+    assert _pairs(tmp_path, left, right) == pairs
+
+
+def test_where_one_side_has_more_none_is_taken_for_another(tmp_path: Path) -> None:
+    assert _pairs(tmp_path, UP, UP + ACROSS) == ()
