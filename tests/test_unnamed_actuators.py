@@ -24,11 +24,9 @@ OF_THE_JOINT = '<motor joint="j"/>'
 
 def _pairs(folder: Path, left: str, right: str) -> tuple[tuple[int, int], ...]:
     need_engine("mujoco")
-    models = [
-        sm.load(written(folder / f"{name}.xml", ARM.format(mass=mass, actuators=actuators)))
-        for name, mass, actuators in (("left", 1.0, left), ("right", 1.2, right))
-    ]
-    return match_models(*models).actuators
+    one = sm.load(written(folder / "left.xml", ARM.format(mass=1.0, actuators=left)))
+    two = sm.load(written(folder / "right.xml", ARM.format(mass=1.2, actuators=right)))
+    return match_models(one, two).actuators
 
 
 @pytest.mark.parametrize(

@@ -67,8 +67,9 @@ def test_a_spring_keeps_its_energy_with_euler_to_the_first_order(spring: Validat
 
 
 @pytest.mark.slow
+@pytest.mark.network
+@pytest.mark.usefixtures("old_releases")
 def test_a_release_turns_bodies_to_the_second_order_with_rk4() -> None:
-    need_engine("mujoco==3.3.7")
     row = run_case(CASES["chain-momentum"], Variant(parse_backend("mujoco==3.3.7"), "RK4"))
     assert row.order == pytest.approx(2.0, abs=0.05)
     now = run_case(CASES["chain-momentum"], Variant(parse_backend("mujoco"), "RK4"))
