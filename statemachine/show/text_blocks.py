@@ -57,6 +57,7 @@ _SPELLINGS = {
     "→": "->",
     "█": "#",
     "≠": "!=",
+    "ö": "oe",  # of a name
     # Of diagrams: each is one letter, as what it stands for.
     "│": "|",
     "┌": "+",
