@@ -265,17 +265,17 @@ def _departure(
     """
     run = draw()
     known = {name: run.columns[name] for name in trace.columns if name in run.columns}
-    perturbed = Trace(replace(trace.header, ended=run.header.ended), known)
+    departed = Trace(replace(trace.header, ended=run.header.ended), known)
     distances: dict[str, Array] = {}
     try:
-        curves, count = series(trace, perturbed, comparison.tip), len(perturbed)
-        for touch in touches(trace, perturbed):
+        curves, count = series(trace, departed, comparison.tip), len(departed)
+        for touch in touches(trace, departed):
             left_first, right_first = touch.left.first, touch.right.first
             gap = comparison.until
             if left_first is not None and right_first is not None:
                 gap = abs(left_first - right_first)
             distances[f"{touch.pair}{_FIRST_TOUCH}"] = np.array([gap])
-        for outcome in outcomes_of(trace, perturbed, comparison.until):
+        for outcome in outcomes_of(trace, departed, comparison.until):
             far = np.inf if run.header.ended else outcome.difference
             distances[outcome.name] = np.array([far])
     except TraceError:  # it ended at once

@@ -237,7 +237,7 @@ def run_case(case: Case, variant: Variant, timesteps: Sequence[float] = ()) -> C
         case=case,
         backend=str(variant.backend),
         integrator=variant.integrator,
-        truth=case.truth(),
+        truth=case.true_value,
         measurements=measurements,
         order=observed_order(case, measurements),
         verdict=verdict_of(case, measurements),
@@ -285,7 +285,7 @@ def measure(case: Case, variant: Variant, timestep: float) -> CaseMeasurement:
     return CaseMeasurement(
         timestep=timestep,
         measured=measured,
-        error=case.error_of(measured, case.truth()),
+        error=case.error_of(measured, case.true_value),
         discrete_error=discrete_error,
         steps=run.steps,
         seconds_per_step=run.seconds / max(run.steps, 1),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 from ...errors import BadInputError
@@ -151,6 +152,11 @@ class Case:
             raise BadInputError(f"the timesteps of {self.name} must become shorter")
         if not self.expected:
             raise BadInputError(f"{self.name} says of no engine what to expect")
+
+    @cached_property
+    def true_value(self) -> float:
+        """Return the number of the closed form [unit], computed once: some take a quadrature."""
+        return self.truth()
 
     @property
     def error_unit(self) -> str:

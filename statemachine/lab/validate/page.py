@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import NO_NUMBER, figure, milliseconds, quantity
+from ...measures.text import NO_NUMBER, command, figure, milliseconds, quantity
 from ...program import NAME
 from ...show.blocks import Page, Table
 from ...show.junit import TestSuite, junit_text
@@ -126,9 +126,9 @@ def page(result: ValidateResult, details: bool = False) -> Page:
     if details:
         for name in names:
             parts.append(_part([row for row in results if row.name == name]))
-    command = _next_command(result, names, details)
-    nearest = _nearest(results)
-    return render(ValidatePage(result, nearest, engines, _worst(results, room), parts, command))
+    nearest, worst = _nearest(results), _worst(results, room)
+    following = _next_command(result, details)
+    return render(ValidatePage(result, nearest, engines, worst, parts, following))
 
 
 def _label(row: CaseResult) -> str:
@@ -261,16 +261,14 @@ def _costs(row: CaseResult) -> list[str]:
     return costs
 
 
-def _next_command(result: ValidateResult, names: Sequence[str], details: bool) -> str:
-    """Return what to type next: all of what was asked, or of the worst case."""
+def _next_command(result: ValidateResult, details: bool) -> str:
+    """Return what to type next, of the worst case: its details, or with them its JSON."""
     worst = max(result.results, key=badness)
     words = [NAME, "validate"]
     for backend in result.request.backends:
         words += ["--backend", backend]
-    if details and len(names) > 1:
-        return " ".join([*words, "--case", worst.name, "--json"])
-    words += ["--case", worst.name]
-    return " ".join([*words, "--json" if details else "--details"])
+    words += ["--case", worst.name, "--json" if details else "--details"]
+    return command(words)
 
 
 def junit_of(result: ValidateResult) -> str:
