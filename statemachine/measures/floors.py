@@ -72,22 +72,22 @@ class RobotScale:
 
     @property
     def weight(self) -> float:
-        """Its weight [N]."""
+        """Return its weight [N]."""
         return self.mass * GRAVITY
 
     @property
     def force(self) -> float:
-        """Floor of a contact's force [N]; what it does to a joint has a lower one of its own."""
+        """Return the floor of a contact's force [N]; that of a joint's force is lower."""
         return RUN_FORCE_SHARE * self.weight
 
     @property
     def energy(self) -> float:
-        """Floor of a change of energy [J]: what lifts the whole robot by a share of its size."""
+        """Return the floor of an energy change [J]: what lifts the robot by a share of its size."""
         return RUN_FORCE_SHARE * self.weight * self.size
 
     @property
     def acceleration(self) -> float:
-        """Floor of the acceleration of what slides, in one step [m/s²].
+        """Return the floor of the acceleration of what slides, in one step [m/s²].
 
         The floor of a force on it is that, times the inertia of its degree of freedom.
         """
@@ -95,7 +95,7 @@ class RobotScale:
 
     @property
     def angular_acceleration(self) -> float:
-        """Floor of the acceleration of what turns, in one step [rad/s²].
+        """Return the floor of the acceleration of what turns, in one step [rad/s²].
 
         It is that of a pendulum as long as the robot. The floor of a torque is that, times the
         inertia of its degree of freedom.
@@ -104,12 +104,12 @@ class RobotScale:
 
     @property
     def length(self) -> float:
-        """Floor of a place, or of a depth, in one step [m]."""
+        """Return the floor of a place, or of a depth, in one step [m]."""
         return STEP_SHARE * self.size
 
     @property
     def angle(self) -> float:
-        """Floor of a rotation, in one step [rad]."""
+        """Return the floor of a rotation, in one step [rad]."""
         return STEP_SHARE
 
 

@@ -36,7 +36,7 @@ class Gap:
 
     @property
     def shown(self) -> float:
-        """The size in the unit that is read, mm or degrees; infinite if it has none."""
+        """Return the size in the unit that is read, mm or degrees; infinite if it has none."""
         return np.inf if self.size is None else display_unit(self.unit)[0] * self.size
 
     def __str__(self) -> str:
@@ -103,17 +103,17 @@ class JointAddresses:
 
     @property
     def quats(self) -> Ints:
-        """Where all quaternions start: those of ball joints, then those of free bodies."""
+        """Return the starts of all quaternions: those of ball joints, then those of free bodies."""
         return np.concatenate([self.balls, self.free + 3])
 
     @property
     def positions(self) -> Ints:
-        """Where the coordinates of free bodies are."""
+        """Return the places of the coordinates of free bodies."""
         return (self.free[:, None] + np.arange(3)).ravel()
 
     @property
     def width(self) -> int:
-        """How many numbers there are."""
+        """Return the number of coordinates."""
         return len(self.hinges) + len(self.slides) + 4 * len(self.balls) + 7 * len(self.free)
 
 

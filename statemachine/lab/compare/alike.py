@@ -48,7 +48,7 @@ def match_sides(
 
 
 def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, Trace]:
-    """Both runs with the names of the left; commands in its order where both have all of them.
+    """Return both runs with the names of the left; commands in its order where both have all.
 
     What a joint, body or site of the left is called, its counterpart is called too. One
     without a counterpart whose name is taken is "NAME (right)". Where a joint has none, the

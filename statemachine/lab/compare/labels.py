@@ -163,7 +163,7 @@ def _options_to_compare(header: Header, other: Header) -> dict[str, OptionValue]
 
 
 def numbered(names: Two) -> Two:
-    """Two that are alike, with their places."""
+    """Return two labels that are alike, each with its place behind it."""
     return names if names[0] != names[1] else (f"{names[0]} (first)", f"{names[1]} (second)")
 
 

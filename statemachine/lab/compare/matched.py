@@ -37,7 +37,7 @@ class RenamedPair:
 
     @property
     def note(self) -> str:
-        """Both, in a sentence without its end."""
+        """Return both names as a sentence without its end."""
         return (
             f"{self.kind} {self.left!r} on the left is taken for {self.right!r} on the right: "
             f"{self.shared} ({self.suggestion} says otherwise)"
@@ -201,7 +201,7 @@ def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
 
 
 def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
-    """Pairs of places in act."""
+    """Return the pairs of places in act."""
     owner = ctrl_owners(left), ctrl_owners(right)
     pairs: set[tuple[int, int]] = set()
     for left_id, right_id in actuators:

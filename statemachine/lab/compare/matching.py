@@ -246,7 +246,7 @@ def _by_name(
 
 
 def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, int]]) -> Pairs:
-    """Pairs, and of some further ones, in turn, those whose ends are both left."""
+    """Return the pairs, and of some further ones, in turn, those whose ends are both left."""
     return tuple(sorted(one_to_one(further, pairs).items()))
 
 

@@ -199,7 +199,7 @@ def direction(draw: np.random.Generator) -> Array:
 
 
 def _nudged(values: Array, draw: np.random.Generator) -> Array:
-    """Values (n,) changed by rounding; what is not finite stays."""
+    """Return values (n,) changed by rounding; what is not finite stays."""
     finite = np.where(np.isfinite(values), values, 0.0)
     return values + ROUNDING * np.maximum(1.0, np.abs(finite)) * draw.uniform(-1, 1, len(values))
 

@@ -46,7 +46,7 @@ class Series:
 
     @property
     def unit(self) -> str:
-        """SI unit of the values."""
+        """Return the SI unit of the values."""
         return QUANTITIES[self.kind].unit
 
 
@@ -139,13 +139,13 @@ def _normal_forces_of_pairs(time: Array, sides: Sides) -> list[Series]:
 
 
 def _curve(name: str, kind: str, time: Array, left: Array, right: Array) -> Series:
-    """Numbers (n,), or vectors (n, k)."""
+    """Return the series of numbers (n,), or of vectors (n, k)."""
     gap = np.abs(left - right) if left.ndim == 1 else distances(left, right)
     return Series(name, kind, time, left, right, gap)
 
 
 def _turned(name: str, kind: str, time: Array, left: Array, right: Array) -> Series:
-    """Rotation matrices (n, 3, 3)."""
+    """Return the series of rotation matrices (n, 3, 3)."""
     return Series(name, kind, time, np.empty(0), np.empty(0), angle_between(left, right))
 
 
@@ -214,7 +214,7 @@ def normal_forces(trace: Trace) -> dict[str, Array]:
 
 
 def total_forces(trace: Trace) -> dict[str, Array]:
-    """Length of the sum of the contact forces (n,) [N] between each pair of bodies.
+    """Return the length of the sum of the contact forces (n,) [N] between each pair of bodies.
 
     Friction and all, added as vectors in world axes: neither at least nor at most the sum of
     the normal forces.
@@ -233,7 +233,7 @@ def _sums(trace: Trace, forces: Array) -> dict[str, Array]:
 
 
 def world_forces(trace: Trace) -> Array:
-    """Force (c, 3) [N] of each contact in world axes, on the body with the larger id."""
+    """Return the force (c, 3) [N] of each contact in world axes, on the body with the larger id."""
     # Rows of a contact frame are its axes; the force along them is that of geom 0 on geom 1.
     axes = trace["contact_frame"].reshape(-1, 3, 3)
     forces = np.einsum("nij,ni->nj", axes, trace["contact_force"])

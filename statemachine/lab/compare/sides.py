@@ -121,7 +121,7 @@ class Side:
         return model.replace(**all_options) if all_options else model
 
     def taking(self, parts: Sequence[str], of: Side, names: Mapping[str, str]) -> Side:
-        """Itself with some parts of another side's file; `names` as of `ReplacedParts`."""
+        """Return the side with some parts of another's file; `names` as of `ReplacedParts`."""
         return (
             replace(self, replaced_parts=ReplacedParts(tuple(parts), of, names)) if parts else self
         )
@@ -177,7 +177,7 @@ def _renamed(
 def with_options(
     sides: Sequence[Side], options: Mapping[str, OptionValue]
 ) -> tuple[list[Side], dict[str, OptionValue]]:
-    """Sides with what only they are given, and the options of `Model.replace` that both have.
+    """Return sides with the options that only they have, and those of `Model.replace` of both.
 
     Args:
         sides: Two.

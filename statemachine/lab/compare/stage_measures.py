@@ -56,7 +56,7 @@ class StageMeasure:
 
     @property
     def beyond(self) -> NDArray[np.bool_]:
-        """(n, k) what is beyond the tolerance, beyond its floor, and beyond the null."""
+        """Tell which values (n, k) are beyond the tolerance, its floor, and the null."""
         return self.gaps > np.maximum(np.maximum(self.tolerance, self.floors), self.null)
 
     @property

@@ -124,7 +124,7 @@ class StageReader:
         return [*self._poses(side, data), mass[self._upper][:, None], *forces]
 
     def _poses(self, side: int, data: Data) -> tuple[Array, Array]:
-        """Origins and rotations of the left's frames, wherever the right's are in the solids."""
+        """Return the left's origins and rotations, wherever the right's are in the solids."""
         xpos, xquat, positions, rotations = data.xpos, data.xquat, [], []
         for solid in self._matched.solids[1:]:
             body = (solid.left, solid.right)[side]

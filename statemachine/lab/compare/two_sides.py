@@ -205,7 +205,7 @@ def _loop(request: Request, left: Trace, right: Trace, matched: Matched | None) 
 
 
 def _opened(request: Request, progress: Progress) -> SidesRun:
-    """Two traces; or one, and what comes of its ctrl on the other engine."""
+    """Return two traces; or one, and what comes of its ctrl on the other engine."""
     traces = request.traces()
     both = len(traces) == 2
     refuse_of_run(request)

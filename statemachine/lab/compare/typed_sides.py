@@ -30,7 +30,7 @@ _SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 
 def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side]:
-    """Sides from words: FILE, FILE@ENGINE, FILE@ENGINE:engine, each with options behind it.
+    """Return the sides of words: FILE, FILE@ENGINE, FILE@ENGINE:engine, with options behind.
 
     An option, such as timestep=0.002, stands in the word of its side or in one of its own
     after it.

@@ -83,7 +83,7 @@ class DoctorPage(PageContent):
 
     @property
     def next_steps(self) -> list[HealthCheck]:
-        """What is to be done about what is not well."""
+        """Return the checks that ask for something to be done."""
         return [finding for finding in self.diagnosis.findings if finding.next_step]
 
 

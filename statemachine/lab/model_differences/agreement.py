@@ -52,7 +52,7 @@ class _Compared:
 
     @property
     def relative(self) -> float:
-        """How far they are apart, as a part of what that is set against."""
+        """Return how far they are apart, as a share of their scale."""
         if not self.size:
             return 0.0
         return self.size / self.scale if self.scale else math.inf

@@ -171,7 +171,7 @@ class Effects:
 
     @property
     def root(self) -> Pair:
-        """The rigid parts that carry all others, as the files state them."""
+        """Return the rigid parts that carry all others, as the files state them."""
         return self._stated.matching.pairs[0]
 
     def joints_of_parts(self) -> Iterator[tuple[RobotJoint, RobotJoint]]:

@@ -40,7 +40,7 @@ class JointLoad:
 
     @property
     def effort(self) -> float:
-        """The largest force of the joint; 0 where it is unlimited."""
+        """Return the largest force of the joint [N·m; of a slide, N]; 0 where it is unlimited."""
         effort = self.joint.effort
         if effort is None or not math.isfinite(effort):
             return 0.0
@@ -93,7 +93,7 @@ class SideLoads:
 
     @cached_property
     def loads(self) -> dict[str, JointLoad]:
-        """By the name of a joint what it carries."""
+        """Return what each joint carries, by its name."""
         loads: dict[str, JointLoad] = {}
         for group in self.tree.groups:
             if group.joint is not None:
@@ -102,12 +102,12 @@ class SideLoads:
 
     @cached_property
     def actuators(self) -> dict[str, Actuator]:
-        """By the name of an actuator what it is."""
+        """Return the actuators by their names."""
         return {actuator.name: actuator for actuator in self.tree.robot.actuators or ()}
 
     @cached_property
     def arms(self) -> dict[str, dict[str, float]]:
-        """By the name of an actuator its moment arms, by joint of this model."""
+        """Return the moment arms of each actuator by its name, by joint of this model."""
         arms = raw_engine_of(DEFAULT).moment_arms(self.model.compiled)
         return dict(zip(self.actuators, arms, strict=True))
 

@@ -47,7 +47,7 @@ class Locator:
 
     @cached_property
     def _counterparts(self) -> dict[str, dict[int, int]]:
-        """By the kind of an element, the id on the right by that on the left."""
+        """Return for each kind of element the id on the right by that on the left."""
         matched = self._matched
         left, right = matched.left.compiled, matched.right.compiled
         counterparts = {

@@ -74,83 +74,83 @@ class ModelsPage(PageContent):
 
     @property
     def left_name(self) -> str:
-        """The left file, and its engine if that has read it."""
+        """Return the left file, and its engine if that has read it."""
         return _name(self.result.left)
 
     @property
     def right_name(self) -> str:
-        """The right file, and its engine if that has read it."""
+        """Return the right file, and its engine if that has read it."""
         return _name(self.result.right)
 
     @property
     def state(self) -> ModelsState:
-        """Whether anything differs that acts on a motion."""
+        """Return whether anything differs that acts on a motion."""
         if self.acting:
             return "differs"
         return "not all compared" if self.result.skipped else "equal"
 
     @property
     def acting(self) -> list[ListedDifference]:
-        """The differences that act on a motion."""
+        """Return the differences that act on a motion."""
         return [row for row in self.result.differences if row.matters]
 
     @property
     def subjects(self) -> list[str]:
-        """The subjects of these, each with how many there are."""
+        """Return the subjects of these, each with its number of differences."""
         return _counts(self.acting)
 
     @property
     def record(self) -> list[str]:
-        """The subjects of what does not act, each with how many there are."""
+        """Return the subjects of what does not act, each with its number of differences."""
         return _counts([row for row in self.result.differences if not row.matters])
 
     @property
     def largest(self) -> AlikeDifferences | None:
-        """The weightiest difference; None where there is none."""
+        """Return the weightiest difference; None where there is none."""
         groups = weightiest(self.result)
         return groups[0] if groups else None
 
     @property
     def gross(self) -> list[str]:
-        """What is drawn far too large or too small, in words."""
+        """Return what is drawn far too large or too small, in words."""
         return [f"{row.element}, {row.effect}" for row in gross_visuals(self.result)]
 
     @property
     def paired(self) -> Sequence[RenamedPair]:
-        """What was taken for one although the names differ."""
+        """Return the elements that are paired although their names differ."""
         return self.result.renamed
 
     @property
     def hint(self) -> Hint:
-        """What is said of the details; "" where they are shown."""
+        """Return what the details would show; "" where they are shown."""
         if self.details:
             return ""
         return "differences" if self.result.differences else "figures"
 
     @property
     def joints(self) -> int:
-        """How many joints were moved to compare poses."""
+        """Return the number of joints that were moved to compare poses."""
         return self.result.posed.joints
 
     @property
     def distance(self) -> str:
-        """How far apart a link is at most where joints have the same positions."""
+        """Return the largest distance of a link where joints have the same positions."""
         return _tiny(self.result.posed.distance, "m")
 
     @property
     def angle(self) -> str:
-        """How far turned a link is at most where joints have the same positions."""
+        """Return the largest rotation of a link where joints have the same positions."""
         return _tiny(self.result.posed.angle, "rad")
 
     @property
     def furthest(self) -> str:
-        """The link that is furthest off; "" where none is."""
+        """Return the link that is furthest off; "" where none is."""
         posed = self.result.posed
         return posed.link if posed.joints and posed.distance > _POSITION_TOLERANCE else ""
 
     @property
     def sides(self) -> Table:
-        """How both sides were read, and what they have."""
+        """Return how both sides were read, and what they have."""
         rows = zip(
             _SIDE_COLUMNS, _column(self.result.left), _column(self.result.right), strict=True
         )
@@ -158,18 +158,18 @@ class ModelsPage(PageContent):
 
     @property
     def emulated(self) -> str:
-        """The engine that read a file, and emulates the contract in a run; "" without one."""
+        """Return the engine that read a file and emulates the contract in a run; "" without."""
         return self._engine_that_reads().emulated
 
     @property
     def written(self) -> str:
-        """The same, where the file reaches it as a URDF that is written; "" else."""
+        """Return that engine where the file reaches it as a URDF that is written; "" else."""
         side = self._engine_that_reads()
         return side.emulated if side.is_mjcf else ""
 
     @property
     def unlike(self) -> str:
-        """What a run has that the engine's own users do not have; "" for nothing."""
+        """Return what a run has that the engine's own users do not have; "" for nothing."""
         left, right = self.result.left.unlike_its_users, self.result.right.unlike_its_users
         return capital(left if left else right)
 
@@ -180,40 +180,40 @@ class ModelsPage(PageContent):
 
     @property
     def faults(self) -> Table:
-        """What is wrong in a file, and what a run has instead."""
+        """Return what is wrong in a file, and what a run has instead."""
         return faults_table(self.result.faults)
 
     @property
     def reasons(self) -> list[str]:
-        """Why, as MuJoCo says it."""
+        """Return the reasons for these, as MuJoCo gives them."""
         return reasons_of(self.result.faults)
 
     @property
     def lack(self) -> LackOfArmature | None:
-        """What the lack of armature on one side does to a joint, if it lacks there."""
+        """Return what the lack of armature on one side does to a joint, if it lacks there."""
         return lack_of_armature(self.result.differences)
 
     @property
     def records(self) -> Table:
-        """What does not act on a motion: how many of each subject."""
+        """Return what does not act on a motion: the number of differences of each subject."""
         idle = [row for row in self.result.differences if not row.matters]
         return record_table(idle, _files(self.result))
 
     @property
     def elements(self) -> list[ElementChange]:
-        """The elements of the right's file whose attributes undo differences."""
+        """Return the elements of the right's file whose attributes undo differences."""
         return element_changes(self.result.changes)
 
     @property
     def unwritten(self) -> list[UnwrittenGroup]:
-        """What no attribute undoes; where there is no file to change, what cannot be equalized."""
+        """Return what no attribute undoes; without a file to change, what cannot be equalized."""
         if self.result.changes:
             return unwritten_groups(self.result.changes)
         return refused_groups(self.result.differences)
 
     @property
     def pairs(self) -> Table:
-        """What was taken for one although the names differ, a row for each pair."""
+        """Return the elements that are paired although their names differ, a row for each pair."""
         rows: list[tuple[str, ...]] = []
         for pair in self.result.renamed:
             rows.append((pair.kind, pair.left, pair.right, pair.suggestion))
@@ -223,12 +223,12 @@ class ModelsPage(PageContent):
 
     @property
     def equal(self) -> Table:
-        """How well both sides agree, a row for each subject."""
+        """Return how well both sides agree, a row for each subject."""
         return _equal(self.result.agreements)
 
     @property
     def notes(self) -> list[str]:
-        """What a reader should know, in sentences."""
+        """Return what a reader should know, in sentences."""
         result = self.result
         notes = [f"left: {note}" for note in result.left.notes]
         notes += [f"right: {note}" for note in result.right.notes]
@@ -236,7 +236,7 @@ class ModelsPage(PageContent):
 
     @property
     def versions(self) -> str:
-        """What computed it."""
+        """Return the versions of the programs that computed it."""
         return versions_text(self.result.versions)
 
 

@@ -36,22 +36,22 @@ class FileAsked:
 
     @property
     def path(self) -> Path:
-        """The file, with its folder."""
+        """Return the file, with its folder."""
         return resolve(self.file, self.menagerie)
 
     @property
     def label(self) -> str:
-        """As one types it for a run: "a.xml", "a.xml@pybullet"."""
+        """Return the file as one types it for a run: "a.xml", "a.xml@pybullet"."""
         return f"{self.file}@{self.engine}" if self.engine else str(self.file)
 
     @property
     def is_urdf(self) -> bool:
-        """Whether the file is a URDF."""
+        """Tell whether the file is a URDF."""
         return self.path.suffix.lower() == ".urdf"
 
     @property
     def is_open(self) -> bool:
-        """Whether it leaves open if its base floats: the text of a URDF does."""
+        """Tell whether it leaves open if its base floats: the text of a URDF does."""
         return self.is_urdf and self.engine is None
 
 

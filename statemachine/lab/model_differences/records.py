@@ -76,7 +76,7 @@ class ListedDifference:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What it is known by: the kind of its element, the element, and the quantity."""
+        """Return what identifies it: the kind of its element, the element, and the quantity."""
         return self.kind, self.element, self.quantity
 
 
@@ -245,10 +245,10 @@ class ModelsComparison:
 
     @property
     def mass(self) -> tuple[float, float]:
-        """The mass of each robot in all [kg]."""
+        """Return the mass of each whole robot [kg]."""
         return self.left.mass, self.right.mass
 
     @property
     def equal(self) -> bool:
-        """Whether everything was compared, and nothing was found that matters."""
+        """Tell whether everything was compared, and nothing was found that matters."""
         return not self.skipped and not any(row.matters for row in self.differences)

@@ -98,12 +98,12 @@ class AlikeDifferences:
 
     @property
     def first(self) -> ListedDifference:
-        """The weightiest of them."""
+        """Return the weightiest of them."""
         return self.rows[0]
 
     @property
     def label(self) -> str:
-        """What it is called: as its difference is, with the figure that it is of it."""
+        """Return its label: that of its difference, with the figure that it is of it."""
         row, more = self.first, len(self.rows) - 1
         name = _name_of(row)
         name = f"{capital(name)} + {more} more" if more else capital(name)
@@ -114,7 +114,7 @@ class AlikeDifferences:
 
     @property
     def short_label(self) -> str:
-        """The element and its figure, for a table that has little room."""
+        """Return the element and its figure, for a table that has little room."""
         row, more = self.first, len(self.rows) - 1
         if not row.element or row.subject in _TEXT_SUBJECTS:
             return self.label
@@ -124,23 +124,23 @@ class AlikeDifferences:
 
     @property
     def left(self) -> str:
-        """The left's value."""
+        """Return the left's value."""
         return value_text(self.first.left, _unit_of(self.first))
 
     @property
     def right(self) -> str:
-        """The right's value."""
+        """Return the right's value."""
         return value_text(self.first.right, _unit_of(self.first))
 
     @property
     def effect(self) -> str:
-        """What it means for a motion; of several the first and the last."""
+        """Return what it means for a motion; of several the first and the last."""
         effects = dict.fromkeys((self.first.effect, self.rows[-1].effect))
         return " … ".join(effects)
 
     @property
     def apart(self) -> str:
-        """How far the values are apart; "" where that says nothing."""
+        """Return how far the values are apart; "" where that says nothing."""
         if self.first.size is None or self.first.subject == "drawing":
             return ""
         return _number(self.first.size, _unit_of(self.first), DIFFERENCE_TEXTS)

@@ -47,7 +47,7 @@ class PlacedVisual:
 
     @property
     def label(self) -> str:
-        """What it is called: by the name of the shape, of its mesh, or its kind."""
+        """Return its label: the name of the shape, of its mesh, or its kind."""
         for name in (self.shape.name, PurePath(self.shape.mesh).stem):
             if name:
                 return f"{name} on {self.shape.body}"
@@ -55,7 +55,7 @@ class PlacedVisual:
 
     @property
     def drawing(self) -> str:
-        """What is drawn: the mesh file, or the kind of another shape."""
+        """Return what is drawn: the mesh file, or the kind of another shape."""
         return self.shape.mesh if self.shape.mesh else self.shape.kind
 
 

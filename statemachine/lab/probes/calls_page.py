@@ -37,7 +37,7 @@ class _Answer:
 
     @property
     def state(self) -> Literal["calls", "computed later", "changed", "nothing"]:
-        """What there is to tell."""
+        """Return what there is to report."""
         if self.calls.rows:
             return "calls"
         if self.due:

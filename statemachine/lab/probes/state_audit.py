@@ -45,7 +45,7 @@ class FutureGap:
 
     @property
     def exact(self) -> bool:
-        """Whether every byte is the same."""
+        """Tell whether every byte is the same."""
         return self.first is None
 
     def __str__(self) -> str:
@@ -73,7 +73,7 @@ class OmittedStatePart:
 
     @property
     def decides(self) -> bool:
-        """Whether another value of it leads to another future."""
+        """Tell whether another value of it leads to another future."""
         return self.gap is not None and not self.gap.exact
 
 
@@ -102,17 +102,17 @@ class Audit:
 
     @property
     def decides(self) -> tuple[str, ...]:
-        """Names of the parts that decide the future."""
+        """Return the names of the parts that decide the future."""
         return tuple(part.name for part in self.parts if part.decides)
 
     @property
     def idle(self) -> tuple[str, ...]:
-        """Names of the parts that were left out and changed nothing."""
+        """Return the names of the parts that were left out and changed nothing."""
         return tuple(part.name for part in self.parts if part.gap is not None and part.gap.exact)
 
     @property
     def not_tried(self) -> tuple[str, ...]:
-        """Names of the parts that both runs had in common."""
+        """Return the names of the parts that both runs had in common."""
         return tuple(part.name for part in self.parts if part.gap is None)
 
     def __str__(self) -> str:

@@ -116,7 +116,7 @@ class CompareFigures(PageContent):
 
     @property
     def reasons(self) -> Table:
-        """Why each tolerance is what it is."""
+        """Return the reason of each tolerance."""
         return _reasons(self.comparison.agreements)
 
     @property

@@ -49,7 +49,7 @@ class _Verdict:
 
     @property
     def divergence(self) -> Divergence | None:
-        """When the runs diverge."""
+        """Return when the runs diverge; None where they do not."""
         return self.finding.divergence
 
 
@@ -137,7 +137,7 @@ class EndedVerdict(_Verdict, PageContent):
 
     @property
     def reason(self) -> str:
-        """Why it ended, without the end of the sentence."""
+        """Return why it ended, without the end of the sentence."""
         return shortened([self.ended.reason.rstrip(".")], _REASON)[0]
 
     @property

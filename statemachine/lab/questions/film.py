@@ -65,7 +65,7 @@ class Timing:
 
     @property
     def times(self) -> Array:
-        """(count,) simulated time of each [s]."""
+        """Return the simulated time of each picture (count,) [s]."""
         return np.arange(self.count) / self.fps
 
     @property
@@ -187,7 +187,7 @@ def frames(
     renderer: Renderer,
     camera: Camera | None = None,
 ) -> Generator[Pixels]:
-    """Pictures (height, width, 3) uint8 of one trace, or of two in one place.
+    """Yield pictures (height, width, 3) uint8 of one trace, or of two in one place.
 
     Args:
         traces: The first is drawn solid, a second one as a ghost where it parts from the first.

@@ -66,7 +66,7 @@ class Overlay:
         self._to_come = Image.blend(self._done, white, _TO_COME)
 
     def _paper(self, title: str, labels: Sequence[str], points: float) -> Any:
-        """Title, labels and the strip, as a figure of matplotlib's."""
+        """Return title, labels and the strip, as a figure of matplotlib's."""
         from matplotlib.figure import Figure
         from matplotlib.patches import Patch
 
@@ -93,7 +93,7 @@ class Overlay:
         return figure
 
     def paint(self, shot: Any, k: int) -> Any:
-        """Picture `k`, whole, as an image of Pillow's."""
+        """Return picture `k`, whole, as an image of Pillow's."""
         from PIL import Image, ImageDraw
 
         (width, height), time = self._size, float(self._times[k])

@@ -248,7 +248,7 @@ def _origin(*traces: Trace) -> list[str]:
 
 
 def drawn(plot: TracePlot, form: str) -> bytes:
-    """A figure as svg, png or pdf; the same figure gives the same bytes.
+    """Return a figure as svg, png or pdf; the same figure gives the same bytes.
 
     Raises:
         MissingEngineError: matplotlib is not installed.

@@ -122,7 +122,7 @@ class Header:
 
     @property
     def label(self) -> str:
-        """The backend and its version, and what is unusual about them."""
+        """Return the backend and its version, and what is unusual about them."""
         version = self.provenance.versions.get(self.backend, "")
         text = f"{engine_of(self.backend)} {version}".strip()
         if self.defaults == "engine":
@@ -131,7 +131,7 @@ class Header:
 
     @property
     def counts(self) -> dict[str, int]:
-        """The lengths that `COLUMNS` speaks of."""
+        """Return the lengths that `COLUMNS` speaks of."""
         return {
             "nq": self.nq,
             "nv": self.nv,
@@ -176,19 +176,19 @@ class Header:
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
-        """A name for each joint: its own, or "joint 0"; a free joint is called by its body."""
+        """Return a name for each joint: its own, or "joint 0"; of a free joint that of its body."""
         return labels_of_joints(self.joints, self.jnt_type, self.jnt_bodyid, self.bodies)
 
     @property
     def moving_sites(self) -> tuple[bool, ...] | None:
-        """Whether joints move each site; None of a trace that does not tell."""
+        """Tell which sites are moved by joints; None of a trace that does not tell."""
         if len(self.site_bodyid) != len(self.sites):
             return None
         return moving_sites(self.site_bodyid, self.body_parentid, self.jnt_bodyid)
 
     @property
     def body_labels(self) -> tuple[str, ...]:
-        """A name for each body: its own, or "body 1" by its number."""
+        """Return a name for each body: its own, or "body 1" by its number."""
         return tuple(name or f"body {k}" for k, name in enumerate(self.bodies))
 
     def _check(self) -> None:

@@ -80,7 +80,7 @@ class RecordRequest:
 
     @property
     def name(self) -> str:
-        """What is done, in a word: the experiment, the stem of the file, or the function."""
+        """Return its name, a word: the experiment, the stem of the file, or the function."""
         if isinstance(self.what, str):
             return function_file(self.what).stem
         return file_and_name_of(self.what)[1]

@@ -140,27 +140,27 @@ class Trace:
 
     @property
     def timestep(self) -> float:
-        """Simulated time between two rows [s]."""
+        """Return the simulated time between two rows [s]."""
         return self.header.timestep
 
     @property
     def time(self) -> Array:
-        """(n,) [s]."""
+        """Return the time of each row (n,) [s]."""
         return self.columns["time"]
 
     @property
     def qpos(self) -> Array:
-        """(n, nq) positions."""
+        """Return the positions (n, nq)."""
         return self.columns["qpos"]
 
     @property
     def qvel(self) -> Array:
-        """(n, nv) velocities."""
+        """Return the velocities (n, nv)."""
         return self.columns["qvel"]
 
     @property
     def ctrl(self) -> Array:
-        """(n, nu) commands; those of a row are in force from its time on."""
+        """Return the commands (n, nu); those of a row are in force from its time on."""
         return self.columns["ctrl"]
 
     def site(self, name: str) -> tuple[Array, Array]:
@@ -170,7 +170,7 @@ class Trace:
 
     @cached_property
     def contact_pairs(self) -> Mapping[str, Ints]:
-        """Which contacts are of each pair of bodies: their places by "gripper on box"."""
+        """Return the places of the contacts of each pair of bodies, by "gripper on box"."""
         geoms = self["contact_geom"].tolist() if "contact_geom" in self else []
         of_pair = grouped((self._contact_names.pair(*pair), k) for k, pair in enumerate(geoms))
         return {pair: np.array(places) for pair, places in of_pair.items()}
@@ -182,7 +182,7 @@ class Trace:
 
     @cached_property
     def overlaps(self) -> list[str]:
-        """Shapes that are inside each other in the first row, as `measures.overlaps` has them."""
+        """Return shapes that overlap in the first row, as `measures.overlaps` does."""
         if "contact_row" not in self:
             return []
         first = self["contact_row"] == 0

@@ -265,7 +265,7 @@ class _Examination:
         return RUNS
 
     def _cost(self, model: Model) -> float | None:
-        """Time of a step over that of the engine, driven by its own functions, in turns."""
+        """Return the time of a step over that of the engine by its own functions, in turns."""
         engine = raw_engine_of(model.backend)
         if not model.nv or not engine.can("stepper"):
             return None

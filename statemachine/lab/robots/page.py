@@ -68,28 +68,28 @@ class RobotsPage(PageContent):
 
     @property
     def model_count(self) -> int:
-        """Number of models."""
+        """Return the number of models."""
         return len(self.survey.models)
 
     @property
     def inside(self) -> list[str]:
-        """Models whose shapes are inside each other at the start, each with the deepest pair."""
+        """Return the models whose shapes overlap at the start, each with the deepest pair."""
         return [f"{row.file}, {row.inside[0]}" for row in self.survey.models if row.inside]
 
     @property
     def wrong(self) -> list[str]:
-        """All that contradicts, each with its model's file."""
+        """Return all that contradicts, each with its model's file."""
         wrong = self.survey.wrong.items()
         return [f"{file}: {text}" for file, texts in wrong for text in texts]
 
     @property
     def wrong_listed(self) -> list[str]:
-        """The first of what contradicts."""
+        """Return the first of what contradicts."""
         return self.wrong[:_LISTED]
 
     @property
     def wrong_unlisted(self) -> int:
-        """How much more contradicts."""
+        """Return the number of further contradictions."""
         return max(len(self.wrong) - _LISTED, 0)
 
 
@@ -141,7 +141,7 @@ class RobotPage(PageContent):
 
     @property
     def was_loaded(self) -> bool:
-        """Whether an engine told the sizes of the model."""
+        """Tell whether an engine gave the sizes of the model."""
         return self.model.nq is not None
 
 

@@ -70,28 +70,28 @@ class RunGap:
 
     @property
     def largest(self) -> float:
-        """The largest of them, in SI units; 0 where there is none."""
+        """Return the largest of them, in SI units; 0 where there is none."""
         return max((self.hinge or 0.0, self.slide or 0.0, self.position or 0.0, self.turn or 0.0))
 
     @property
     def is_rounding(self) -> bool:
-        """Whether rounding alone makes about as much: nothing is known of the engines then."""
+        """Tell whether rounding alone makes about as much: nothing is known of the engines then."""
         return self.floor is not None and self.largest <= _ONE_RUN * self.floor
 
     @property
     def explodes(self) -> bool:
-        """Whether the other engine went far beyond where the first one went."""
+        """Tell whether the other engine went far beyond where the first one went."""
         return self.largest > _FAR * max(self.moved, _STILL)
 
     @property
     def first_order(self) -> bool:
-        """Whether it vanishes with the timestep, as that of two integrators does."""
+        """Tell whether it vanishes with the timestep, as that of two integrators does."""
         return self.shrinks is not None and self.shrinks >= _FIRST_ORDER
 
     @property
     @only_on_pages
     def outcome(self) -> GapOutcome:
-        """The first of these that holds; "measured" where the size of the gap says it all."""
+        """Return the first of these that holds; "measured" where the size says it all."""
         if self.explodes:
             return "explodes"
         if self.ended:
@@ -137,13 +137,13 @@ class BackendRow:
 
     @property
     def loads(self) -> bool:
-        """Whether it loads with contacts."""
+        """Tell whether it loads with contacts."""
         return not self.refusal
 
     @property
     @only_on_pages
     def loading(self) -> Loading:
-        """With what it loads."""
+        """Return with what it loads."""
         if self.loads:
             return "with contacts"
         if not self.refusal_without:
@@ -152,7 +152,7 @@ class BackendRow:
 
     @property
     def unexplained(self) -> bool:
-        """Whether the gap without contacts is one that nothing accounts for.
+        """Tell whether the gap without contacts is one that nothing accounts for.
 
         What accounts for it: a warning at load that names a difference, or that the gap
         vanishes with the timestep, or that it is rounding.
@@ -189,13 +189,13 @@ class WitnessRow:
     @property
     @only_on_pages
     def refuses(self) -> bool:
-        """Whether it compares nothing."""
+        """Tell whether it compares nothing."""
         return self.gap is None
 
     @property
     @only_on_pages
     def has_no_own_reading(self) -> bool:
-        """Whether it compares, and says why it does so without a reading of its own."""
+        """Tell whether it compares, and says why it does so without a reading of its own."""
         return self.gap is not None and bool(self.refusal)
 
 
@@ -237,13 +237,13 @@ class ExaminedModel:
 
     @property
     def is_model(self) -> bool:
-        """Whether it is a model of its own: a part of another file must load, and move."""
+        """Tell whether it is a model by itself: a part of another file must load, and move."""
         return not self.part_of or bool(self.nv)
 
     @property
     @only_on_pages
     def ran_experiments(self) -> bool:
-        """Whether an experiment was tried on a backend."""
+        """Tell whether an experiment was tried on a backend."""
         return any(backend.scenarios for backend in self.backends.values())
 
     def exactness(self, default: str) -> Exactness:

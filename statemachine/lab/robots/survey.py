@@ -72,20 +72,20 @@ class Survey:
 
     @property
     def wrong(self) -> Mapping[str, tuple[str, ...]]:
-        """What must not be, by file."""
+        """Return what must not be, by file."""
         by_file = {row.file: row.wrong(self.default) for row in self.models}
         return {file: said for file, said in by_file.items() if said}
 
     @property
     @only_on_pages
     def is_of_one_model(self) -> bool:
-        """Whether it is of one model alone, of which all that was found is worth showing."""
+        """Tell whether it is of one model alone, of which every finding is worth showing."""
         return len(self.models) == 1 and not self.parts
 
     @property
     @only_on_pages
     def backends(self) -> tuple[str, ...]:
-        """Every backend that a model was examined on."""
+        """Return every backend that a model was examined on."""
         names: dict[str, None] = {}
         for model in self.models:
             names |= dict.fromkeys(model.backends)
@@ -94,25 +94,25 @@ class Survey:
     @property
     @only_on_pages
     def others(self) -> tuple[str, ...]:
-        """The backends that are compared with the default one."""
+        """Return the backends that are compared with the default one."""
         return tuple(name for name in self.backends if name != self.default)
 
     @property
     @only_on_pages
     def ran_experiments(self) -> bool:
-        """Whether an experiment was tried on a model."""
+        """Tell whether an experiment was tried on a model."""
         return any(model.ran_experiments for model in self.models)
 
     @property
     @only_on_pages
     def engines(self) -> tuple[EngineTally, ...]:
-        """The sums of each backend, the default one first."""
+        """Return the sums of each backend, the default one first."""
         return tuple(self._tally(engine) for engine in (self.default, *self.others))
 
     @property
     @only_on_pages
     def grades(self) -> Mapping[str, int]:
-        """The number of models that the witness compared by each of its readings, or "refused"."""
+        """Return the number of models that the witness compared by each reading, or "refused"."""
         witnesses = [model.witness for model in self.models if model.witness is not None]
         counts = Counter(witness.grade or "refused" for witness in witnesses)
         return dict(sorted(counts.items()))

@@ -96,12 +96,12 @@ class CallPeriods:
 
     @property
     def differ(self) -> bool:
-        """Whether the function is called more often on one side."""
+        """Tell whether the function is called more often on one side."""
         return not math.isclose(self.left, self.right, rel_tol=_WHOLE)
 
     @property
     def common_word(self) -> str:
-        """The common time, as one types it."""
+        """Return the common time, as one types it."""
         return f"{1000 * self.common:.10g}ms"
 
 

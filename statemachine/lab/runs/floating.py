@@ -50,12 +50,12 @@ class BaseFrame:
 
     @property
     def distance(self) -> float:
-        """How far the origins are apart [m]."""
+        """Return how far the origins are apart [m]."""
         return float(np.linalg.norm(self.pos))
 
     @property
     def is_turned(self) -> bool:
-        """Whether the axes differ, and not the origins alone."""
+        """Tell whether the axes differ, and not the origins alone."""
         return self.angle > 0.0
 
 
@@ -84,14 +84,14 @@ class Bases:
 
     @property
     def inherited_from(self) -> Literal["left", "right", ""]:
-        """The side whose base the other takes over; "" for none."""
+        """Return the side whose base the other takes over; "" for none."""
         if not self.inherited_by:
             return ""
         return "right" if self.inherited_by == "left" else "left"
 
     @property
     def differ(self) -> bool:
-        """Whether one base floats and the other is fixed."""
+        """Tell whether one base floats and the other is fixed."""
         return None not in (self.left, self.right) and self.left != self.right
 
     def notes(self) -> Iterator[str]:

@@ -35,7 +35,7 @@ class Tip:
 
     @property
     def array(self) -> str:
-        """The array of a Data that has its position."""
+        """Return the name of the array of a Data that has its position."""
         return "site_xpos" if self.kind == "site" else "xpos"
 
     def read(self, data: Data) -> Array:

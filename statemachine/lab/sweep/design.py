@@ -263,7 +263,7 @@ class Design:
 
     @property
     def size(self) -> int:
-        """Number of points; it may be too large for `len`."""
+        """Return the number of points; it may be too large for `len`."""
         count = self.samples if self.sampled else 1
         return count * math.prod(len(vary.values) for vary in self.listed)
 

@@ -54,7 +54,7 @@ class _Tracking:
 
     @property
     def error(self) -> float | None:
-        """Root mean square over steps and servos [rad or m]; None without either."""
+        """Return the root mean square over steps and servos [rad or m]; None without either."""
         if not self._steps:
             return None
         return float(np.sqrt(self._squares / self._steps))
@@ -123,7 +123,7 @@ class Outcomes:
 
     @property
     def fell(self) -> float | None:
-        """1 where the base fell, else 0; None of a fixed base.
+        """Return 1 where the base fell, else 0; None of a fixed base.
 
         It fell where it was below a third of its height at the start after any step, or the
         direction that pointed up at the start pointed down.

@@ -120,7 +120,7 @@ class SweepReportPage(PageContent):
 
     @property
     def left_out_values(self) -> list[str]:
-        """Values of a list that are left out of the shares as a whole."""
+        """Return the values of a list that are left out of the shares as a whole."""
         parts: list[str] = []
         for name, values in self.effects.left_out_values.items():
             words = [_value(self.effects, name, value) for value in values]

@@ -110,7 +110,7 @@ class AnswerSentence(PageContent):
 
     @property
     def first_failure(self) -> str:
-        """Why the first cause whose share cannot be had could not be equalized; "" of none."""
+        """Return why the first cause without a share could not be equalized; "" of none."""
         for row in self.result.shares:
             if row.failure is not None:
                 return row.failure.failure.reason

@@ -54,7 +54,7 @@ class Cause:
 
     @property
     def refused(self) -> str:
-        """Why it cannot be equalized; "" if it can."""
+        """Return why it cannot be equalized; "" if it can."""
         return next((row.refused for row in self.differences if row.refused), "")
 
     def spec_edits(self, side: int) -> tuple[SpecEdit, ...]:

@@ -48,7 +48,7 @@ class WhyChanges(PageContent):
 
     @property
     def in_file(self) -> tuple[AttributeChange, ...]:
-        """Attributes of the right's file."""
+        """Return the attributes of the right's file."""
         changes: list[AttributeChange] = []
         for row in self._acting:
             changes += row.changes

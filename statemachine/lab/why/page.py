@@ -64,7 +64,7 @@ class WhyPage(PageContent):
 
     @property
     def known_changes(self) -> Sequence[Block]:
-        """Known changes between two releases that concern the runs."""
+        """Return the known changes between two releases that concern the runs."""
         versions = [side.versions[side.backend] for side in self.result.provenance]
         changes = [ShownChange(versions[0], versions[1], change) for change in self.result.changes]
         return known_changes_blocks(changes)

@@ -80,23 +80,23 @@ class CallsPage(PageContent):
 
     @property
     def total(self) -> int:
-        """Number of calls that were run."""
+        """Return the number of calls that were run."""
         return sum(len(phrases) for phrases in self.result.engines.values())
 
     @property
     def wrong(self) -> list[_EnginePhrase]:
-        """Calls that did not do what they should."""
+        """Return the calls that did not do what they should."""
         phrases = [phrase for concept in self.concepts for phrase in concept.phrases]
         return [phrase for phrase in phrases if phrase.state == "fails"]
 
     @property
     def right(self) -> int:
-        """Number of calls that did what they should."""
+        """Return the number of calls that did what they should."""
         return self.total - len(self.wrong)
 
     @property
     def holds(self) -> bool:
-        """Whether all did what they should."""
+        """Tell whether all did what they should."""
         return not self.wrong
 
 

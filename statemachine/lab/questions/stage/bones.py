@@ -16,7 +16,7 @@ _GREY = (0.6, 0.6, 0.6, 1.0)
 
 
 def bones_of(trace: Trace) -> Drawing:
-    """A stick figure of a trace whose model cannot be had: a bone to each body from its parent.
+    """Draw a trace whose model cannot be had as sticks: a bone to each body from its parent.
 
     It is what the trace itself tells: where the bodies are in the first row.
     """
@@ -35,7 +35,7 @@ def bones_of(trace: Trace) -> Drawing:
 
 
 def _bone(end: Array, thick: float) -> tuple[Any, Any]:
-    """Two pyramids on one square, near the thicker end."""
+    """Return two pyramids on one square, near the thicker end."""
     length = float(np.linalg.norm(end))
     if length < 1e-6:
         end, length = np.array([0.0, 0.0, thick]), thick

@@ -92,7 +92,7 @@ def _lane(name: str, content: Sequence[Html], look: str, *key: object) -> Html:
 
 
 def _beyond(chart: QuantityChart, until: float) -> list[list[float]]:
-    """When a quantity is beyond its tolerance, from and to [s]; tiny gaps are closed."""
+    """Return when a quantity is beyond its tolerance, from and to [s]; tiny gaps are closed."""
     time = chart.curve.time
     beyond = chart.curve.difference > chart.agreement.tolerance
     seen: list[list[float]] = []

@@ -165,7 +165,7 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
 
 
 def _quantity_data(chart: QuantityChart, rows: Ints) -> dict[str, Any]:
-    """What the script shows of a quantity at each moment shown: figures that were compared."""
+    """Return what the script shows of a quantity at each moment: figures that were compared."""
     curve = chart.curve
     scale, unit = display_unit(curve.unit)
     data: dict[str, Any] = {

@@ -57,12 +57,12 @@ class QuantityChart(Interactive):
 
     @property
     def unit(self) -> str:
-        """What it is drawn in."""
+        """Return the unit that it is drawn in."""
         return display_unit(self.curve.unit)[1].strip()
 
     @property
     def said(self) -> str:
-        """What it shows, for those who do not see it."""
+        """Return what it shows, for those who do not see it."""
         return " ".join(render_texts(ChartInWords(self.title, self.agreement)))
 
     def values(self) -> Traces | None:
@@ -104,7 +104,7 @@ class QuantityChart(Interactive):
 
 
 def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[QuantityChart, ...]:
-    """A chart for each quantity that is a number throughout; of many, those most beyond."""
+    """Return a chart for each quantity that is always a number; of many, those most beyond."""
     agreements = {agreement.name: agreement for agreement in comparison.agreements}
     bands: dict[str, Array] = {}
     if floor is not None:
@@ -201,7 +201,7 @@ def _strongest(pair: str, left: Mapping[str, Array], right: Mapping[str, Array])
 
 
 def spans(mask: NDArray[np.bool_], time: Array, step: float, until: float) -> list[list[float]]:
-    """From when to when rows are marked [s]; a row counts until the next one.
+    """Return from when to when rows are marked [s]; a row counts until the next one.
 
     Args:
         mask: (n,) which rows.

@@ -42,7 +42,7 @@ def _charts(quantity: QuantityChart) -> Html:
 
 
 def data_table(quantity: QuantityChart) -> Html:
-    """The figures of its charts: moments evenly spaced, and that of the largest difference."""
+    """Return the figures of its charts: at even spaces, and at the largest difference."""
     time, tolerance = quantity.curve.time, quantity.agreement.tolerance
     rows = np.linspace(0, len(time) - 1, min(_ROWS, len(time))).round().astype(int)
     worst = largest(quantity.curve.difference)[1]

@@ -101,7 +101,7 @@ class SideNotes(PageContent):
 
 
 def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
-    """Moments to be shown: those that were compared, unless they are too few to look like motion.
+    """Return the moments to show: those compared, unless they are too few to look like motion.
 
     Args:
         left: A trace; without enough common moments its own are shown.
@@ -127,7 +127,7 @@ def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[A
 def scene_of(
     runs: BothRuns, looks: Sequence[Look], times: Array, left_out: int = 0, start: int = 0
 ) -> Scene:
-    """Both runs at the moments that are shown.
+    """Return both runs at the moments that are shown.
 
     Args:
         runs: The runs.
@@ -265,7 +265,7 @@ def _near(tips: tuple[Array, Array] | None, start: int, extent: float) -> float:
 def _drawings(
     traces: Sequence[Trace], looks: Sequence[Look], labels: Sequence[str]
 ) -> tuple[list[str], list[Drawing]]:
-    """A drawing for each side, of sticks where there is none better; and notes on them."""
+    """Return a drawing for each side, of sticks where there is none better; and notes on them."""
     notes: list[str] = []
     drawings: list[Drawing] = []
     for trace, look, label in zip(traces, looks, labels, strict=True):
@@ -290,7 +290,7 @@ def _tips(
 
 
 def _way(trace: Trace, tip: str, shown: Array) -> dict[str, str]:
-    """The way of a site at the rows that its own side has, and how much of it lies behind."""
+    """Return the path of a site at the rows that its side has, and how much of it lies behind."""
     if "site_xpos" not in trace or tip not in trace.header.sites:
         return {"way": "", "behind": ""}
     elapsed = trace.time - trace.time[0]
@@ -351,7 +351,7 @@ def _contacts(trace: Trace, rows: Ints, most: int) -> _Contacts:
 
 
 def _moving(left: Trace, right: Trace) -> list[int]:
-    """Whether each body of the second side is elsewhere at another time or on the other side."""
+    """Return for each body of the second side whether it is elsewhere later or on the first."""
     pairs = zip(left.header.bodies, right.header.bodies, strict=False)
     still = np.array([left_body == right_body for left_body, right_body in pairs])
     for trace, column in itertools.product((left, right), ("xpos", "xquat")):
