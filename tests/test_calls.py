@@ -180,6 +180,7 @@ def test_no_call_goes_round_the_recorder(engine: str) -> None:
     assert not past_the_recorder(engine, lambda: record(WHOLE.format(engine=engine), engine))
 
 
+@pytest.mark.slow
 def test_looks_disturb_nothing_for_long(engine: str) -> None:
     """Many steps of a box that is held: every call of each is looked at."""
     code = WHOLE.format(engine=engine).replace("range(5)", "range(200)")

@@ -452,6 +452,7 @@ def test_the_most_similar_submission_is_a_cell_of_the_table(
     assert not entries["cy"].judged
 
 
+@pytest.mark.slow
 def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
     text = SOLUTION.read_text().replace("import math", "import helper\nimport math")
     written_all(folder, {"helper.py": "ANSWER = 1\n", "gus.py": text, "ann/my_solution.py": text})
@@ -544,6 +545,7 @@ def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -
     assert_has(row, file=f"'{evil.name}", remarks="it is refused")
 
 
+@pytest.mark.slow
 def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:
     written_all(tmp_path, {"step_loop.py": "from mine import *\n", "mine.py": SOLUTION.read_text()})
     assert main(["check", str(tmp_path), "--gradescope", str(tmp_path / "r.json")]) == 0

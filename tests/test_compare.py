@@ -507,6 +507,7 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_not_the_page(
 
 
 @pytest.mark.usefixtures("with_nan")
+@pytest.mark.slow
 def test_a_film_of_poses_that_are_no_numbers_is_refused(here: Cli) -> None:
     done = here("trace", "film", "nan.npz", "-o", "a.webp")
     one_line(done, "no poses", done.returncode)

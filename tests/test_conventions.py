@@ -470,6 +470,7 @@ def test_an_engine_that_behaved_otherwise(name: str, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.usefixtures("bullet")
+@pytest.mark.slow
 def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.chdir(tmp_path)

@@ -31,6 +31,7 @@ from statemachine.show.html.page import report
 from statemachine.show.pictures import Diagram
 from statemachine.show.text_blocks import ASCII
 
+from .support.backends import slow_on
 from .support.browser import browser
 from .support.claims import assert_in
 from .support.colours import contrast
@@ -463,6 +464,7 @@ def test_markdown_has_it_as_one_block_of_html(drawn: Sequence[Diagram]) -> None:
 
 
 @pytest.mark.parametrize("name", ["objects", "state", "forward"])
+@pytest.mark.parametrize("backend", slow_on("pybullet"), indirect=True)
 def test_each_diagram_stands_in_its_lesson_and_in_no_fold(
     name: str, backend: str, tmp_path: Path
 ) -> None:

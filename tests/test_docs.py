@@ -29,6 +29,7 @@ from statemachine.show.diagrams.shapes import Arrow, Box, Bracket, Label
 from statemachine.show.pictures import Diagram, Traces
 from tools.docs_pages import make_path
 
+from .support.backends import slow_on
 from .support.claims import assert_in, refused
 from .support.pages import blocks
 from .support.processes import of_python
@@ -427,6 +428,7 @@ def test_the_notebook_of_questions_compares_a_model_and_names_a_stage(
     assert "mass matrix" in answers["one-step"][0]["data"]["text/plain"]
 
 
+@pytest.mark.parametrize("backend", slow_on("pybullet"), indirect=True)
 def test_a_lesson_in_a_notebook_is_of_the_engine_that_is_asked_for(backend: str) -> None:
     result = lesson("forward", backend)
     text = result._repr_markdown_()  # as a notebook shows it
@@ -444,7 +446,11 @@ def test_an_option_of_a_lesson_in_a_notebook_is_refused_by_its_name() -> None:
 
 
 @pytest.mark.parametrize(
-    ("letter", "says"), [("c", "predicted it: c."), (" A ", "predicted a; it is c.")]
+    ("letter", "says"),
+    [
+        ("c", "predicted it: c."),
+        pytest.param(" A ", "predicted a; it is c.", marks=pytest.mark.slow),
+    ],
 )
 def test_a_prediction_in_the_notebook_is_judged(letter: str, says: str) -> None:
     assert says in lesson("state", prediction=letter)._repr_markdown_()

@@ -103,6 +103,7 @@ def test_a_callback_may_use_what_its_own_data_offers(mujoco_arm: sm.Model) -> No
     use.assert_called_once_with()
 
 
+@pytest.mark.slow
 def test_two_data_in_two_threads_equal_serial(
     model: sm.Model, request: pytest.FixtureRequest
 ) -> None:

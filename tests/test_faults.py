@@ -143,6 +143,7 @@ def test_pytest_alone_runs_the_exercise(plugin: tuple[str, ...]) -> None:
     of_python(*words, folder=EXERCISE.parent, code=0)
 
 
+@pytest.mark.slow
 def test_the_exercise_begins_with_missed_faults_and_an_idle_test() -> None:
     found = examine(EXERCISE, only=("xyzw", "degrees", "no-forward"))
     missed = (FAULTS["xyzw"],)
@@ -176,8 +177,8 @@ def test_after(model):
     [
         pytest.param("time.sleep(600)", "took longer than", marks=pytest.mark.slow),
         ("os.abort()", "crashed the process (SIGABRT)"),
-        ("os._exit(0)", "ended the process with code 0"),
-        ("raise RuntimeError('lost')", "RuntimeError: lost"),
+        pytest.param("os._exit(0)", "ended the process with code 0", marks=pytest.mark.slow),
+        pytest.param("raise RuntimeError('lost')", "RuntimeError: lost", marks=pytest.mark.slow),
     ],
 )
 def test_what_ends_under_a_fault_has_caught_it(

@@ -391,6 +391,7 @@ def test_an_engine_that_is_mistyped_is_told(light: str) -> None:
 # What a result shows.
 
 
+@pytest.mark.slow
 def test_print_shows_what_the_command_prints(light: str, heavy: str) -> None:
     words = ("compare", "hold", light, heavy, "--seconds", "0.1", "--no-chaos")
     printed = of_python("-m", "statemachine", *words, code=1).stdout

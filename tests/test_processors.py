@@ -75,6 +75,7 @@ _ROUNDED = {"_worst", "_padding_at", "Surfaces._solve", "Surfaces._frictions_of_
 _ROUNDED |= {"Hull.__init__", "roughness", "_planes", "_inset", "_sphere"}
 
 
+@pytest.mark.slow
 def test_dense_algebra_is_not_numpys() -> None:
     """`backends/dense.py` has what a backend with bits of its own to keep may use."""
     files = sorted((ROOT / "statemachine" / "backends" / "bullet").glob("[!_]*.py"))

@@ -141,7 +141,13 @@ open("mark", "w").write("done")
 
 
 @posix
-@pytest.mark.parametrize("shell", ["", "<&- >&- 2>&-", ">&-", "2>&-", ">&- 2>&-"])
+@pytest.mark.parametrize(
+    "shell",
+    [
+        "<&- >&- 2>&-",
+        *(pytest.param(s, marks=pytest.mark.slow) for s in ("", ">&-", "2>&-", ">&- 2>&-")),
+    ],
+)
 def test_it_prints_nothing_and_works_without_streams(tmp_path: Path, shell: str) -> None:
     """The shell takes streams away before Python starts."""
     done = subprocess.run(
@@ -245,6 +251,7 @@ def test_what_is_switched_off_at_load_is_not_refused(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_urdf_with_two_roots_is_no_crash(tmp_path: Path) -> None:
     """PyBullet's own reader crashes on it; MuJoCo, which reads it here, fuses both roots."""
     (tmp_path / "two.urdf").write_text(TWO_ROOTS)
@@ -263,7 +270,14 @@ print(ends[1][:2])
     runs_in_silence(code, tmp_path, "(('world', 'c'), ('j',))\n")
 
 
-@pytest.mark.parametrize("text", ["", "<mujoco>", "no XML at all"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("", marks=pytest.mark.slow),
+        pytest.param("<mujoco>", marks=pytest.mark.slow),
+        "no XML at all",
+    ],
+)
 def test_a_file_that_nobody_reads_is_an_error_of_ours(text: str, tmp_path: Path) -> None:
     for suffix in ("xml", "urdf"):
         written(tmp_path / f"bad.{suffix}", text)
@@ -332,8 +346,8 @@ def test_engine_does_not_tell_forces_by_part() -> None:
 @pytest.mark.parametrize(
     ("backend", "name", "cycles"),
     [
-        ("mujoco", "so101/scene_box", 2_000),
-        ("pybullet", "so101", 400),
+        pytest.param("mujoco", "so101/scene_box", 2_000, marks=pytest.mark.slow),
+        pytest.param("pybullet", "so101", 400, marks=pytest.mark.slow),
         pytest.param("pybullet", "so101/scene_box", 800, marks=pytest.mark.slow),
     ],
 )
@@ -382,6 +396,7 @@ def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch, memory: s
 
 
 @linux
+@pytest.mark.slow
 def test_memory_that_ends_is_said_before_it_does(tmp_path: Path) -> None:
     """The engine itself ends the process: std::bad_alloc, or a null pointer."""
     code = """
@@ -410,6 +425,7 @@ kept.pop().close()
 
 
 @linux
+@pytest.mark.slow
 def test_a_killed_process_leaves_no_file(tmp_path: Path) -> None:
     code = """
 import statemachine as sm

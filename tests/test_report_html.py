@@ -524,6 +524,7 @@ def test_what_was_commanded(hold: Made) -> None:
     assert "nothing is commanded" in page_of(of_look(one, two, hold[3]))
 
 
+@pytest.mark.slow
 def test_a_link_only_to_what_is_there(hold: Made) -> None:
     models = Page("models", "", [Verdict("1 figure differs", False)])
     for kind in ("model", "engine"):
@@ -601,6 +602,7 @@ def test_no_name_beside_the_slider_is_cut(page: Path, width: int) -> None:
         assert cut == 0
 
 
+@pytest.mark.slow
 def test_without_a_script_every_figure_of_the_comparison_is_on_the_page(
     hold: Made, page: Path
 ) -> None:

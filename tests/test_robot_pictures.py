@@ -94,6 +94,7 @@ def test_a_picture_is_drawn_for_each_lesson_s_own_name() -> None:
     assert POSES.keys() == PICTURES.keys()
 
 
+@pytest.mark.slow
 def test_a_picture_above_the_text_repeats_no_text_in_a_notebook() -> None:
     page = Page(
         "t", "o", [_picture(), Text("above"), Question("q", ("a", "b"), 0, "so"), Text("z")]

@@ -323,6 +323,7 @@ def test_a_survey_typed_again_tries_only_what_changed_or_ended(surveys: TwoSurve
     assert again["tendon.xml"] == surveys.rows()["tendon.xml"]
 
 
+@pytest.mark.slow
 def test_a_row_has_the_scenarios_that_run_and_what_a_step_costs(folder: Path) -> None:
     (row,) = examine_all(find([folder / "good.xml"])).models
     for backend in row.backends.values():
@@ -525,6 +526,7 @@ def test_versions_and_settings_are_part_of_the_table(quick: bool, seed: int) -> 
     assert told.endswith(", quick") is quick
 
 
+@pytest.mark.slow
 def test_a_file_that_the_engine_alone_cannot_open_is_no_contradiction(tmp_path: Path) -> None:
     """Its mesh is in a ROS package, which the interface finds and MuJoCo does not look for."""
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'

@@ -356,6 +356,7 @@ UNSEEN = {
 @pytest.mark.skipif(sys.platform != "linux", reason="both ways are tried where both can be")
 @pytest.mark.usefixtures("shut_in")
 @pytest.mark.parametrize("attack", UNSEEN)
+@pytest.mark.slow
 def test_where_it_is_only_watched_who_changes_the_watch_is_not_seen(
     attack: str, tmp_path: Path, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -640,6 +641,7 @@ def test_a_file_or_a_folder_that_is_itself_a_link_is_refused(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links are those of POSIX")
+@pytest.mark.slow
 def test_a_hard_link_is_as_good_as_the_file(tmp_path: Path) -> None:
     """docs/teaching.md says so: nothing tells it from a file."""
     folder = _class(tmp_path, {})

@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import statemachine as sm
 from statemachine import backends, releases
 from statemachine.backends.served.engine_process import ServedEngine, Server
@@ -25,6 +27,14 @@ def registered(name: str, loader: str) -> Iterator[str]:
         yield name
     finally:
         backends.BACKENDS.pop(name)
+
+
+def slow_on(name: str) -> list[Any]:
+    """Return parameters of the fixture `backend` of which one is for the slow part."""
+    return [
+        pytest.param(each, marks=pytest.mark.slow) if each == name else each
+        for each in backends.backend_names()
+    ]
 
 
 def bullet_clients() -> set[int]:
