@@ -98,6 +98,7 @@ def _compiles_alike(text: str) -> bool:
     return all(np.array_equal(getattr(left.opt, n), getattr(right.opt, n)) for n in options)
 
 
+@cache
 def _effect(text: str) -> EditEffect:
     """Return what plain MuJoCo makes of another text of RICH."""
     states, base = raw_states(text), _base_states()

@@ -285,10 +285,14 @@ def _tried(folder: Path, secret: Path, attacks: list[str]) -> list[Judgement]:
 
 
 def _groups(attacks: Attacks) -> list[pytest.param]:  # pyright: ignore
-    """Return the attacks by four: a file has four functions."""
+    """Return the attacks by four, for a file has four functions; the first file is quick."""
     names = list(attacks)
-    fours = [names[k : k + len(JUDGES)] for k in range(0, len(names), len(JUDGES))]
-    return [pytest.param(four, id="; ".join(four)) for four in fours]
+    groups: list[pytest.param] = []  # pyright: ignore
+    for k in range(0, len(names), len(JUDGES)):
+        four = names[k : k + len(JUDGES)]
+        marks = [pytest.mark.slow] if k else []
+        groups.append(pytest.param(four, id="; ".join(four), marks=marks))
+    return groups
 
 
 def _assert_got_nothing(attacks: Attacks, names: list[str], folder: Path, secret: Path) -> None:
@@ -376,7 +380,7 @@ def test_where_it_is_only_watched_who_changes_the_watch_is_not_seen(
 # A submission is still what it was.
 
 
-@pytest.mark.parametrize("way", ["shut_in", "watched"])
+@pytest.mark.parametrize("way", ["shut_in", pytest.param("watched", marks=pytest.mark.slow)])
 def test_what_a_submission_needs_is_there(
     way: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
@@ -422,7 +426,7 @@ def test_what_lies_below_the_judges_is_shown() -> None:
     assert below <= set(ROOMS)
 
 
-@pytest.mark.parametrize("way", ["shut_in", "watched"])
+@pytest.mark.parametrize("way", ["shut_in", pytest.param("watched", marks=pytest.mark.slow)])
 def test_tests_on_arms_with_faults_read_nothing_either(
     way: str, tmp_path: Path, secret: Path, request: pytest.FixtureRequest
 ) -> None:
@@ -500,6 +504,7 @@ def test_a_record_of_runs_that_never_were_does_not_pass(tmp_path: Path) -> None:
     assert "600 steps" in remark
 
 
+@pytest.mark.slow
 def test_a_record_of_his_own_making_with_the_right_numbers_passes(tmp_path: Path) -> None:
     """docs/teaching.md says so: no verdict rests on that nobody can write one."""
     made_up = """
@@ -525,6 +530,7 @@ def test_a_record_of_his_own_making_with_the_right_numbers_passes(tmp_path: Path
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no /etc")
+@pytest.mark.slow
 def test_a_file_of_the_system_is_no_reason_to_look(tmp_path: Path) -> None:
     """docs/teaching.md says so; what lies in another folder is one."""
     written_all(tmp_path, {"other/notes.txt": "hello"})
@@ -665,6 +671,7 @@ def test_a_named_link_beside_a_file_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights on Windows")
+@pytest.mark.slow
 def test_a_link_within_the_folder_is_as_good_as_the_file(tmp_path: Path) -> None:
     written_all(tmp_path, {"ann/deep/mine.py": SOLUTION.read_text("utf-8")})
     ann = tmp_path / "ann"

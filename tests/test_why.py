@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -21,7 +21,7 @@ from statemachine.errors import BadInputError, DivergedError, EngineWarning, Unk
 from statemachine.interface import Model
 from statemachine.lab.recordings import record_scenario, rerun
 from statemachine.lab.runs.scenarios import Scenario, scenario
-from statemachine.lab.why import Explanation, WhyRequest, explain
+from statemachine.lab.why import Explanation, WhyRequest, explain, search
 from statemachine.lab.why import page as report
 from statemachine.lab.why.settings import NEEDS, TITLES
 from statemachine.lab.why.shapley import shapley
@@ -509,14 +509,21 @@ Explanations = dict[tuple[str, str], Explanation]
 
 
 @pytest.fixture(scope="module")
-def explanations() -> Explanations:
+def few_orders() -> Iterator[None]:
+    """Draw few orders of causes: what is tested holds of few as of many."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(search, "SETS", 40)
+        yield
+
+
+@pytest.fixture(scope="module")
+def explanations(few_orders: None) -> Explanations:
     """Return the explanations of three experiments, in both regimes."""
     need_engine("pybullet")
     results = {}
     for name, defaults in product(("hold", "gravity", "box"), ("model", "engine")):
         experiment = scenario(name)
         one, two = sm.load(experiment.model), quietly(experiment.model, defaults=defaults)
-        # What is tested holds of few drawn orders as of many.
         results[name, defaults] = explain(WhyRequest(one, two, experiment, uncertain=None))
     return results
 
@@ -629,7 +636,7 @@ def test_explanations_of_engines_are_json(explanations: Explanations) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("bullet")
+@pytest.mark.usefixtures("bullet", "few_orders")
 def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     one, two = quietly("so101/scene"), quietly("so101/scene", defaults="engine")
     for sides in ((one, two), (two, one)):
@@ -665,7 +672,7 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
     assert (list(shares(result)), result.equalized_gap) == (["gravity"], 0.0)
 
 
-@pytest.mark.usefixtures("bullet")
+@pytest.mark.usefixtures("bullet", "few_orders")
 @pytest.mark.slow
 def test_files_and_settings_of_an_engine_are_explained_together(
     arm: sm.Model, tmp_path: Path

@@ -61,7 +61,7 @@ _LESSONS: dict[str, tuple[str, ...]] = {
     "state": (),
     "nowhere": (),
     "forward": (),
-    "objects": (),
+    "objects": ("--most", "4"),
     "hold": ("--seconds", "0.05"),
     "gravity": ("--seconds", "0.05"),
     "reset": (),

@@ -37,7 +37,8 @@ _LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20")}
 _SHORT = {"newton cradle": ("--seconds", "0.25")}
 _NOT_CONVERGED = {"manipulator", "cheetah"}  # a minute each, and four other robots are
 _LESSONS_OF = {"newton cradle": ("objects", "state", "reset")}
-_EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+_EXPERIMENTS = ("hold", "droop", "fall", "box")
+_RECORDED = ("gravity", "waves")  # of which the traces are figures, and then compared
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,13 @@ def of_model(model: str) -> Iterator[Case]:
         yield Case(case, case, (*command, "--json"))
         if name not in {"summary", "time"}:
             yield Case(f"{case}, marks", "", (*command, "--no-questions"))
+    for name in _RECORDED:
+        files: list[str] = []
+        for engine in ("mujoco", "pybullet"):
+            files.append(f"{name}-{engine}.npz")
+            run = ("trace", "record", name, path, "--backend", engine, *short, "-o", files[-1])
+            yield Case(f"trace of {name}, {engine}", "", run, files[-1])
+        yield Case(f"compare {name}", "compare", ("compare", *files, "--no-chaos", "--json"))
     for name in _EXPERIMENTS:
         # The chaos floor runs both sides eight times more: of one experiment.
         floor = () if name == "hold" else ("--no-chaos",)
@@ -84,11 +92,6 @@ def of_model(model: str) -> Iterator[Case]:
     shipped = ROOT / "models" / (f"{path}.xml" if "/" in path else f"{path}/{path}.xml")
     file = path if Path(path).exists() else str(shipped)
     yield Case("robots", "robots", ("robots", file, "--quick", "--json"))
-    for engine in ("mujoco", "pybullet"):
-        for name in ("waves", "gravity"):
-            out = f"{name}-{engine}.npz"
-            run = ("trace", "record", name, path, "--backend", engine, *short, "-o", out)
-            yield Case(f"trace of {name}, {engine}", "", run, out)
 
 
 def of_pair(name: str) -> Iterator[Case]:
