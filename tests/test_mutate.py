@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from coverage import CoverageData
 
 from tools.mutants import __main__ as run
-from tools.mutants.covered import Covered
+from tools.mutants import places
+from tools.mutants.contexts import few
+from tools.mutants.covered import Chosen, Covered
 from tools.mutants.draw import Site, all_sites, by_code, find, sites
+from tools.mutants.places import Place
 from tools.mutants.renew import NOT_TRIED, Row, renewed
 
 from .support.claims import assert_in
@@ -162,35 +165,180 @@ def test_tests_are_chosen_by_line_room_and_time(tmp_path: Path) -> None:
         seconds[test] = took
     data.write()
     fixtures = {"tests/test_page.py": 40.0}
-    times = {"seconds": seconds, "fixtures": fixtures, "failed": ["tests/test_other.py::fails"]}
+    times = {"seconds": seconds, "fixtures": fixtures, "unused": ["tests/test_other.py::fails"]}
     written(tmp_path / "times.json", json.dumps(times))
     found = list(sites(_module(tmp_path), tmp_path))
     inside = next(site for site in found if site.lines == range(8, 9))
     covered = Covered(tmp_path)
-    names = [test.partition("::")[2] for test in covered.tests(inside, 60)]
+    names = [test.partition("::")[2] for test in covered.chosen(inside, 60).tests]
     assert names == ["slow", "quick", "first", "second"]
-    assert len(covered.tests(inside, 6.5)) == len(covered.tests(inside, 40)) == 2
-    assert len(covered.tests(next(site for site in found if not site.called), 60)) == 5
+    assert len(covered.chosen(inside, 6.5).tests) == len(covered.chosen(inside, 40).tests) == 2
+    outside = next(site for site in found if not site.called)
+    assert len(covered.chosen(outside, 60).tests) == 5
+
+
+def _covered(folder: Path, contexts: dict[str, int], seconds: dict[str, float]) -> Covered:
+    """Return what is measured where each context runs one line of arm.py."""
+    data = CoverageData(str(folder / "data"))
+    for context, line in contexts.items():
+        data.set_context(context)
+        data.add_lines({"statemachine/arm.py": [line]})
+    data.write()
+    times = {"seconds": seconds, "fixtures": {}, "unused": []}
+    written(folder / "times.json", json.dumps(times))
+    return Covered(folder)
+
+
+def test_the_tests_of_a_file_are_run_one_after_the_other(tmp_path: Path) -> None:
+    seconds = {"tests/test_a.py::x": 1, "tests/test_b.py::x": 2, "tests/test_a.py::y": 3}
+    covered = _covered(tmp_path, {f"{test} (call)": 8 for test in seconds}, seconds)
+    [site, *_] = [site for site in sites(_module(tmp_path), tmp_path) if 8 in site.lines]
+    chosen = covered.chosen(site, 60)
+    assert chosen.tests == ("tests/test_a.py::x", "tests/test_a.py::y", "tests/test_b.py::x")
+    assert chosen.seconds == 6
+
+
+@pytest.mark.parametrize(("context", "is_at_import"), [("", True), ("tests/t.py::x (call)", False)])
+def test_a_statement_that_no_test_runs_is_one_of_the_import(
+    tmp_path: Path, context: str, is_at_import: bool
+) -> None:
+    covered = _covered(tmp_path, {context: 8}, {"tests/t.py::x": 1})
+    [site, *_] = [site for site in sites(_module(tmp_path), tmp_path) if 8 in site.lines]
+    assert covered.chosen(site, 60).at_import is is_at_import
+
+
+def test_three_cases_of_a_test_are_measured() -> None:
+    assert few([*range(10)]) == [0, 4, 9]  # the first, the middle, the last
+
+
+# A fault is tried
+
+_COUNT = """\
+LEAST = 0
+
+
+def count(n):
+    while n > LEAST:
+        n = n - 1
+    return n
+"""
+_TESTS = """\
+import time
+
+from statemachine import count
+
+
+def test_count():
+    assert count.count(3) == 0
+
+
+def test_even():
+    assert count.count(2) == 0
+
+
+def test_least():
+    assert count.LEAST == 0
+
+
+def test_waits():
+    time.sleep(2.5)
+    assert count.count(1) == 0
+
+
+def test_fails():
+    assert count.count(1) == 7
+"""
+
+
+class _Count:
+    """A small package with its tests, and a place where its faults are tried.
+
+    Attributes:
+        file: Its module.
+        place: The place.
+    """
+
+    def __init__(self, tree: Path) -> None:
+        self.file = _module(tree, "count.py", _COUNT)
+        copied = "tools/__init__.py", "tools/mutants/__init__.py", "tools/mutants/session.py"
+        files = {name: (ROOT / name).read_text("utf-8") for name in copied}
+        written_all(tree, {"tests/test_count.py": _TESTS, **files})
+        self.place = Place(tree)
+        self._sites = list(sites(self.file, tree))
+
+    def outcome(
+        self, kind: str, statement: str, *tests: str, at_import: bool = False
+    ) -> tuple[str, str]:
+        """Return what becomes of a fault, and the name of the function that noticed it."""
+        wanted = kind, statement
+        [site] = [
+            site for site in self._sites if (site.mutant.kind, site.mutant.statement) == wanted
+        ]
+        named = tuple(f"tests/test_count.py::{test}" for test in tests)
+        result, test = self.place.outcome(site, Chosen(named, 0.0, at_import))
+        return result, test.rpartition("::")[2]
+
+
+@pytest.fixture(scope="module")
+def counting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[_Count]:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(places, "PROCESSOR", 2.0)
+        count = _Count(tmp_path_factory.mktemp("mutants") / "tree")
+        with count.place:
+            yield count
 
 
 @pytest.mark.slow
-def test_a_fault_is_killed_survives_or_runs_out_of_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_fault_that_a_test_notices_is_killed(counting: _Count) -> None:
+    outcome = counting.outcome("number", "n = n - 1", "test_least", "test_count")
+    assert outcome == ("killed", "test_count")
+
+
+@pytest.mark.slow
+def test_a_fault_that_no_test_notices_survives(counting: _Count) -> None:
+    assert counting.outcome("number", "n = n - 1", "test_even") == ("survived", "")
+
+
+@pytest.mark.slow
+def test_a_fault_is_out_of_the_module_when_it_was_tried(counting: _Count) -> None:
+    counting.outcome("sign", "n = n - 1", "test_least")
+    assert counting.file.read_text("utf-8") == _COUNT
+
+
+@pytest.mark.slow
+def test_a_fault_that_loops_is_ended_by_its_processor_time(counting: _Count) -> None:
+    assert counting.outcome("sign", "n = n - 1", "test_count") == ("timed out", "")
+
+
+@pytest.mark.slow
+def test_a_test_that_waits_longer_than_its_processor_time_is_not_ended(counting: _Count) -> None:
+    outcome = counting.outcome("comparison", "while n > LEAST:", "test_waits")
+    assert outcome == ("killed", "test_waits")
+
+
+@pytest.mark.slow
+def test_a_fault_that_waits_for_ever_is_ended_by_the_clock(
+    counting: _Count, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tree = tmp_path / "tree"
-    source = "def count(n):\n    while n > 0:\n        n = n - 1\n    return n\n"
-    file = _module(tree, "count.py", source)
-    text = "from statemachine.count import count\n\ndef test_count():\n    assert count(3) < 1\n"
-    written_all(tree, {"tests/test_count.py": text})
-    monkeypatch.setattr(run, "SECONDS", 30)
-    test = "tests/test_count.py::test_count"
-    outcomes = {
-        (site.mutant.kind, site.mutant.statement): run.outcome_of(site, [test], tree)
-        for site in sites(file, tree)
-    }
-    assert outcomes["comparison", "while n > 0:"] == ("survived", "")  # one more turn
-    assert outcomes["number", "while n > 0:"] == ("killed", test)
-    assert outcomes["sign", "n = n - 1"] == ("timed out", "")
-    assert file.read_text("utf-8") == source
-    outside = replace(next(sites(file, tree)), called=True)
-    assert run.outcome_of(outside, [], tree) == ("not covered", "")
+    monkeypatch.setattr(places, "CLOCK", 0.5)
+    outcome = counting.outcome("comparison", "while n > LEAST:", "test_waits")
+    assert outcome == ("timed out", "")
+
+
+@pytest.mark.slow
+def test_a_fault_of_an_import_is_noticed_by_a_process_that_starts_with_it(
+    counting: _Count,
+) -> None:
+    outcome = counting.outcome("number", "LEAST = 0", "test_least", at_import=True)
+    assert outcome == ("killed", "test_least")
+
+
+@pytest.mark.slow
+def test_a_test_that_fails_without_the_fault_has_noticed_nothing(counting: _Count) -> None:
+    tests = "test_fails", "test_least"
+    assert counting.outcome("number", "n = n - 1", *tests) == ("survived", "")
+
+
+@pytest.mark.slow
+def test_a_fault_that_no_test_runs_is_not_covered(counting: _Count) -> None:
+    assert counting.outcome("number", "n = n - 1") == ("not covered", "")

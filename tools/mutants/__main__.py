@@ -3,119 +3,137 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
+import random
 import re
 import shutil
-import signal
-import subprocess
 import sys
+import time
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from queue import SimpleQueue
+from threading import Lock
+from typing import Any
 
-from .covered import Covered, environment, measure
-from .draw import ROOT, Mutant, Site, all_sites, by_code, draw, find
+from .covered import Covered, measure
+from .draw import ROOT, Mutant, all_sites, by_code, draw, find
+from .places import WORK, Place, copy, git
 from .renew import NOT_TRIED, Row, renewed
 
 HERE = Path(__file__).resolve().parent
-WORK = ROOT / "build" / "mutants"
 RESULTS = HERE / "results.json"
-SECONDS = 60.0  # a mutant may take; its tests took a third of that without it
+SECOND = HERE / "second.json"
+SECONDS = 5.0  # processor time of the tests that judge a mutant, as coverage.py measured it
 _STATES = ("killed", "survived", "timed out", "not covered", "gone", NOT_TRIED)
 
 
-def _git(*arguments: str) -> str:
-    return subprocess.check_output(["git", *arguments], cwd=ROOT, text=True).strip()
+def _measured(tree: Path) -> Path:
+    """Return the folder that says which tests run which line of what is committed.
+
+    It is measured once for a state of the package and the tests. Where only files of tests are
+    other than when it was last measured, these alone are measured again, and what the other tests
+    noticed stands.
+    """
+    package, tests = (git("rev-parse", f"HEAD:{folder}") for folder in ("statemachine", "tests"))
+    folder = WORK / f"covered-{package[:8]}-{tests[:8]}"
+    if (folder / "data").exists():
+        return folder
+    shutil.rmtree(folder, ignore_errors=True)
+    for earlier in sorted(
+        WORK.glob(f"covered-{package[:8]}-*"), key=lambda at: -at.stat().st_mtime
+    ):
+        changed = git("diff", "--name-only", earlier.name.rpartition("-")[2], tests).split()
+        files = [f"tests/{name}" for name in changed]
+        is_tests = all(re.fullmatch(r"tests/test_\w+\.py", name) for name in files)
+        if (earlier / "data").exists() and is_tests:
+            shutil.copytree(earlier, folder)
+            log = folder / "tried.jsonl"
+            lines = [
+                json.dumps(asdict(line)) + "\n"
+                for line in read_tried(log)
+                if line.result == "killed" and line.test.partition("::")[0] not in files
+            ]
+            log.write_text("".join(lines), "utf-8")
+            measure(tree, folder, [name for name in files if (tree / name).exists()])
+            return folder
+    measure(tree, folder)
+    return folder
 
 
-def _copy(name: str) -> Path:
-    """Clone what is committed, where shared data are found as they are beside the checkout."""
-    tree = WORK / name
-    shutil.rmtree(tree, ignore_errors=True)
-    _git("clone", "-q", "--shared", str(ROOT), str(tree))
-    link = WORK / "shared"
-    if not link.exists() and (ROOT.parent / "shared").exists():
-        link.symlink_to(ROOT.parent / "shared")
-    return tree
+@dataclass(frozen=True)
+class Tried:
+    """What became of a mutant, as it stands in a line of the log.
+
+    Attributes:
+        mutant: The mutant as text.
+        result: As in Row.
+        test: As in Row.
+        seconds: The processor time that its tests were given [s].
+    """
+
+    mutant: str
+    result: str
+    test: str
+    seconds: float
 
 
-def _end(running: subprocess.Popen[bytes], tree: Path) -> None:
-    """End the tests of a copy, with what they started: a fault may have left that in a loop."""
-    running.kill()
-    running.wait()
-    mark = f"PYTHONPATH={tree}\0".encode()
-    for started in Path("/proc").glob("[0-9]*/environ"):
-        with contextlib.suppress(OSError):
-            if mark in started.read_bytes():
-                os.kill(int(started.parent.name), signal.SIGKILL)
+def read_tried(log: Path) -> list[Tried]:
+    """Return what became of the mutants that were tried before."""
+    text = log.read_text("utf-8") if log.exists() else ""
+    return [Tried(**json.loads(line)) for line in text.splitlines()]
 
 
-def outcome_of(site: Site, tests: list[str], tree: Path) -> tuple[str, str]:
-    """Return what became of a mutant, and the test that noticed it."""
-    if not tests:
-        return "not covered", ""
-    path, listed = tree / site.mutant.file, tree.with_suffix(".txt")
-    original, times = path.read_bytes(), path.stat()
-    listed.write_text("\n".join(tests), "utf-8")
-    path.write_bytes(site.source(tree))
-    command = [sys.executable, "-m", "pytest", "-x", "-rfE", "-p", "no:cacheprovider", f"@{listed}"]
-    log = tree.with_suffix(".log")
-    with log.open("wb") as written:
-        running = subprocess.Popen(
-            command, cwd=tree, env=environment(tree), stdout=written, stderr=subprocess.STDOUT
-        )
-        try:
-            running.wait(SECONDS)
-        except subprocess.TimeoutExpired:
-            return "timed out", ""
-        finally:
-            _end(running, tree)
-            path.write_bytes(original)
-            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-    if running.returncode == 0:
-        return "survived", ""
-    named = re.search(r"^(?:FAILED|ERROR) (\S+)", log.read_text(errors="replace"), re.MULTILINE)
-    return "killed", named[1] if named else f"exit code {running.returncode}"
+def _run(mutants: Sequence[Mutant], seconds: float) -> list[Row]:
+    """Return every mutant with what became of it.
 
-
-def _run(mutants: Sequence[Mutant]) -> list[Row]:
-    """Return every mutant with what became of it."""
-    trees = [_copy(f"tree{number}") for number in range(os.cpu_count() or 1)]
-    states = [_git("rev-parse", f"HEAD:{folder}")[:8] for folder in ("statemachine", "tests")]
-    tested = WORK / "-".join(["covered", *states])
-    if not (tested / "data").exists():
-        shutil.rmtree(tested, ignore_errors=True)
-        measure(trees[0], tested)
+    Args:
+        mutants: The mutants.
+        seconds: Processor time that the tests of each may take. One that survived tests of less
+            time is tried again.
+    """
+    trees = [copy(f"tree{number}") for number in range(os.cpu_count() or 1)]
+    folder = _measured(trees[0])
     standing = by_code(all_sites(trees[0]))
     found = [(mutant, find(mutant, standing)) for mutant in mutants]
-    covered = Covered(tested)
-    chosen = [covered.tests(site, SECONDS / 3) if site else [] for _, site in found]
-    log = tested / "tried.jsonl"  # typed again, what was interrupted goes on
-    log.touch()
-    tried = dict(json.loads(line) for line in log.read_text("utf-8").splitlines())
-    free: SimpleQueue[Path] = SimpleQueue()
-    for tree in trees:
-        free.put(tree)
+    covered = Covered(folder)
+    log = folder / "tried.jsonl"  # typed again, what was interrupted goes on
+    tried = {line.mutant: line for line in read_tried(log)}
+    free: SimpleQueue[Place] = SimpleQueue()
+    writing = Lock()
+    with ExitStack() as opened, ThreadPoolExecutor(len(trees)) as pool:
+        for tree in trees:
+            free.put(opened.enter_context(Place(tree)))
 
-    def one(number: int) -> Row:
-        mutant, site = found[number]
-        if str(mutant) not in tried:
-            tree = free.get()
-            outcome = outcome_of(site, chosen[number], tree) if site else ("gone", "")
-            free.put(tree)
-            tried[str(mutant)] = outcome
-            with log.open("a", encoding="utf-8") as lines:
-                lines.write(json.dumps([str(mutant), outcome]) + "\n")
-        result, test = tried[str(mutant)]
-        print(f"{result:12} {mutant.file} {mutant.scope} {mutant.kind}", flush=True)
-        return Row(site.mutant if site else mutant, result, test)
+        def one(number: int) -> Row:
+            mutant, site = found[number]
+            known = tried.get(str(mutant))
+            is_known = known is not None and (known.result == "killed" or known.seconds >= seconds)
+            if known is None or not is_known:
+                known = Tried(str(mutant), "gone", "", seconds)
+                if site is not None:
+                    with writing:
+                        chosen = covered.chosen(site, seconds)
+                    place = free.get()
+                    try:
+                        result, test = place.outcome(site, chosen)
+                    finally:
+                        free.put(place)
+                    known = replace(known, result=result, test=test)
+                with writing, log.open("a", encoding="utf-8") as lines:
+                    lines.write(json.dumps(asdict(known)) + "\n")
+            result = f"{known.result:12} {mutant.file} {mutant.scope} {mutant.kind} {known.test}"
+            print(result, flush=True)
+            return Row(site.mutant if site else mutant, known.result, known.test)
 
-    with ThreadPoolExecutor(len(trees)) as pool:
-        return list(pool.map(one, range(len(found))))
+        # In an order that says nothing of their rooms: what is interrupted is a sample of them.
+        order = random.Random(len(found)).sample(range(len(found)), len(found))
+        rows = dict(zip(order, pool.map(one, order), strict=True))
+        return [rows[number] for number in range(len(found))]
 
 
 def _room(file: str) -> str:
@@ -125,7 +143,7 @@ def _room(file: str) -> str:
 
 
 def _table(rows: Sequence[Row]) -> str:
-    """Return the score by room and what survived, as a page."""
+    """Return the score by room, as a table."""
     rooms: dict[str, Counter[str]] = defaultdict(Counter)
     for row in rows:
         rooms[_room(row.mutant.file)][row.result] += 1
@@ -136,32 +154,82 @@ def _table(rows: Sequence[Row]) -> str:
         score = f"{counts['killed'] / tried:.0%}" if tried else "–"
         numbers = " | ".join(str(counts[state]) for state in _STATES)
         lines.append(f"| {room} | {counts.total()} | {numbers} | {score} |")
-    for state in _STATES[1:]:
-        mutants = [row.mutant for row in rows if row.result == state]
-        lines += ["", f"## {state.capitalize()}: {len(mutants)}", ""] if mutants else []
-        lines += [
-            f"- `{mutant.file}`, `{mutant.scope or 'module'}`, {mutant.kind}: "
-            f"`` {mutant.statement} ``, {mutant.index}: `` {mutant.becomes} ``".replace("\n", " ")
-            for mutant in mutants
-        ]
     return "\n".join(lines) + "\n"
+
+
+def _unnoticed(rows: Sequence[Row]) -> str:
+    """Return the mutants that no test noticed, each with what a reader found."""
+    lines: list[str] = []
+    for state in _STATES[1:]:
+        same = [row for row in rows if row.result == state]
+        lines += ["", f"### {state.capitalize()}: {len(same)}", ""] if same else []
+        for row in same:
+            mutant = row.mutant
+            line = (
+                f"- `{mutant.file}`, `{mutant.scope or 'module'}`, {mutant.kind}: "
+                f"`` {mutant.statement} ``, {mutant.index}: `` {mutant.becomes} ``"
+            )
+            note = f". {row.note}" if row.note else ""
+            lines.append((line + note).replace("\n", " "))
+    return "\n".join(lines) + "\n"
+
+
+def _rows(entries: Sequence[dict[str, Any]]) -> list[Row]:
+    """Return the mutants of a list, with what became of each."""
+    names = {field.name for field in fields(Mutant)}
+    rows = []
+    for entry in entries:
+        mutant = Mutant(**{name: entry[name] for name in names})
+        rows.append(Row(mutant, entry["result"], entry["test"], entry.get("note", "")))
+    return rows
 
 
 def read() -> list[Row]:
     """Return the mutants of results.json, with what became of each."""
-    rows = []
-    for entry in json.loads(RESULTS.read_text("utf-8")):
-        result, test = entry.pop("result"), entry.pop("test")
-        rows.append(Row(Mutant(**entry), result, test))
-    return rows
+    return _rows(json.loads(RESULTS.read_text("utf-8")))
+
+
+def _with_notes(rows: Sequence[Row], before: Sequence[Row]) -> list[Row]:
+    """Return rows with the notes that stood beside the same mutants where these survived too."""
+    notes = {row.mutant: row.note for row in before}
+    return [
+        row if row.result == "killed" else replace(row, note=notes.get(row.mutant, row.note))
+        for row in rows
+    ]
 
 
 def write(rows: Sequence[Row]) -> None:
     """Write results.json and SCORE.md, and print the score."""
     entries = [row.to_dict() for row in rows]
     RESULTS.write_text(json.dumps(entries, indent=1, ensure_ascii=False) + "\n", "utf-8")
-    (HERE / "SCORE.md").write_text("# Score\n\n" + _table(rows), "utf-8")
-    print(_table(rows).partition("##")[0])
+    _write_page()
+    print(_table(rows))
+
+
+def write_second(rows: Sequence[Row], seed: int) -> None:
+    """Write second.json, the draw that the tests were not written for, and SCORE.md."""
+    told = {
+        "date": time.strftime("%Y-%m-%d"),
+        "seed": seed,
+        "mutants": [row.to_dict() for row in rows],
+    }
+    SECOND.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    _write_page()
+    print(_table(rows))
+
+
+def _write_page() -> None:
+    """Write SCORE.md: the list that is replayed, then the second draw."""
+    first = read()
+    parts = ["# Score\n", "## The list that is replayed\n", _table(first)]
+    after = [_unnoticed(first)]
+    if SECOND.exists():
+        told = json.loads(SECOND.read_text("utf-8"))
+        rows = _rows(told["mutants"])
+        parts += [f"## Drawn with seed {told['seed']} on {told['date']}\n", _table(rows)]
+        after += [f"## Not noticed, seed {told['seed']}\n", _unnoticed(rows)]
+    page = "\n".join([*parts, "## Not noticed, of the list\n", *after])
+    (HERE / "SCORE.md").write_text(re.sub(r"\n{3,}", "\n\n", page), "utf-8")
 
 
 def main() -> int:
@@ -175,15 +243,31 @@ def main() -> int:
         help="bring the list up to date with today's source, and try nothing",
     )
     parser.add_argument("--seed", type=int, default=0, help="of what is drawn (0)")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=SECONDS,
+        help=f"processor time of the tests of each mutant; survivors of less are tried again "
+        f"({SECONDS:g})",
+    )
+    parser.add_argument(
+        "--apart",
+        action="store_true",
+        help="leave the list as it is: what is drawn is written into second.json",
+    )
     options = parser.parse_args()
     if options.renew:
         write(renewed(read(), all_sites(ROOT), options.seed))
         return 0
     if options.draw:
-        write(_run(draw(options.draw, options.seed)))
+        rows = _run(draw(options.draw, options.seed), options.seconds)
+        if options.apart:
+            write_second(rows, options.seed)
+        else:
+            write(_with_notes(rows, read()))
         return 0
     before = read()
-    now = _run([row.mutant for row in before])
+    now = _with_notes(_run([row.mutant for row in before], options.seconds), before)
     write(now)
     lost = [
         row

@@ -1,7 +1,12 @@
-"""A pytest plugin: which test runs which line, and how long each test takes.
+"""A pytest plugin: which test runs which line, and how much processor time each test takes.
 
 It names the running test to coverage.py, in the process of the tests and in its forks. A process
-that a test starts reads the name from PYTEST_CURRENT_TEST (`covered.INI`).
+that a test starts reads the name from PYTEST_CURRENT_TEST (`covered.INI`). The time of the clock
+depends on what else the machine does, so what is written is the time of the processors, with that
+of the processes that a test started and waited for.
+
+Measuring all tests takes most of an hour, and more of the same rarely notices more. So of the cases
+of a test, three are measured; and of a file, what comes within `FILE_SECONDS`.
 """
 
 from __future__ import annotations
@@ -10,19 +15,44 @@ import json
 import os
 import threading
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 from coverage import Coverage
 
+_Case = TypeVar("_Case")
+CASES = 3  # of one test
+FILE_SECONDS = 8.0  # of a file, under coverage.py; the test that exceeds them is the last
+
 _seconds: dict[str, float] = defaultdict(float)
 _fixtures: dict[str, float] = defaultdict(float)
-_failed: set[str] = set()
+_unused: set[str] = set()  # failed or skipped
+_spent: dict[str, float] = defaultdict(float)  # of each file, in the process that runs its tests
+
+
+def _file(test: str) -> str:
+    return test.partition("::")[0]
 
 
 def _name(context: str) -> None:
     if measuring := Coverage.current():
         measuring.switch_context(context)
+
+
+@contextmanager
+def _timed(item: pytest.Item, stage: str) -> Iterator[None]:
+    """Name a stage of a test to coverage.py, and give its processor time to the test's report."""
+    _name(f"{item.nodeid} ({stage})")
+    before = sum(os.times()[:4])
+    try:
+        yield
+    finally:
+        took = sum(os.times()[:4]) - before
+        _spent[_file(item.nodeid)] += took
+        item.user_properties.append((f"processor {stage}", took))
 
 
 def pytest_configure() -> None:
@@ -32,30 +62,51 @@ def pytest_configure() -> None:
     os.register_at_fork(after_in_child=lambda: _name(os.environ.get("PYTEST_CURRENT_TEST", "")))
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the first, the middle and the last of the cases of a test."""
+    cases: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        cases[item.nodeid.partition("[")[0]].append(item)
+    items[:] = [case for same in cases.values() for case in few(same)]
+
+
+def few(same: list[_Case]) -> list[_Case]:
+    """Return `CASES` of them at most, as far from each other as they are."""
+    if len(same) <= CASES:
+        return same
+    return [same[place * (len(same) - 1) // (CASES - 1)] for place in range(CASES)]
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup(item: pytest.Item) -> object:
-    _name(f"{item.nodeid} (setup)")
-    return (yield)
+    if _spent[_file(item.nodeid)] > FILE_SECONDS:
+        pytest.skip("its file has had its time")
+    with _timed(item, "setup"):
+        return (yield)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> object:
-    _name(f"{item.nodeid} (call)")
-    return (yield)
+    with _timed(item, "call"):
+        return (yield)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    _seconds[report.nodeid] += report.duration
-    if report.when == "setup":
-        file = report.nodeid.partition("::")[0]
-        _fixtures[file] = max(_fixtures[file], report.duration)
-    if report.failed:
-        _failed.add(report.nodeid)
+    if not report.passed:
+        _unused.add(report.nodeid)
+    if report.when != "teardown":
+        return
+    spent = dict(report.user_properties)
+    setup = float(spent.get("processor setup", 0.0))
+    _seconds[report.nodeid] = setup + float(spent.get("processor call", 0.0))
+    file = _file(report.nodeid)
+    _fixtures[file] = max(_fixtures[file], setup)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if measuring := Coverage.current():
         measuring.save()
     if not hasattr(session.config, "workerinput"):
-        told = {"seconds": _seconds, "fixtures": _fixtures, "failed": sorted(_failed)}
+        told = {"seconds": _seconds, "fixtures": _fixtures, "unused": sorted(_unused)}
         Path(os.environ["MUTANTS_TIMES"]).write_text(json.dumps(told), "utf-8")

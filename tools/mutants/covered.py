@@ -7,7 +7,10 @@ import os
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypedDict
 
 from coverage import Coverage, CoverageData
 
@@ -16,6 +19,9 @@ from .draw import Site
 # Figures that were frozen from this project or its models guard against change. They are not
 # tests of what is true, so they must not hold the score up.
 FROZEN = ("tests/test_reference.py", "tests/test_golden.py")
+# What `make test` runs. The other tests take an hour under coverage.py, and few of them would fit
+# into the time of a fault; what they alone notice counts as not noticed.
+QUICK = "not slow"
 _INI = """\
 [run]
 source = {tree}/statemachine
@@ -28,27 +34,85 @@ disable_warnings = no-data-collected, module-not-imported, already-imported, cou
 """
 
 
+class Times(TypedDict):
+    """What `contexts` writes.
+
+    Attributes:
+        seconds: Processor time of each test [s].
+        fixtures: The most that setting up a test of a file took [s].
+        unused: Tests that failed or were skipped.
+    """
+
+    seconds: dict[str, float]
+    fixtures: dict[str, float]
+    unused: list[str]
+
+
 def environment(tree: Path) -> dict[str, str]:
     """Return the environment of tests in a copy: every process they start imports that copy."""
     return {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def measure(tree: Path, folder: Path) -> None:
-    """Run all tests of a copy of the checkout, and write which line each of them runs."""
-    folder.mkdir(parents=True)
-    settings = folder / "coverage.ini"
+def measure(tree: Path, folder: Path, files: Sequence[str] = ()) -> None:
+    """Run the quick tests of a copy of the checkout, and write which line each of them runs.
+
+    Args:
+        tree: The copy.
+        folder: Where it is written. What stands there of other files stays.
+        files: The files of tests that are run; all of them where none is named.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    settings, times = folder / "coverage.ini", folder / "times.json"
+    before: Times | None = json.loads(times.read_text("utf-8")) if times.exists() else None
     settings.write_text(_INI.format(tree=tree, folder=folder), "utf-8")
-    watched = {"COVERAGE_PROCESS_START": str(settings), "MUTANTS_TIMES": str(folder / "times.json")}
+    watched = {"COVERAGE_PROCESS_START": str(settings), "MUTANTS_TIMES": str(times)}
     command = [sys.executable, "-m", "pytest", "-p", "tools.mutants.contexts", "-n", "auto"]
+    ignored = [f"--ignore={path}" for path in FROZEN]
     subprocess.run(
-        [*command, "--dist", "worksteal", *(f"--ignore={path}" for path in FROZEN)],
+        [*command, "--dist", "loadfile", "-m", QUICK, *ignored, *files],
         cwd=tree,
-        env={**environment(tree), **watched},
+        env={**os.environ, "PYTHONPATH": str(tree), **watched},
         check=False,  # a test that fails here is not used
     )
     measured = Coverage(config_file=str(settings))
+    measured.load()
     measured.combine([str(folder)])
     measured.save()
+    if before is not None:
+        now = json.loads(times.read_text("utf-8"))
+        times.write_text(json.dumps(_renewed(before, now, files)), "utf-8")
+
+
+def _renewed(before: Times, now: Times, files: Sequence[str]) -> Times:
+    """Return the times of all tests, where those of some files were measured again."""
+    gone = tuple(f"{file}::" for file in files)
+    seconds = {test: took for test, took in before["seconds"].items() if not test.startswith(gone)}
+    unused = [test for test in before["unused"] if not test.startswith(gone)]
+    return {
+        "seconds": seconds | now["seconds"],
+        "fixtures": before["fixtures"] | now["fixtures"],
+        "unused": unused + now["unused"],
+    }
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The tests by which a mutant is judged.
+
+    Attributes:
+        tests: Their names, in the order in which they are run.
+        seconds: The processor time that they take in all [s].
+        at_import: Whether the statement also runs before any test, so that only a process that
+            starts with the fault has it.
+    """
+
+    tests: tuple[str, ...]
+    seconds: float
+    at_import: bool
+
+
+def _file(test: str) -> str:
+    return test.partition("::")[0]
 
 
 class Covered:
@@ -58,18 +122,25 @@ class Covered:
         self._data = CoverageData(str(folder / "data"))
         self._data.read()
         told = json.loads((folder / "times.json").read_text("utf-8"))
-        failed = set(told["failed"])
+        unused = set(told["unused"])
         self._seconds: dict[str, float] = {
             test: seconds
             for test, seconds in told["seconds"].items()
-            if test not in failed and not test.startswith(FROZEN)
+            if test not in unused and not test.startswith(FROZEN)
         }
         self._fixtures: dict[str, float] = told["fixtures"]
+        self._by_line: dict[str, dict[int, list[str]]] = {}
         self._of_file: dict[str, list[str]] = defaultdict(list)
         for test in self._seconds:
-            self._of_file[test.partition("::")[0]].append(test)
+            self._of_file[_file(test)].append(test)
 
-    def tests(self, site: Site, seconds: float) -> list[str]:
+    def _contexts(self, file: str) -> dict[int, list[str]]:
+        """Return what ran each line of a module."""
+        if file not in self._by_line:
+            self._by_line[file] = self._data.contexts_by_lineno(file)
+        return self._by_line[file]
+
+    def chosen(self, site: Site, seconds: float) -> Chosen:
         """Return the tests that run the statement of a mutant.
 
         Those whose file is named after its room or module come first, then the quickest. What
@@ -80,27 +151,27 @@ class Covered:
             site: Where the mutant stands.
             seconds: How long they may take in all; the first is always there [s].
         """
-        by_line = self._data.contexts_by_lineno(site.mutant.file)
+        by_line = self._contexts(site.mutant.file)
         lines = [line for line in site.lines if site.called] or list(by_line)
+        contexts = {context for line in lines for context in by_line.get(line, [])}
         found: set[str] = set()
-        for context in {context for line in lines for context in by_line.get(line, [])}:
+        for context in contexts:
             test, _, stage = context.rpartition(" (")
-            file = test.partition("::")[0]
-            found.update(self._of_file[file] if stage == "setup)" else [test])
+            found.update(self._of_file[_file(test)] if stage == "setup)" else [test])
         rooms = set(site.mutant.file.removesuffix(".py").replace("/", "_").split("_")[1:])
 
         def order(test: str) -> tuple[bool, float, str]:
-            file = test.partition("::")[0]
+            file = _file(test)
             own = rooms & set(file.removesuffix(".py").split("_")[1:])
             return not own, self._seconds[test] + self._fixtures.get(file, 0.0), test
 
-        chosen: list[str] = []
-        prepared: set[str] = set()
+        by_file: dict[str, list[str]] = {}  # in the order of the first of each
+        left = seconds
         for test in sorted(found & set(self._seconds), key=order):
-            file = test.partition("::")[0]
-            fixtures = 0.0 if file in prepared else self._fixtures.get(file, 0.0)
-            if not chosen or self._seconds[test] + fixtures < seconds:
-                seconds -= self._seconds[test] + fixtures
-                prepared.add(file)
-                chosen.append(test)
-        return chosen
+            file = _file(test)
+            fixtures = 0.0 if file in by_file else self._fixtures.get(file, 0.0)
+            if not by_file or self._seconds[test] + fixtures < left:
+                left -= self._seconds[test] + fixtures
+                by_file.setdefault(file, []).append(test)
+        tests = tuple(test for same in by_file.values() for test in same)
+        return Chosen(tests, seconds - left, not site.called or "" in contexts)

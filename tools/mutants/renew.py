@@ -26,15 +26,18 @@ class Row:
         mutant: The fault.
         result: "killed", "survived", "timed out", "not covered", "gone" or "not tried".
         test: The test that noticed it; "" where none did.
+        note: What a reader of the survivors found; "" where nobody looked.
     """
 
     mutant: Mutant
     result: str
     test: str
+    note: str = ""
 
     def to_dict(self) -> dict[str, object]:
         """Return the entry of results.json."""
-        return {**asdict(self.mutant), "result": self.result, "test": self.test}
+        outcome = {"result": self.result, "test": self.test, "note": self.note}
+        return {**asdict(self.mutant), **outcome}
 
 
 def unique(sites: Iterable[Site]) -> set[Mutant]:
@@ -98,7 +101,7 @@ def renewed(rows: Sequence[Row], sites: Sequence[Site], seed: int) -> list[Row]:
     for row in rows:
         site = find(row.mutant, standing)
         if site is not None and site.mutant in single:
-            now = Row(site.mutant, row.result, row.test)
+            now = Row(site.mutant, row.result, row.test, row.note)
             if site.mutant.function != row.mutant.function:
                 now = Row(site.mutant, NOT_TRIED, "")
         else:
