@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import sys
 import types
 import urllib.error
@@ -296,6 +297,41 @@ def test_every_lesson_that_makes_sense_holds(model: Any, robot: str, name: str) 
     assert not any(isinstance(block, (Text, Question)) for block in page.blocks)
     assert code
     assert blocks(page, Table) or name == "nowhere" or (name == "reset" and not made.keyframes)
+
+
+# A cart that one motor pushes against its limit, with a pole that falls onto its own.
+INVERTED = """<mujoco><option integrator="RK4" timestep="0.02"/><worldbody>
+  <body name="cart"><joint name="slider" type="slide" axis="1 0 0" range="-1 1" limited="true"
+      damping="1"/><geom type="capsule" size=".1 .1" mass="10" contype="0"/>
+    <body name="pole"><joint name="hinge" axis="0 1 0" range="-90 90" limited="true" damping="1"/>
+      <geom type="capsule" fromto="0 0 0 .001 0 .6" size=".05" mass="5" contype="0"/></body>
+  </body></worldbody>
+  <actuator><motor joint="slider" gear="100" ctrlrange="-3 3"/></actuator></mujoco>"""
+
+
+def test_broken_runs_may_end_in_the_same_bits(tmp_path: Path, here: Cli, bullet: object) -> None:
+    """At its limits a robot forgets how it came there; the lesson does not say that it differs."""
+    file = written(tmp_path / "inverted.xml", INVERTED)
+    words = ("lesson", "replay", "--backend", "pybullet", "--model", str(file), "--json")
+    found = json.loads(here(*words, code=0).stdout)["pybullet"]
+    assert [(run["peak"] > 0.01, run["end"]) for run in found["breaks"]] == [(True, 0.0)] * 2
+
+
+def test_what_a_stage_of_an_integrator_leaves_is_of_no_moment(model: Any) -> None:
+    """RK4 computes four times in a step: that it leaves another place than forward is no fault."""
+    found, page, _ = lesson("forward", model(INVERTED), further=True, seconds=0.1)
+    raw = mujoco.MjModel.from_xml_string(INVERTED)
+    data = mujoco.MjData(raw)
+    mujoco.mj_forward(raw, data)
+    data.qpos[0] = found.value
+    mujoco.mj_step(raw, data)
+    left = data.xpos.copy()
+    data.qpos[:], data.qvel[:] = 0, 0
+    data.qpos[0] = found.value
+    mujoco.mj_forward(raw, data)
+    assert not np.array_equal(data.xpos, left)
+    assert {change.name: change.same for change in found.further.changes}["xpos"] is False
+    assert page.holds
 
 
 def test_a_value_is_in_the_range_of_its_joint(model: Any) -> None:

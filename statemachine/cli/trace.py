@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BadInputError, printable
+from ..show.labels import TableLabels
 from .common import (
     ONE_BACKEND,
     PROGRAM,
@@ -28,6 +29,9 @@ from .experiments import EXPERIMENTS, experiments
 if TYPE_CHECKING:
     from ..lab.recordings import Trace
     from ..lab.recordings.request import PlayRequest, RecordRequest
+
+
+_SAY = TableLabels(__name__, "trace_labels.md.j2")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -270,16 +274,17 @@ def _write(trace: Trace, target: Path) -> int:
     """Write a trace, and say what it is of."""
     from ..lab.recordings import write
 
-    replaced = " (the file that was there is replaced)" if target.exists() else ""
+    replaces = target.exists()
     path = write(trace, target)
     header = trace.header
-    what = f"{header.experiment} on {header.label}{replaced}"
-    print(printable(f"{path}: {len(trace)} rows of {what}"))
+    written = _SAY(
+        "written", file=str(path), rows=len(trace), what=header.experiment, engine=header.label
+    )
+    print(printable(written))
+    if replaces:
+        print(_SAY("replaced"))
     if header.rewritten:
-        print(
-            f"{header.rewritten} rows do not follow from the step before: the controller "
-            "wrote qpos or qvel, or the engine does not repeat"
-        )
+        print(_SAY("rewritten", rows=header.rewritten))
     if header.ended:
         return print_error(
             f"the run ended early, and is written until then: {header.ended}", SAYS_NO

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 
 from ..errors import BadInputError, printable
 from ..installed import DEFAULT
+from ..show.labels import TableLabels
 from ..typed_numbers import typed_float, typed_int
 from .common import PROGRAM, TerminalReporter, add_backend, add_menagerie, flag_of, is_given
 
 if TYPE_CHECKING:
     from ..view.request import BrowserView, RecordingRequest, ServerSettings, SimulationRequest
 
+_SAY = TableLabels(__name__, "view_labels.md.j2")
 _PORT = 8080
 _MODEL = "so101/scene_box"
 
@@ -141,17 +143,17 @@ def _announce(options: argparse.Namespace, view: BrowserView, port: int, token: 
     host = f"[{options.host}]" if ":" in options.host else options.host
     address = f"http://{'localhost' if is_local else host}:{port}/?token={token}"
     if options.port not in (0, port):
-        print(f"port {options.port} is taken, so it is {port}")
+        print(_SAY("taken", asked=options.port, port=port))
     print(address)
-    print(printable(f"shows {view.what}; Ctrl-C ends it"))
+    print(printable(_SAY("shows", what=view.what)))
     if everywhere or not is_local:
-        print(f"whoever has this address and reaches port {port} here can move the sliders")
+        print(_SAY("open", port=port))
     else:
         machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"
-        print("from another machine, first:")
+        print(_SAY("elsewhere"))
         print(f"ssh -L {port}:localhost:{port} {machine}")
     for left_out in view.drawing.left_out:
-        print(f"not drawn: {left_out}")
+        print(printable(_SAY("left_out", what=left_out)))
     sys.stdout.flush()  # a pipe is read while this runs
     if options.open:
         import webbrowser

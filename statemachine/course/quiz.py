@@ -20,9 +20,11 @@ from typing import NamedTuple
 from .. import __version__
 from ..atomic_files import replace_text
 from ..show.blocks import LETTERS, Question
+from ..show.labels import TableLabels
 from .asking import Stopped
 from .grading import KIND, answers_in
 
+_SAY = TableLabels(__name__, "quiz_labels.md.j2")
 _WIDTH_MOST = 100
 _SPLIT = 0.25  # what it costs to split a block: as much as half of a window that stays empty
 _CUT = 10.0  # what it costs to cut a figure: so much that one is cut only where it has no room
@@ -76,12 +78,12 @@ class Reader:
         self.show()
         letters = LETTERS[: len(question.choices)]
         while True:
-            typed = self._typed(f"Your prediction (a-{letters[-1]}, Enter to pass, q to stop): ")
+            typed = self._typed(_SAY("predict", last=letters[-1]))
             if not typed:
                 return None
             if typed in list(letters):
                 return letters.index(typed)
-            print(f"Please type one of {', '.join(letters)}.")
+            print(_SAY("choose", letters=", ".join(letters)))
 
     def go_on(self, what: str = "more") -> None:
         """Show what is new, and wait until the reader wants to see `what`.
@@ -90,14 +92,14 @@ class Reader:
             Stopped: The reader typed q, or Ctrl-D.
         """
         self.show()
-        while self._typed(f"Enter for {what} (q to stop) ", end="q"):
-            print("Please press Enter alone, or type q.")
+        while self._typed(_SAY("go_on", what=what), end="q"):
+            print(_SAY("enter"))
 
     def _typed(self, prompt: str, end: str = "") -> str:
         """Return what the reader types, in small letters; `end` if nothing more is to come."""
         _forget_typed_ahead()
         try:
-            typed = input(prompt).strip().lower().rstrip(")")
+            typed = input(f"{prompt} ").strip().lower().rstrip(")")
         except EOFError:
             print()
             typed = end
@@ -144,14 +146,15 @@ class RecordedReader(Reader):
         first = self._answers.setdefault(f"{self.lesson}: {question.text}", answer)
         self._write()
         if first["predicted"] != predicted:
-            print(f"(In {self._file.name} your first answer counts: {first['predicted']}.)")
+            earlier = str(first["predicted"]).replace("`", "")
+            print(_SAY("first_counts", file=self._file.name, answer=earlier))
         return choice
 
     @property
     def summary(self) -> str:
         """Return what the file says by now, in a line."""
         right = sum(bool(answer["right"]) for answer in self._answers.values())
-        return f"{self._file.name}: {right} of {len(self._answers)} predictions right"
+        return _SAY("score", file=self._file.name, right=right, count=len(self._answers))
 
     def _write(self) -> None:
         answers = list(self._answers.values())
@@ -286,8 +289,10 @@ def _rows(line: str) -> int:
 def _question_lines(question: Question) -> Iterator[str]:
     """Yield a question and its choices in lines of the window's width."""
     width = max(min(shutil.get_terminal_size().columns, _WIDTH_MOST), 20)
-    text = question.text if question.always else f"Before you read on: {question.text}"
-    yield from textwrap.wrap(text.replace("`", ""), width)
+    text = question.text.replace("`", "")
+    if not question.always:
+        text = _SAY("before", question=text)
+    yield from textwrap.wrap(text, width)
     for choice in lettered(question):
         yield from textwrap.wrap(
             choice.replace("`", ""), width, initial_indent="  ", subsequent_indent="     "

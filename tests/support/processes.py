@@ -34,15 +34,21 @@ def without_estimates(stderr: str) -> str:
 
 
 def of_python(
-    *words: object, folder: Path = ROOT, code: int | None = None, **environment: str
+    *words: object,
+    folder: Path = ROOT,
+    code: int | None = None,
+    typed: str | None = None,
+    **environment: str,
 ) -> subprocess.CompletedProcess[str]:
     """Run Python with such words in a process of its own, which has this checkout.
 
-    `code` is the exit code that it must have, if that is all that is asked of it. Its standard
+    `code` is the exit code that it must have, if that is all that is asked of it, and `typed` what
+    it reads on its standard input. Its standard
     error is without the line that depends on speed (`without_estimates`).
     """
     done = subprocess.run(
         [sys.executable, *map(str, words)],
+        input=typed,
         capture_output=True,
         text=True,
         timeout=600,  # of a busy machine

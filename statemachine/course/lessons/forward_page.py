@@ -38,11 +38,14 @@ class FurtherPart:
         effects: What the next step makes of the write.
         changes: How many arrays each call changes.
         lag: How far what a step leaves is behind.
+        of_a_moment: Whether it belongs to a moment, before the step or after it. RK4 leaves what it
+            computed for a stage of its own.
     """
 
     effects: WriteEffects
     changes: ChangeCounts
     lag: WorstLag
+    of_a_moment: bool
 
 
 @dataclass(frozen=True)
@@ -99,10 +102,14 @@ class ForwardPage(PageContent):
         return (1, 2) in self.result.equal
 
     @property
+    def overwrites(self) -> bool:
+        """Tell whether another number stood where it was written: only then can a copy show it."""
+        return self.result.written.copy != self.result.value
+
+    @property
     def is_view(self) -> bool:
-        """Tell whether another name for qpos shows what was written, and a copy does not."""
-        written = self.result.written
-        return written.view == self.result.value != written.copy
+        """Tell whether another name for qpos shows what was written."""
+        return self.result.written.view == self.result.value
 
     @property
     def engine_agrees(self) -> bool:
@@ -137,7 +144,12 @@ class ForwardPage(PageContent):
         further = self.result.further
         if further is None:
             return None
-        return FurtherPart(further.effects, counts_of(further.changes), worst_lag_of(further.lag))
+        return FurtherPart(
+            effects=further.effects,
+            changes=counts_of(further.changes),
+            lag=worst_lag_of(further.lag),
+            of_a_moment=not further.lag.neither,
+        )
 
 
 def contents(results: Results[ForwardResult], frame: LessonFrame) -> dict[str, ForwardPage]:

@@ -109,14 +109,14 @@ class ReplayPage(PageContent):
         return None if self.broken is None else _COURSES.index(self.broken.course)
 
     @property
-    def all_differ(self) -> bool:
-        """Tell whether each broken run differs; a late command means nothing without actuators."""
-        return bool(self.result.breaks) and all(run.peak > 0 for run in self.result.breaks)
+    def notices(self) -> bool:
+        """Tell whether the ends of all broken runs differ from that of the first run."""
+        return bool(self.result.breaks) and all(run.end > 0 for run in self.result.breaks)
 
     @property
-    def notices(self) -> bool:
-        """Tell whether the ends of all broken runs differ."""
-        return all(run.end > 0 for run in self.result.breaks)
+    def equal_ends(self) -> int:
+        """Return how many broken runs differ on the way, and end in the same bits all the same."""
+        return sum(run.peak > 0 and run.end == 0 for run in self.result.breaks)
 
     @property
     def shrinks_all(self) -> bool:

@@ -236,13 +236,29 @@ def take(
     """
     values = fitted(lesson, model, options or {})
     lesson_module = module(lesson.name)
-    code = lesson_module.code(model, values, load_line(name or lesson.model, backend, menagerie))
+    code = code_as_typed(lesson, model, backend, values, name or lesson.model, menagerie)
     with CodeRun(code, model) as play:
         result = lesson_module.run(play, values, progress)
     recording = _recorded(code, backend) if calls else None
     draw = getattr(lesson_module, "diagram", None)
     diagram = draw(model) if draw else None
     return LessonRun(result, code, play.printed, is_so101(model), recording, diagram)
+
+
+def code_as_typed(
+    lesson: Lesson, model: Model, backend: str, values: Options, name: str, menagerie: str | None
+) -> str:
+    """Return the code of a lesson, as a student types it.
+
+    Args:
+        lesson: An entry of the table of lessons.
+        model: The Model that it is written for.
+        backend: What `load` is given for it.
+        values: All options of the lesson by key, see `fitted`.
+        name: What `load` is given as the model.
+        menagerie: What it is given as that.
+    """
+    return module(lesson.name).code(model, values, load_line(name, backend, menagerie))
 
 
 def _recorded(code: str, backend: str) -> Recording | None:
