@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from statemachine.backends import parse_backend
-from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.errors import BadInputError, EngineError, UnknownNameError
+from statemachine.lab.runs.drive import Progress
+from statemachine.lab.runs.reporter import QuietReporter
 from statemachine.lab.validate.battery import ValidateRequest, answer, run_case
 from statemachine.lab.validate.case import (
     Case,
@@ -23,16 +30,11 @@ from statemachine.lab.validate.case import (
     exact_steps,
     wrong,
 )
+from statemachine.lab.validate.case_runs import CaseRun, outcomes_of
 from statemachine.lab.validate.cases import CASES, cases_of
 from statemachine.lab.validate.run import Run, Samples, zero_crossings
 from statemachine.lab.validate.variants import Variant, variants_of
-from statemachine.lab.validate.verdict import (
-    CaseMeasurement,
-    Status,
-    observed_order,
-    status_of,
-    verdict_of,
-)
+from statemachine.lab.validate.verdict import CaseMeasurement, Status, judgement_of
 
 from .support.requirements import need_engine
 
@@ -46,6 +48,19 @@ _SLIDE = (
 def height_after_a_tenth(run: Run) -> float:
     run.advance(0.1)
     return float(run.data.qpos[0])
+
+
+class Fractions(QuietReporter):
+    """A reporter that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.fractions: list[float] = []
+
+    @contextmanager
+    def stage(
+        self, what: str, runs_at_once: int = 0, expected_seconds: float | None = None
+    ) -> Iterator[Progress]:
+        yield self.fractions.append
 
 
 def fall(**changes: Any) -> Case:
@@ -87,21 +102,25 @@ def measured(*errors: float | None, discrete: float | None = None) -> list[CaseM
 def test_verdict_follows_the_errors(
     errors: tuple[float | None, ...], discrete: float | None, verdict: Verdict
 ) -> None:
-    assert verdict_of(fall(), measured(*errors, discrete=discrete)) == verdict
+    assert judgement_of(fall(), measured(*errors, discrete=discrete), None).verdict == verdict
+
+
+def order_of(case: Case, *errors: float) -> float | None:
+    return judgement_of(case, measured(*errors), None).order
 
 
 @pytest.mark.parametrize("power", [1, 2, 4])
 def test_order_is_the_power_of_the_timestep(power: int) -> None:
     errors = [300.0 * step**power for step in STEPS]
-    assert observed_order(fall(rounding=0.0), measured(*errors)) == pytest.approx(power)
+    assert order_of(fall(rounding=0.0), *errors) == pytest.approx(power)
 
 
 def test_no_order_is_observed_of_rounding() -> None:
-    assert observed_order(fall(rounding=0.0), measured(4e-12, 2e-12, 1e-12)) is None
+    assert order_of(fall(rounding=0.0), 4e-12, 2e-12, 1e-12) is None
 
 
 def test_no_order_is_observed_of_a_chaotic_end() -> None:
-    assert observed_order(fall(is_chaotic=True), measured(0.4, 0.2, 0.1)) is None
+    assert order_of(fall(is_chaotic=True), 0.4, 0.2, 0.1) is None
 
 
 @pytest.mark.parametrize(
@@ -115,6 +134,10 @@ def test_no_order_is_observed_of_a_chaotic_end() -> None:
         (exact(), (0.004, 0.002, 0.001), "worse"),
         (exact_steps(0.004), (0.004, 0.002, 0.001), "worse"),
         (bounded(0.01, "contact model"), (0.01, 0.01, 0.01), "as expected"),
+        (bounded(0.01, "contact model"), (0.001, 0.001, 0.001), "better"),
+        (bounded(0.01, "contact model"), (0.001, 0.005, 0.001), "as expected"),
+        (converges(1.0, 0.1), (0.004, 0.002, 0.001), "better"),
+        (exact(), (1e-15, 0.0, 0.0), "as expected"),
         (wrong(0.5, "engine's own"), (0.01, 0.01, 0.01), "better"),
         (diverges("engine's own"), (None, None, None), "as expected"),
         (None, (0.01, 0.01, 0.01), "not on record"),
@@ -123,12 +146,25 @@ def test_no_order_is_observed_of_a_chaotic_end() -> None:
 def test_status_compares_with_the_record(
     expectation: Expectation | None, errors: tuple[float | None, ...], status: Status
 ) -> None:
-    assert status_of(fall(), measured(*errors), expectation) == status
+    assert status_of(fall(), errors, expectation) == status
+
+
+def status_of(
+    case: Case, errors: Sequence[float | None], expectation: Expectation | None
+) -> Status:
+    return judgement_of(case, measured(*errors), expectation).status
 
 
 def test_one_timestep_shows_no_order_and_is_held_by_the_size_of_its_error() -> None:
-    assert status_of(fall(), measured(0.004), converges(1.0, 0.004)) == "as expected"
-    assert status_of(fall(), measured(0.006), converges(1.0, 0.004)) == "worse"
+    assert status_of(fall(), [0.004], converges(1.0, 0.004)) == "as expected"
+    assert status_of(fall(), [0.006], converges(1.0, 0.004)) == "worse"
+
+
+def test_no_error_is_much_smaller_than_on_record_by_chaos_or_a_shorter_timestep() -> None:
+    record = bounded(0.01, "contact model")
+    assert status_of(fall(), [0.001, 0.001, 0.001], record) == "better"
+    assert status_of(fall(is_chaotic=True), [0.001, 0.001, 0.001], record) == "as expected"
+    assert status_of(fall(timesteps=(0.008,)), [0.001, 0.001, 0.001], record) == "as expected"
 
 
 def test_a_record_is_found_by_engine_and_integrator_before_integrator_alone() -> None:
@@ -201,6 +237,13 @@ def test_a_group_stands_for_its_cases() -> None:
     assert cases_of(()) == list(CASES.values())
 
 
+def test_a_pattern_stands_for_the_cases_whose_names_fit() -> None:
+    names = [case.name for case in cases_of(("pendulum-*", "free-fall"))]
+    expected = [name for name in CASES if name.startswith("pendulum-") or name == "free-fall"]
+    assert names == expected
+    assert len(names) > 2
+
+
 @pytest.mark.parametrize(
     ("words", "error"),
     [
@@ -210,8 +253,64 @@ def test_a_group_stands_for_its_cases() -> None:
         ({"timesteps": (0.0,)}, BadInputError),
         ({"timesteps": (math.nan,)}, BadInputError),
         ({"timesteps": (1.0,)}, BadInputError),
+        ({"cases": ("shpere-*",)}, UnknownNameError),
+        ({"jobs": 0}, BadInputError),
     ],
 )
 def test_bad_requests_are_refused(words: dict[str, Any], error: type[Exception]) -> None:
     with pytest.raises(error):
         ValidateRequest(**words)
+
+
+def test_errors_do_not_depend_on_the_number_of_processes() -> None:
+    need_engine("mujoco")
+    names = ("bounce", "pendulum-quarter", "collision-restitution")
+    alone, shared = (answer(ValidateRequest(cases=names, jobs=jobs)) for jobs in (1, 3))
+    assert [row.verdict for row in alone.results] == [row.verdict for row in shared.results]
+    for one, other in zip(alone.results, shared.results, strict=True):
+        assert (one.name, one.way) == (other.name, other.way)
+        assert [each.measured for each in one.measurements] == [
+            each.measured for each in other.measurements
+        ]
+
+
+def test_progress_comes_to_its_end_once_for_each_run() -> None:
+    need_engine("mujoco")
+    reporter = Fractions()
+    result = answer(ValidateRequest(cases=("pendulum-quarter",), jobs=2), reporter)
+    count = sum(len(row.measurements) for row in result.results)
+    assert reporter.fractions == pytest.approx([(k + 1) / count for k in range(count)])
+
+
+def test_a_process_that_ends_in_a_run_is_an_error_that_names_the_case() -> None:
+    need_engine("mujoco")
+    parent = os.getpid()
+
+    def measure(run: Run) -> float:
+        if os.getpid() != parent:
+            os.abort()
+        return 0.0
+
+    variant = Variant(parse_backend("mujoco"), "Euler")
+    runs = [CaseRun(fall(measure=measure), variant, step) for step in STEPS]
+    with pytest.raises(EngineError, match="fall on mujoco Euler"):
+        outcomes_of(runs, 2, lambda _fraction: None)
+
+
+def test_no_temporary_file_is_left_by_a_process_that_ends_in_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    need_engine("mujoco")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    parent = os.getpid()
+
+    def measure(run: Run) -> float:
+        if os.getpid() != parent:
+            os.abort()
+        return 0.0
+
+    variant = Variant(parse_backend("mujoco"), "Euler")
+    runs = [CaseRun(fall(measure=measure), variant, step) for step in STEPS]
+    with pytest.raises(EngineError):
+        outcomes_of(runs, 2, lambda _fraction: None)
+    assert list(tmp_path.iterdir()) == []

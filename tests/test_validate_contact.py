@@ -19,8 +19,9 @@ from statemachine.lab.validate import (
     contact_rolling,
     contact_tipping,
 )
-from statemachine.lab.validate.battery import ValidateRequest, answer, measure
+from statemachine.lab.validate.battery import ValidateRequest, answer
 from statemachine.lab.validate.case import GRAVITY
+from statemachine.lab.validate.case_runs import measure
 from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.contact import CASES as CONTACT
 from statemachine.lab.validate.soft_contact import SoftContact, Spring

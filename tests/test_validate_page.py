@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,12 +23,14 @@ from statemachine.lab.validate.battery import (
     run_case,
 )
 from statemachine.lab.validate.case import exact
-from statemachine.lab.validate.cases import CASES
+from statemachine.lab.validate.cases import CASES, GROUPS
 from statemachine.lab.validate.page import badness, junit_of, page
 from statemachine.lab.validate.variants import Variant
+from statemachine.show.pictures import Traces
 
 from .support.pages import shown
-from .support.requirements import need_engine
+from .support.processes import lives, soon, without_estimates
+from .support.requirements import ROOT, need_engine
 
 SPRING = "spring-energy"
 
@@ -138,9 +144,71 @@ def test_the_command_writes_tests_and_prints_json(
     assert len(ElementTree.parse(file).getroot()) == len(result["results"])
 
 
-def test_an_unknown_case_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["validate", "--case", "fre-fall"]) == 2
-    assert "free-fall" in capsys.readouterr().err
+@pytest.mark.parametrize(("word", "nearest"), [("fre-fall", "free-fall"), ("motoin", "motion")])
+def test_an_unknown_case_is_bad_input_and_the_nearest_name_is_said(
+    word: str, nearest: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["validate", "--case", word]) == 2
+    error = capsys.readouterr().err
+    assert nearest in error
+    assert all(group in error for group in GROUPS)
+    assert len(error) < 200
+
+
+@pytest.mark.parametrize("suffix", ["svg", "png"])
+def test_the_command_draws_work_against_precision(tmp_path: Path, suffix: str) -> None:
+    need_engine("mujoco")
+    pytest.importorskip("matplotlib")
+    file = tmp_path / f"work.{suffix}"
+    assert main(["validate", "--case", "pendulum-quarter", "--plot", str(file)]) == 0
+    content = file.read_bytes()
+    assert content
+    if suffix == "svg":
+        assert b"mujoco: RK4" in content
+
+
+def test_a_plot_with_another_suffix_is_refused_before_anything_is_run(tmp_path: Path) -> None:
+    assert main(["validate", "--backend", "all", "--plot", str(tmp_path / "work.txt")]) == 2
+
+
+def test_the_curves_are_the_errors_over_what_their_runs_took(spring: ValidateResult) -> None:
+    pictures = [each for each in page(spring, details=True).blocks if isinstance(each, Traces)]
+    (picture,) = [each for each in pictures if each.title.startswith(SPRING)]
+    costs, sizes = picture.curves["mujoco: Euler"]
+    row = of(spring, SPRING, "Euler")
+    assert list(sizes) == [abs(each.error or 0.0) for each in row.measurements]
+    assert list(costs) == [each.steps * (each.seconds_per_step or 0) for each in row.measurements]
+
+
+def test_what_is_better_than_on_record_is_told_and_holds(spring: ValidateResult) -> None:
+    better = [replace(row, status="better") for row in spring.results]
+    result = replace(spring, results=tuple(better))
+    assert result.holds
+    assert "Better than on record" in shown(page(result))
+    assert "Better than on record" not in shown(page(spring))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="children are read from /proc")
+def test_no_process_stays_after_ctrl_c() -> None:
+    need_engine("pybullet")
+    words = ("validate", "--backend", "pybullet", "--case", "weld-*", "--jobs", "2")
+    run = subprocess.Popen(
+        [sys.executable, "-m", "statemachine", *words],
+        cwd=ROOT,
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    place = Path(f"/proc/{run.pid}/task/{run.pid}/children")
+    assert soon(lambda: len(place.read_text().split()) == 2)
+    children = [int(word) for word in place.read_text().split()]
+    os.killpg(run.pid, signal.SIGINT)
+    out, err = run.communicate(timeout=300)
+    assert run.returncode == 130
+    assert out == b""
+    assert without_estimates(err.decode()).strip() == ""
+    assert soon(lambda: not any(map(lives, children)))
 
 
 def test_the_nearest_of_one_case_has_the_smallest_error() -> None:

@@ -11,6 +11,7 @@ from .common import (
     EACH_BACKEND,
     TerminalReporter,
     add_backend,
+    add_jobs,
     add_json,
     file_name,
     show,
@@ -36,7 +37,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--case",
         action="append",
         metavar="NAME",
-        help="a case or a group (motion, joints, contact); may be repeated (default: all)",
+        help=(
+            "a case, a pattern such as sphere-*, or a group (motion, joints, contact); may be "
+            "repeated (default: all)"
+        ),
     )
     parser.add_argument(
         "--timestep",
@@ -49,8 +53,15 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--details", action="store_true", help="every case: errors, orders, causes and costs"
     )
     parser.add_argument(
+        "--plot",
+        type=file_name,
+        metavar="FILE",
+        help="draw the error of each case over the CPU time of its runs: .svg, .png or .pdf",
+    )
+    parser.add_argument(
         "--junit", type=file_name, metavar="FILE", help="write the results as tests of JUnit"
     )
+    add_jobs(parser)
     add_json(parser)
 
 
@@ -67,6 +78,7 @@ def request_of(options: argparse.Namespace) -> ValidateRequest:
         backends=tuple(options.backend or [DEFAULT]),
         cases=tuple(options.case or ()),
         timesteps=tuple(options.timestep or ()),
+        jobs=options.jobs,
     )
 
 
@@ -75,11 +87,17 @@ def run(options: argparse.Namespace) -> int:
     from ..atomic_files import check_place, replace_text
     from ..lab.validate.battery import answer
     from ..lab.validate.page import junit_of, page
+    from ..show.charts import check_suffix, write_pictures
 
     request = request_of(options)
-    if options.junit is not None:
-        check_place(options.junit)
+    if options.plot is not None:
+        check_suffix(options.plot)
+    for file in (options.junit, options.plot):
+        if file is not None:
+            check_place(file)
     result = answer(request, TerminalReporter())
+    if options.plot is not None:
+        write_pictures(page(result, details=True).blocks, options.plot)
     if options.junit is not None:
         replace_text(options.junit, junit_of(result))
     return show(page(result, options.details), result, options.json)

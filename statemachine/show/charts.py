@@ -191,7 +191,11 @@ def _traces(axes: Any, picture: Traces) -> None:
         points = x, y
         if picture.log:
             points = _parted(x, np.where(y == 0, 0.0, np.maximum(y, least)))
-        axes.plot(*points, label=name, **style)
+        axes.plot(*points, label=name, marker="o" if picture.log_across else "", **style)
+    if picture.log_across:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.xaxis.set_minor_formatter(lambda _value, _: "")
     _spanned(axes, every, picture.least)
     if picture.tolerance:
         axes.axhline(picture.tolerance, color=INK, linewidth=0.7, linestyle=(0, (1, 1.5)))

@@ -25,6 +25,7 @@ class Traces:
         across: What the horizontal axis is, with its unit; up: the vertical one.
         curves: (x, y) by name, each a sequence of numbers.
         log: Whether the vertical axis is logarithmic; what is zero has a level below it.
+        log_across: Whether the horizontal axis is; the points of the curves are marked then.
         sides: Whether the curves are the sides of a comparison, in the order of their styles.
         tolerance: Of the values; a line, and what is beyond it is filled.
         floor: (x, y) of the chaos floor, an area.
@@ -36,6 +37,7 @@ class Traces:
     up: str
     curves: Mapping[str, tuple[Numbers, Numbers]]
     log: bool = False
+    log_across: bool = False
     sides: bool = False
     tolerance: float | None = None
     floor: tuple[Numbers, Numbers] | None = None

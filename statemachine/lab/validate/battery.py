@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-import warnings
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ...backends import BackendChoice
 from ...backends.chosen import ALL, chosen_backends
-from ...errors import (
-    BadInputError,
-    DivergedError,
-    MissingEngineError,
-    ModelError,
-    StateMachineError,
-    UnsupportedError,
-)
+from ...errors import BadInputError, MissingEngineError, ModelError, StateMachineError
 from ...installed import DEFAULT
-from ...interface import make_data
-from ..runs.drive import Progress
+from ...processes import checked_jobs
 from ..runs.each_backend import note_missing
 from ..runs.reporter import QUIET, Reporter
 from .case import Case, Cause, Expectation, Group, Integrator, Verdict
+from .case_runs import (
+    CaseOutcome,
+    CaseRun,
+    outcome_of_run,
+    outcomes_of,
+    processes_for,
+    timesteps_of,
+)
 from .cases import cases_of
-from .run import Run
 from .variants import OWN, Variant, variants_of
-from .verdict import CaseMeasurement, Status, observed_order, status_of, verdict_of
+from .verdict import CaseMeasurement, Status, judgement_of
 
 _LONGEST = 0.1  # [s] of a timestep
 _EMPTY = "<mujoco><worldbody/></mujoco>"
@@ -39,17 +38,21 @@ class ValidateRequest:
         backends: As `parse_backend` reads them; "all" for those that are installed.
         cases: Names of cases or of groups; empty for all.
         timesteps: At which each case is run [s]; empty for the case's own.
+        jobs: Number of processes; None for one a processor where that pays. The errors do not
+            depend on it.
     """
 
     backends: tuple[str, ...] = (DEFAULT,)
     cases: tuple[str, ...] = ()
     timesteps: tuple[float, ...] = ()
+    jobs: int | None = None
 
     def __post_init__(self) -> None:
         if not self.backends:
             raise BadInputError("no backend is named: name one, or all")
         chosen_backends(self.backends)
         cases_of(self.cases)
+        checked_jobs(self.jobs)
         for timestep in self.timesteps:
             if not 0.0 < timestep <= _LONGEST:
                 raise BadInputError(
@@ -183,25 +186,28 @@ def answer(request: ValidateRequest, reporter: Reporter = QUIET) -> ValidateResu
             missing.append(error)
             continue
         versions[str(backend)] = version_of_engine(backend, variants)
-        with reporter.stage(f"{len(cases)} cases on {backend}") as progress:
-            results += _run_all(cases, variants, request.timesteps, progress)
+        results += _run_all(cases, variants, request, reporter)
     note_missing(missing, bool(versions), reporter)
     return ValidateResult(request, versions, tuple(results))
 
 
 def _run_all(
-    cases: Sequence[Case],
-    variants: Sequence[Variant],
-    timesteps: Sequence[float],
-    progress: Progress,
+    cases: Sequence[Case], variants: Sequence[Variant], request: ValidateRequest, reporter: Reporter
 ) -> list[CaseResult]:
-    """Return what each way of stepping does in each case."""
+    """Return what each way of stepping of a backend does in each case."""
+    pairs = [(case, variant) for case in cases for variant in variants]
+    runs: list[CaseRun] = []
+    for case, variant in pairs:
+        for timestep in timesteps_of(case, request.timesteps):
+            runs.append(CaseRun(case, variant, timestep))
+    jobs = processes_for(runs, request.jobs)
+    what = f"{len(cases)} cases on {variants[0].backend}"
+    with reporter.stage(what, jobs) as progress:
+        outcomes = iter(outcomes_of(runs, jobs, progress))
     results: list[CaseResult] = []
-    total = len(cases) * len(variants)
-    for case in cases:
-        for variant in variants:
-            results.append(run_case(case, variant, timesteps))
-            progress(len(results) / total)
+    for case, variant in pairs:
+        count = len(timesteps_of(case, request.timesteps))
+        results.append(_judged(case, variant, list(itertools.islice(outcomes, count))))
     return results
 
 
@@ -219,7 +225,7 @@ def version_of_engine(backend: BackendChoice, variants: Sequence[Variant]) -> st
 
 
 def run_case(case: Case, variant: Variant, timesteps: Sequence[float] = ()) -> CaseResult:
-    """Run a case at each timestep, and judge what comes of it.
+    """Run a case at each timestep in this process, and judge what comes of it.
 
     Args:
         case: What is run.
@@ -229,64 +235,34 @@ def run_case(case: Case, variant: Variant, timesteps: Sequence[float] = ()) -> C
     Raises:
         StateMachineError: As an engine raises it, but for refusals and divergence.
     """
-    chosen = timesteps if timesteps else case.timesteps
-    measurements, refusal = _measurements(case, variant, sorted(chosen, reverse=True))
+    outcomes: list[CaseOutcome] = []
+    for timestep in timesteps_of(case, timesteps):
+        outcomes.append(outcome_of_run(CaseRun(case, variant, timestep)))
+        if outcomes[-1].measurement is None:
+            break
+    return _judged(case, variant, outcomes)
+
+
+def _judged(case: Case, variant: Variant, outcomes: Sequence[CaseOutcome]) -> CaseResult:
+    """Return the result of a case from what came of it at each timestep."""
+    measurements: list[CaseMeasurement] = []
+    refusal = ""
+    for outcome in outcomes:
+        if outcome.measurement is None:
+            measurements, refusal = [], outcome.refusal
+            break
+        measurements.append(outcome.measurement)
     expectation = case.expectation(str(variant.backend), variant.integrator)
-    status = status_of(case, measurements, expectation)
+    judgement = judgement_of(case, measurements, expectation)
     return CaseResult(
         case=case,
         backend=str(variant.backend),
         integrator=variant.integrator,
         truth=case.true_value,
-        measurements=measurements,
-        order=observed_order(case, measurements),
-        verdict=verdict_of(case, measurements),
-        status=status,
+        measurements=tuple(measurements),
+        order=judgement.order,
+        verdict=judgement.verdict,
+        status=judgement.status,
         expectation=expectation,
         refusal=refusal,
-    )
-
-
-def _measurements(
-    case: Case, variant: Variant, timesteps: Sequence[float]
-) -> tuple[tuple[CaseMeasurement, ...], str]:
-    """Return what each timestep gives, or nothing and why the model was refused."""
-    measurements: list[CaseMeasurement] = []
-    with warnings.catch_warnings(action="ignore"):
-        try:
-            for timestep in timesteps:
-                measurements.append(measure(case, variant, timestep))
-        except (ModelError, UnsupportedError) as error:
-            return (), str(error)
-    return tuple(measurements), ""
-
-
-def measure(case: Case, variant: Variant, timestep: float) -> CaseMeasurement:
-    """Run a case once.
-
-    Raises:
-        UnsupportedError: The backend does not take the model.
-        ModelError: The engine does not read it.
-    """
-    text = case.model_text(timestep, variant.integrator)
-    with (
-        variant.loaded(text, timestep, case.gravity) as model,
-        make_data(model) as data,
-    ):
-        run = Run(model, data)
-        try:
-            measured = case.measure(run)
-        except DivergedError:
-            return CaseMeasurement(timestep, None, None, None, run.steps, None)
-    discrete_error = None
-    if variant.integrator in case.discrete:
-        discrete_truth = case.discrete[variant.integrator](timestep)
-        discrete_error = case.error_of(measured, discrete_truth)
-    return CaseMeasurement(
-        timestep=timestep,
-        measured=measured,
-        error=case.error_of(measured, case.true_value),
-        discrete_error=discrete_error,
-        steps=run.steps,
-        seconds_per_step=run.seconds / max(run.steps, 1),
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Data
 from ...interface.records import Array
-from .case import GRAVITY, Case, bounded, converges, wrong
+from .case import GRAVITY, Case, bounded, converges, exact, wrong
 from .contact_tools import ROUND, on_engines, one, tilted_gravity
 from .run import Run, Samples, zero, zero_crossings
 
@@ -145,7 +145,7 @@ CASES: tuple[Case, ...] = (
         source=_TIPPING,
         expected=on_engines(
             mujoco=bounded(0.03, "contact model"),
-            pybullet=bounded(0.004, "engine's own"),
+            pybullet=exact(),
             own=wrong(0.05, "engine's own"),
         ),
         gravity=tilted_gravity(SLOPE),
@@ -190,7 +190,7 @@ CASES: tuple[Case, ...] = (
         expected=on_engines(
             mujoco=bounded(0.081, "contact model"),
             pybullet=converges(0.6, 0.027),
-            own=bounded(0.031, "engine's own"),
+            own=converges(0.6, 0.031),
         ),
         option=ROUND,
         tolerance=0.09,

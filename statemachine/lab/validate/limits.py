@@ -28,14 +28,14 @@ _LIMIT = (
 
 
 def _beyond_limit(run: Run) -> float:
-    """Return how far the weight rests beyond the limit after 4 s [m]."""
-    run.advance(4.0)
+    """Return how far the weight rests beyond the limit after 1.5 s [m]."""
+    run.advance(1.5)
     return -0.5 - float(run.data.qpos[0])
 
 
 def _force_of_limit(run: Run) -> float:
     """Return the force of the limit at rest [N]."""
-    run.advance(4.0)
+    run.advance(1.5)
     run.forward()
     return float(run.data.qfrc_limit[0])
 

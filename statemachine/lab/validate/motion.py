@@ -146,7 +146,7 @@ def _stepwise_sinking(timestep: float) -> float:
 
 
 def _last_speed(run: Run) -> float:
-    run.advance(8.0)
+    run.advance(6.0)
     return float(run.data.qvel[0])
 
 
@@ -312,7 +312,7 @@ CASES: tuple[Case, ...] = (
     Case(
         name="terminal-speed",
         group="motion",
-        description="A weight sinks against damping for 8 s; its speed is measured.",
+        description="A weight sinks against damping for 6 s; its speed is measured.",
         mjcf=_SINKING,
         measure=_last_speed,
         truth=_terminal,

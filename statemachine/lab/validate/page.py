@@ -7,10 +7,11 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import NO_NUMBER, command, figure, milliseconds, quantity
+from ...measures.text import NO_NUMBER, command, figure, milliseconds, quantity, significant
 from ...program import NAME
 from ...show.blocks import Page, Table
 from ...show.junit import TestSuite, junit_text
+from ...show.pictures import Traces
 from ...show.templates import PageContent, render
 from .battery import CaseResult, ValidateResult
 from .case import Verdict
@@ -32,7 +33,9 @@ class _CasePart:
         result: One of its results, which names it.
         errors: Table of the error at each timestep, a row for each engine and integrator.
         verdicts: Table of the verdict, its cause, and whether it is as on record.
-        work: Table of what each error costs.
+        work: Table of what each error costs: time of the run at each timestep, and steps a second.
+        curves: Work against precision, a curve for each engine and integrator; none where
+            there is no error to draw.
         refusals: Sentences about the engines that do not take the case.
     """
 
@@ -40,6 +43,7 @@ class _CasePart:
     errors: Table
     verdicts: Table
     work: Table
+    curves: Sequence[Traces]
     refusals: Sequence[str]
 
     @property
@@ -245,20 +249,45 @@ def _part(rows: Sequence[CaseResult]) -> _CasePart:
         result=first,
         errors=Table(("engine", *steps, "order"), errors),
         verdicts=Table(_VERDICT_HEADERS, verdicts, words=frozenset(range(4))),
-        work=Table(("engine", *steps), work),
+        work=Table(("engine", *steps, "steps/s"), work),
+        curves=_curves(rows),
         refusals=refusals,
     )
 
 
+def _curves(rows: Sequence[CaseResult]) -> list[Traces]:
+    """Return the picture of work against precision of a case, if there is an error to draw."""
+    curves: dict[str, tuple[list[float], list[float]]] = {}
+    for row in rows:
+        costs: list[float] = []
+        sizes: list[float] = []
+        for measurement in row.measurements:
+            error, seconds = measurement.error, measurement.seconds_per_step
+            if error is not None and math.isfinite(error) and seconds is not None:
+                costs.append(measurement.steps * seconds)
+                sizes.append(abs(error))
+        if costs:
+            curves[f"{row.backend}: {row.integrator}"] = costs, sizes
+    if not curves:
+        return []
+    case = rows[0].case
+    size = "size of the relative error" if case.relative else "size of the error"
+    title = f"{case.name}: work against precision"
+    up = f"{size} [{case.error_unit}]" if case.error_unit else size
+    return [Traces(title, "CPU time of the run [s]", up, curves, log=True, log_across=True)]
+
+
 def _costs(row: CaseResult) -> list[str]:
-    """Return what the run took at each timestep: steps times the wall time of one."""
+    """Return what the run took at each timestep, and the steps a second at the shortest."""
     costs: list[str] = []
+    rate = NO_NUMBER
     for measurement in row.measurements:
         if measurement.seconds_per_step is None:
             costs.append(NO_NUMBER)
         else:
             costs.append(milliseconds(measurement.steps * measurement.seconds_per_step, 2))
-    return costs
+            rate = significant(1.0 / measurement.seconds_per_step, 2)
+    return [*costs, rate]
 
 
 def _next_command(result: ValidateResult, details: bool) -> str:

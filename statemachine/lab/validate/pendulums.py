@@ -56,11 +56,11 @@ def _mean(other: float) -> float:
 
 
 def _period(run: Run, amplitude: float) -> float:
-    """Return the time between three crossings of the lowest point, halved [s]."""
+    """Return the time between two upward crossings of the lowest point [s]."""
     run.data.qpos[0] = amplitude
-    samples = run.sample(3.3 * pendulum_period(amplitude), _angle)
+    samples = run.sample(1.9 * pendulum_period(amplitude), _angle)
     times = zero_crossings(samples, rising=True)
-    return float(times[2] - times[0]) / 2.0 if len(times) > 2 else math.inf
+    return float(times[1] - times[0]) if len(times) > 1 else math.inf
 
 
 def _small_period(run: Run) -> float:

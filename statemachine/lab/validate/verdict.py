@@ -17,6 +17,8 @@ LEAST_ORDER = 0.5  # a smaller one is no convergence
 _ORDER_SLACK = 0.4  # what an observed order may be below the expected one
 _RANKS: tuple[Verdict, ...] = get_args(Verdict)
 
+_MUCH_SMALLER = 4.0  # by how much an error below its record shows that the record is out of date
+
 Status = Literal["as expected", "better", "worse", "not on record"]
 
 
@@ -31,7 +33,8 @@ class CaseMeasurement:
         discrete_error: How far it is from the exact discrete truth [unit of the case's error];
             None without one.
         steps: Number of steps of the run.
-        seconds_per_step: Wall time of a step, reading included [s]; None if the run diverged.
+        seconds_per_step: CPU time of a step, reading included [s], as of `Run.seconds`; None if
+            the run diverged.
     """
 
     timestep: float
@@ -65,13 +68,41 @@ def observed_order(case: Case, measurements: Sequence[CaseMeasurement]) -> float
     return float(slope)
 
 
-def verdict_of(case: Case, measurements: Sequence[CaseMeasurement]) -> Verdict:
-    """Return how an engine does, from what was measured at each timestep.
+@dataclass(frozen=True)
+class CaseJudgement:
+    """What the errors of an engine in a case say.
+
+    Attributes:
+        verdict: How the engine does.
+        order: With which power of the timestep the error vanishes; None where that is not seen.
+        status: Whether that is what its record says.
+    """
+
+    verdict: Verdict
+    order: float | None
+    status: Status
+
+
+def judgement_of(
+    case: Case,
+    measurements: Sequence[CaseMeasurement],
+    expectation: Expectation | None,
+) -> CaseJudgement:
+    """Return how an engine does, and whether that is as on record.
 
     Args:
-        case: Whose tolerances count.
+        case: Whose tolerances count; the record is of its longest timestep.
         measurements: From the longest timestep to the shortest; empty if it was refused.
+        expectation: The record; None if there is none.
     """
+    order = observed_order(case, measurements)
+    verdict = _verdict(case, measurements, order)
+    status = _status(case, measurements, expectation, verdict, order)
+    return CaseJudgement(verdict, order, status)
+
+
+def _verdict(case: Case, measurements: Sequence[CaseMeasurement], order: float | None) -> Verdict:
+    """Return how an engine does, from what was measured at each timestep."""
     if not measurements:
         return "refused"
     errors: list[float] = []
@@ -84,7 +115,6 @@ def verdict_of(case: Case, measurements: Sequence[CaseMeasurement]) -> Verdict:
     discrete = [measurement.discrete_error for measurement in measurements]
     if all(error is not None and abs(error) <= case.rounding for error in discrete):
         return "exact discrete form"
-    order = observed_order(case, measurements)
     if order is not None and order >= LEAST_ORDER and errors[-1] <= case.tolerance:
         return "converges"
     if max(errors) <= case.tolerance:
@@ -92,22 +122,16 @@ def verdict_of(case: Case, measurements: Sequence[CaseMeasurement]) -> Verdict:
     return "wrong"
 
 
-def status_of(
+def _status(
     case: Case,
     measurements: Sequence[CaseMeasurement],
     expectation: Expectation | None,
+    verdict: Verdict,
+    order: float | None,
 ) -> Status:
-    """Tell whether an engine does as its record says.
-
-    Args:
-        case: Whose longest timestep the record is of.
-        measurements: As of `verdict_of`.
-        expectation: The record; None if there is none.
-    """
+    """Tell whether an engine does as its record says."""
     if expectation is None:
         return "not on record"
-    verdict = verdict_of(case, measurements)
-    order = observed_order(case, measurements)
     expected = expectation.verdict
     shows_no_order = len(measurements) == 1 and expected in ("converges", "wrong", "bounded")
     if shows_no_order and verdict in ("bounded", "wrong"):
@@ -116,11 +140,32 @@ def status_of(
         return "better" if _RANKS.index(verdict) < _RANKS.index(expected) else "worse"
     if not measurements or measurements[0].error is None:
         return "as expected"
-    if abs(measurements[0].error) > _bound(case, expectation, measurements[0].timestep):
+    size = abs(measurements[0].error)
+    bound = _bound(case, expectation, measurements[0].timestep)
+    if size > bound:
         return "worse"
-    if order is not None and expectation.order is not None:
-        return "as expected" if order >= expectation.order - _ORDER_SLACK else "worse"
+    if _is_lower(order, expectation.order):
+        return "worse"
+    # A shorter timestep than the case's own has a smaller error anyway, and chaos has any.
+    is_comparable = measurements[0].timestep >= case.timesteps[0] and not case.is_chaotic
+    if is_comparable and expected != "exact" and _largest(measurements) < bound / _MUCH_SMALLER:
+        return "better"
     return "as expected"
+
+
+def _is_lower(order: float | None, expected: float | None) -> bool:
+    """Tell whether an order is lower than expected; not where one of them is unknown."""
+    if order is None or expected is None:
+        return False
+    return order < expected - _ORDER_SLACK
+
+
+def _largest(measurements: Sequence[CaseMeasurement]) -> float:
+    """Return the largest size of an error; infinite if a run diverged."""
+    sizes: list[float] = []
+    for measurement in measurements:
+        sizes.append(math.inf if measurement.error is None else abs(measurement.error))
+    return max(sizes)
 
 
 def _bound(case: Case, expectation: Expectation, timestep: float) -> float:
