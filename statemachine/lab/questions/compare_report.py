@@ -19,6 +19,7 @@ from ..why import Explanation
 from ..why.answer_page import answer, proofs
 from ..why.causes_page import causes as causes_blocks
 from ..why.changes_page import steps as steps_blocks
+from ..why.cited_case_page import cited_case_blocks
 from ..why.page import three_parts
 from .compare_details import details_of
 from .compare_verdict import headline_of
@@ -119,7 +120,11 @@ def report_page(result: CompareResult, parts: ReportParts) -> Page:
     why: list[Block] = []
     steps: list[Block] = []
     if explanation is not None:
-        why = [*causes_blocks(explanation), *three_parts(explanation)]
+        why = [
+            *causes_blocks(explanation),
+            *three_parts(explanation),
+            *cited_case_blocks(explanation, details=True),
+        ]
         steps = steps_blocks(explanation)
         subject = explained_quantity(comparison, explanation)
         if subject is not None:

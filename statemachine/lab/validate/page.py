@@ -208,14 +208,24 @@ def _worst(results: Sequence[CaseResult], most: int) -> Table:
 
 
 def _error(row: CaseResult, error: float | None) -> str:
-    """Return an error as it is read; a relative one in per cent where it is large enough."""
+    """Return an error of a case as it is read."""
+    return error_text(error, row.error_unit)
+
+
+def error_text(error: float | None, unit: str) -> str:
+    """Return an error as it is read; a relative one in per cent where it is large enough.
+
+    Args:
+        error: [unit]; None where there is none.
+        unit: SI; "" of a relative error.
+    """
     if error is None:
         return NO_NUMBER
     if math.isinf(error):
         return "no event"
-    if row.error_unit == "" and abs(error) >= 1e-4:
+    if unit == "" and abs(error) >= 1e-4:
         return f"{figure(100.0 * error)} %"
-    return quantity(error, row.error_unit)
+    return quantity(error, unit)
 
 
 def _order(row: CaseResult) -> str:

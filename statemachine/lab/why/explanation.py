@@ -18,6 +18,7 @@ from ..compare.typed_command import TypedCommand
 from ..runs.call_period import CallPeriods
 from ..runs.floating import Bases
 from ..runs.provenance import Provenance
+from .cited_case import CitedCase
 from .gap import FirstTouch, Measure
 from .locate import Localisation
 from .rewriting import RewrittenFile
@@ -190,6 +191,8 @@ class Explanation:
             nobody looked.
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
+        cited_case: The case of the battery that decides the cause, and which side is nearer to the
+            truth in it; None where the cause has none.
     """
 
     experiment: str
@@ -237,6 +240,7 @@ class Explanation:
     call_periods: CallPeriods | None = None
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
+    cited_case: CitedCase | None = None
 
     @property
     def is_complete(self) -> bool:

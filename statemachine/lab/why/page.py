@@ -24,6 +24,7 @@ from .answer_page import amount, answer, missing, parts, proofs, refused
 from .apart_page import apart_sentence
 from .causes_page import causes
 from .changes_page import engine_as_it_comes, steps
+from .cited_case_page import cited_case_blocks
 from .explanation import Explanation
 from .rewritten_page import rewritten_blocks
 from .table_page import summary_table
@@ -44,12 +45,14 @@ class WhyPage(PageContent):
         result: The explanation.
         most_rows: How many causes have a row of their own, and how much of what was not written.
         further: Everything else, under `--details`.
+        shows_case: Whether it says which side is nearer to the truth, where a case decides that.
     """
 
     template = "why.md.j2"
     result: Explanation
     most_rows: int
     further: Sequence[Block]
+    shows_case: bool = True
 
     @property
     def base_frame(self) -> Sequence[Block]:
@@ -73,6 +76,13 @@ class WhyPage(PageContent):
     def causes(self) -> Table:
         """Return a table of the causes, the largest share first."""
         return summary_table(self.result, self.most_rows)
+
+    @property
+    def cited_case(self) -> Sequence[Block]:
+        """Return which side is nearer to the truth, in a case that decides the cause."""
+        if not self.shows_case:
+            return []
+        return cited_case_blocks(self.result, details=bool(self.further))
 
     @property
     def conclusion(self) -> Conclusion:
@@ -212,7 +222,11 @@ def page(result: Explanation, details: bool = False) -> Page:
         return _page(WhyPage(result, rows, ()))
 
     shown = first_screen(page_with)
-    return shown if lines_of(shown) <= LINES else page_with(0)
+    if lines_of(shown) > LINES:
+        shown = page_with(0)
+    if lines_of(shown) > LINES:
+        shown = _page(WhyPage(result, 0, (), shows_case=False))
+    return shown
 
 
 def _page(content: WhyPage) -> Page:

@@ -25,6 +25,7 @@ from ...compare.typed_command import typed_command
 from ...runs.floating import Bases
 from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
+from ...why.case_of_cause import with_cited_case
 from ...why.explain import explain
 from ...why.explanation import Explanation, InterruptedExplanation, Share
 from ...why.gap import Measure
@@ -145,6 +146,8 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
         explanation = _with_changes(stop.result, question, request)
         raise InterruptedExplanation(_result(explanation, request, bases)) from None
     explanation = _with_changes(explanation, question, request)
+    with reporter.stage("why: the case that decides it"):
+        explanation = with_cited_case(explanation, question)
     if request.write is not None:
         explanation = _with_file(explanation, question, sides, Path(request.write))
     return _result(explanation, request, bases)

@@ -1,0 +1,278 @@
+"""Which side is nearer to the truth: the cases of the battery that `compare --why` cites."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import mujoco
+import numpy as np
+import pytest
+
+from statemachine.lab.compare import Request, Side
+from statemachine.lab.questions.requests.causes import ExplainRequest, ExplainResult, answer
+from statemachine.lab.validate.battery import ValidateRequest
+from statemachine.lab.validate.cases import CASES
+from statemachine.lab.why.cited_case import (
+    CitedCase,
+    DecidedCause,
+    SideInCase,
+    nearer_side,
+)
+from statemachine.lab.why.deciding_cases import DECIDING_CASES
+from statemachine.lab.why.page import page
+from statemachine.show.first_screen import COLUMNS, LINES, lines_of
+
+from .support.files import written_all
+from .support.pages import shown
+
+TUMBLING = """
+<mujoco>
+  <option timestep="0.005" integrator="{integrator}" gravity="0 0 0"/>
+  <worldbody>
+    <body name="body">
+      <freejoint/>
+      <inertial pos="{centre} 0 0" mass="1" diaginertia="1 2 3"/>
+    </body>
+  </worldbody>
+  <keyframe><key name="home" qvel="0 0 0 0.5 5 0.5"/></keyframe>
+</mujoco>
+"""
+SLIDING = """
+<mujoco>
+  <option timestep="0.002" cone="{cone}"/>
+  <worldbody>
+    <geom type="plane" size="0 0 1" friction="0.5 0 0"/>
+    <body name="block" pos="0 0 0.05">
+      <freejoint/>
+      <geom type="box" size="0.1 0.1 0.05" mass="{mass}" friction="0.5 0 0"/>
+    </body>
+  </worldbody>
+  <keyframe><key name="home" qpos="0 0 0.0499 1 0 0 0" qvel="1.5 1.5 0 0 0 0"/></keyframe>
+</mujoco>
+"""
+SERVO = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.005" integrator="{integrator}"/>
+  <worldbody>
+    <body>
+      <joint name="hinge" axis="0 1 0" damping="0.1" armature="0.01"/>
+      <inertial pos="0 0 -0.1" mass="0.5" diaginertia="0.003 0.003 0.003"/>
+    </body>
+  </worldbody>
+  <actuator><position joint="hinge" kp="60" kv="2" forcerange="-3 3"/></actuator>
+</mujoco>
+"""
+PUSHED = "def still(model, data):\n    return None\n"
+
+
+def _asked(sides: Sequence[Side], what: str = "fall", keyframe: str | None = "home") -> Request:
+    left, right = sides
+    return Request((what,), sides=(left, right), seconds=0.5, keyframe=keyframe)
+
+
+def _explained(request: Request) -> ExplainResult:
+    return answer(ExplainRequest(request, uncertainty=None, jobs=1))
+
+
+def _cited(result: ExplainResult) -> CitedCase:
+    assert result.cited_case is not None
+    return result.cited_case
+
+
+def _tumbling(folder: Path, *integrators: str, centre: float = 0.0) -> list[Side]:
+    sides: list[Side] = []
+    for integrator in integrators:
+        text = TUMBLING.format(integrator=integrator, centre=centre)
+        name = f"{integrator}.xml"
+        sides.append(Side(str(written_all(folder, {name: text}) / name)))
+    return sides
+
+
+def _raw_energy_change(integrator: str) -> float:
+    """Return the largest change of the energy in the last 4 of 20 s, as a ratio."""
+    text = TUMBLING.format(integrator=integrator, centre=0)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qvel[3:] = [0.01, 5.0, 0.01]
+    inertia = np.array([1.0, 2.0, 3.0])
+    start = float(inertia @ data.qvel[3:] ** 2)
+    mujoco.mj_step(model, data, 3200)
+    worst = 0.0
+    for _ in range(800):
+        mujoco.mj_step(model, data)
+        change = float(inertia @ data.qvel[3:] ** 2) / start - 1.0
+        worst = max(worst, change, key=abs)
+    return worst
+
+
+def test_of_a_tumbling_body_rk4_is_nearer_to_the_truth_than_euler(tmp_path: Path) -> None:
+    left, right = _tumbling(tmp_path, "Euler", "RK4")
+    cited = _cited(_explained(_asked((left, right))))
+    assert (cited.cause, cited.nearer) == ("integrator", "right")
+    assert (cited.left.setting, cited.right.setting) == ("Euler", "RK4")
+    assert cited.left.case == cited.right.case == "tumbling-energy"
+    assert cited.left.error == pytest.approx(_raw_energy_change("Euler"), rel=1e-9)
+    assert cited.left.error == pytest.approx(0.126, rel=0.05)
+    assert cited.right.error == pytest.approx(_raw_energy_change("RK4"), abs=1e-9)
+
+
+def test_the_case_is_run_with_the_timestep_of_each_side(tmp_path: Path) -> None:
+    left, right = _tumbling(tmp_path, "Euler", "RK4")
+    finer = [replace(side, options={"timestep": 0.002}) for side in (left, right)]
+    cited = _cited(_explained(_asked(finer)))
+    assert cited.left.timestep == cited.right.timestep == 0.002
+    assert cited.left.size < 0.07  # of 0.126 at 5 ms: the error is of the first order
+
+
+def test_sides_in_the_other_order_give_the_other_side(tmp_path: Path) -> None:
+    euler, rk4 = _tumbling(tmp_path, "Euler", "RK4")
+    assert _cited(_explained(_asked((rk4, euler)))).nearer == "left"
+
+
+def _raw_slide(cone: str) -> float:
+    """Return how far a block slides down the diagonal in 2 s over the closed form, less 1."""
+    case = CASES["block-slides-diagonal"]
+    model = mujoco.MjModel.from_xml_string(SLIDING.format(cone=cone, mass=1))
+    model.opt.gravity[:] = case.gravity
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 1000)
+    angle = math.atan(1.2 * 0.5)
+    acceleration = 9.81 * (math.sin(angle) - 0.5 * math.cos(angle))
+    return float(np.hypot(*data.qpos[:2])) / (2.0 * acceleration) - 1.0
+
+
+def _sliding(folder: Path, *cones: str) -> Request:
+    texts = {f"{cone}.xml": SLIDING.format(cone=cone, mass=1) for cone in cones}
+    written_all(folder, {**texts, "pushed.py": PUSHED})
+    left, right = (Side(str(folder / name)) for name in texts)
+    return _asked((left, right), f"{folder / 'pushed.py'}:still")
+
+
+def test_of_a_box_that_slides_diagonally_the_elliptic_cone_is_nearer(tmp_path: Path) -> None:
+    cited = _cited(_explained(_sliding(tmp_path, "pyramidal", "elliptic")))
+    assert (cited.cause, cited.nearer) == ("cone", "right")
+    assert (cited.left.setting, cited.right.setting) == ("pyramidal", "elliptic")
+    assert cited.left.error == pytest.approx(_raw_slide("pyramidal"), rel=1e-6)
+    assert cited.right.error == pytest.approx(_raw_slide("elliptic"), rel=1e-6)
+    assert cited.left.size > 1.0
+    assert cited.right.size < 0.01
+
+
+def test_of_a_servo_the_integrator_is_judged_by_a_servo(tmp_path: Path) -> None:
+    texts = {name: SERVO.format(integrator=name) for name in ("Euler", "implicitfast")}
+    sides = [
+        Side(str(written_all(tmp_path, {f"{name}.xml": text}) / f"{name}.xml"))
+        for name, text in texts.items()
+    ]
+    cited = _cited(_explained(_asked(sides, what="hold", keyframe=None)))
+    assert cited.left.case == "servo-step"
+    assert cited.nearer == "right"
+    assert 0.009 < cited.left.size < 0.014
+    assert cited.right.size < 0.003
+
+
+@pytest.mark.usefixtures("bullet")
+def test_of_a_body_thrown_off_its_centre_pybullet_is_nearer(tmp_path: Path) -> None:
+    (side,) = _tumbling(tmp_path, "Euler", centre=0.3)
+    cited = _cited(_explained(_asked((side, replace(side, engine="pybullet")))))
+    assert (cited.cause, cited.nearer) == ("offset centre of mass", "right")
+    assert cited.left.size == pytest.approx(0.0751, rel=0.01)
+    assert cited.right.size < 1e-11
+
+
+@pytest.mark.slow
+def test_of_a_limited_servo_the_installed_release_is_nearer(old_releases: None) -> None:
+    left, right = Side("so101", engine="mujoco==3.3.7"), Side("so101", engine="mujoco")
+    result = _explained(_asked((left, right), "hold", None))
+    cited = _cited(result)
+    assert (cited.cause, cited.nearer) == ("release", "right")
+    assert cited.left.setting == "3.3.7"
+    assert cited.left.case == "effort-limit"
+    assert cited.left.size == pytest.approx(0.0033, rel=0.1)
+    assert cited.right.size < 1e-9
+    _check_first_screen(result)
+
+
+def test_another_mass_cites_nothing(tmp_path: Path) -> None:
+    request = _sliding(tmp_path, "elliptic", "pyramidal")
+    heavy = tmp_path / "heavy.xml"
+    heavy.write_text(
+        SLIDING.format(cone="elliptic", mass=1).replace("0.5 0 0", "0.3 0 0"), encoding="utf-8"
+    )
+    result = _explained(replace(request, sides=(request.sides[0], Side(str(heavy)))))
+    assert result.verdict.answer == "cause"
+    assert result.cited_case is None
+
+
+def test_sides_that_move_alike_cite_nothing(tmp_path: Path) -> None:
+    (side,) = _tumbling(tmp_path, "Euler")
+    assert _explained(_asked((side, side))).cited_case is None
+
+
+def test_an_integrator_that_errs_as_much_is_not_nearer(tmp_path: Path) -> None:
+    hinge = """
+    <mujoco><option timestep="0.005" integrator="{}"/><worldbody><body>
+      <joint axis="0 1 0" damping="0.4"/>
+      <inertial pos="0.2 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+      <body><joint axis="1 0 0"/><inertial pos="0 0.1 -0.3" mass="1" diaginertia=".1 .2 .3"/>
+    </body></body></worldbody></mujoco>"""
+    names = ("implicitfast", "implicit")
+    folder = written_all(tmp_path, {f"{name}.xml": hinge.format(name) for name in names})
+    sides = [Side(str(folder / f"{name}.xml")) for name in names]
+    result = _explained(_asked(sides, keyframe=None))
+    assert result.verdict.answer == "cause"
+    assert result.cited_case is None
+
+
+def _check_first_screen(result: ExplainResult) -> None:
+    first = page(result)
+    assert lines_of(first) <= LINES
+    assert max(map(len, shown(first).splitlines())) <= COLUMNS
+
+
+@pytest.mark.parametrize("details", [False, True])
+def test_the_page_names_the_command_of_the_case(tmp_path: Path, details: bool) -> None:
+    result = _explained(_asked(_tumbling(tmp_path, "Euler", "RK4")))
+    _check_first_screen(result)
+    text = shown(page(result, details))
+    assert "statemachine validate --case tumbling-energy" in text
+    assert ("Landau" in text) == details
+
+
+def test_a_page_without_a_case_says_nothing_of_one(tmp_path: Path) -> None:
+    result = _explained(_asked(_tumbling(tmp_path, "Euler", "RK4")))
+    assert "validate" not in shown(page(replace(result, cited_case=None), details=True))
+
+
+def _side(error: float | None) -> SideInCase:
+    return SideInCase("case", "RK4", "mujoco", "RK4", 0.005, 1.0, error, "")
+
+
+NEARER = (
+    (0.1, -0.01, "right"),
+    (-0.01, 0.1, "left"),
+    (0.1, None, "left"),
+    (math.inf, 0.1, "right"),
+    (None, None, None),
+    (0.1, -0.095, None),
+    (1e-10, 1e-13, None),
+)
+
+
+@pytest.mark.parametrize(("left", "right", "expected"), NEARER)
+def test_the_side_with_the_clearly_smaller_error_is_nearer(
+    left: float | None, right: float | None, expected: str | None
+) -> None:
+    assert nearer_side(_side(left), _side(right), 1e-9) == expected
+
+
+def test_each_row_of_the_table_names_cases_of_the_battery() -> None:
+    for row in DECIDING_CASES:
+        assert set(row.cases.values()) <= set(CASES)
+        ValidateRequest(cases=tuple(row.cases.values()))
+    assert {row.cause for row in DECIDING_CASES} == set(get_args(DecidedCause))
