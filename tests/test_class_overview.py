@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -232,6 +233,18 @@ def test_the_html_of_a_class_has_mistakes_and_remarks(result: ClassResult) -> No
     assert_in(html, "reading 2: 4.5 mm away", "reading …: … mm away", "short functions", "eve")
 
 
+def test_a_row_of_the_class_leads_to_the_remarks_on_its_student(result: ClassResult) -> None:
+    html = report(class_page(result))
+    _, table, *rest = re.split(r"<tbody>", html)
+    links = dict(re.findall(r'<a href="#([\w-]+)">([^<]+)</a>', table.partition("</tbody>")[0]))
+    named = dict(re.findall(r'<th scope="row" id="([\w-]+)">([^<]+)</th>', rest[-1]))
+    with_remarks = {remark.text for entry in result.counted for remark in entry.remarks}
+    assert with_remarks
+    assert links == named
+    expected = {entry.label for entry in result.counted if entry.label in rest[-1]}
+    assert set(links.values()) == expected
+
+
 def test_a_row_of_the_class_fits_80_columns(result: ClassResult) -> None:
     entry = _entry("a" * 30, RIGHT, RIGHT, RIGHT, RIGHT)
     page = class_page(class_result([replace(entry, nearest="b", likeness=0.5)]))
@@ -264,7 +277,7 @@ def test_the_same_remark_on_several_functions_is_a_row() -> None:
 
 def test_a_function_without_a_verdict_leaves_those_of_the_others() -> None:
     entry = _entry("ann", "? it sleeps", RIGHT, RIGHT, RIGHT)
-    (row,) = class_table([entry]).rows
+    (row,) = class_table([entry], {}).rows
     assert row[:2] == ["ann", "3/4 ?"]
     head, cells = rows_of([entry])
     assert dict(zip(head, cells, strict=True))["right"] == 3
@@ -272,7 +285,7 @@ def test_a_function_without_a_verdict_leaves_those_of_the_others() -> None:
 
 def test_a_file_without_any_verdict_has_no_number() -> None:
     entries = [_entry("ann", *["? it sleeps"] * 4), _entry("bob", refusal="a notebook")]
-    assert [row[1] for row in class_table(entries).rows] == ["?", "?"]
+    assert [row[1] for row in class_table(entries, {}).rows] == ["?", "?"]
     for _, right, *_more in list(rows_of(entries))[1:]:
         assert right == ""
 
@@ -299,7 +312,7 @@ def test_whom_one_is_most_like_is_told_from_85_percent_on() -> None:
     entry = _entry("ann", RIGHT, RIGHT, RIGHT, RIGHT)
     cells = []
     for likeness in (0.849, 0.85):
-        table = class_table([replace(entry, nearest="b", likeness=likeness)])
+        table = class_table([replace(entry, nearest="b", likeness=likeness)], {})
         cells.append("most like" in table.headers)
     assert cells == [False, True]
 

@@ -14,9 +14,13 @@ import pytest
 from statemachine.course.grading.faults import FAULTS
 from statemachine.course.grading.judges import JUDGES
 from statemachine.course.lessons import PATH
+from statemachine.course.lessons.page import page as page_of
 from statemachine.course.lessons.questions import ASKED
+from statemachine.course.lessons.request import LessonRequest, answer
+from statemachine.course.quiz import lettered
 from statemachine.interface import Model
 from statemachine.lab.probes.conventions import QUESTIONS
+from statemachine.show.blocks import Question
 
 from .support.claims import assert_in
 from .support.files import written_all
@@ -172,21 +176,35 @@ def test_what_the_readme_asks_for_is_what_the_package_needs() -> None:
 
 
 def test_times_of_the_readme_are_those_of_the_model(mujoco_box: Model) -> None:
-    (begin, steps, timestep) = re.findall(r"keyframe's (\d+) and (\d+) steps of (\d+) ms", README)[
-        0
-    ]
-    assert mujoco_box.raw.key_time[0] == float(begin)
+    (timestep,) = re.findall(r"A step is (\d+) ms", README)
     assert mujoco_box.timestep == pytest.approx(int(timestep) / 1000)
-    (end,) = re.findall(r"It prints (\d+\.\d+)", README)
-    assert int(begin) + int(steps) * int(timestep) / 1000 == pytest.approx(float(end))
+    (asked,) = re.findall(r"Is the time\s+(\d+) s\?", README)
+    (steps,) = re.findall(r"sm\.step\(model, data, (\d+)\)", README)
+    assert int(steps) * mujoco_box.timestep == pytest.approx(float(asked))
 
 
-def test_the_code_of_the_readme_prints_what_it_says(tmp_path: Path) -> None:
+def test_the_code_of_the_readme_prints_a_time_and_a_place(
+    tmp_path: Path, mujoco_box: Model
+) -> None:
+    """Its question is answered by the lesson, and not above it."""
     out = of_python("-c", PYTHON["README.md"], folder=tmp_path, code=0).stdout
-    (time,) = re.findall(r"It prints (\d+\.\d+)", README)
-    assert out.startswith(f"{time} ")
-    tip = [f"{float(word):.4f}" for word in re.findall(r"-?\d\.\d+", out)[1:4]]
-    assert f"[{' '.join(tip)}]" in README
+    time, *place = (float(word) for word in re.findall(r"-?\d+\.\d+", out))
+    assert time == pytest.approx(mujoco_box.raw.key_time[0] + 3)
+    assert len(place) == 3
+    assert not re.search(rf"\b{time:.0f}\.0|\b{mujoco_box.raw.key_time[0]:.0f} s\b", README)
+
+
+def test_the_question_of_the_readme_is_that_of_the_lesson() -> None:
+    """And what it asks is told below, after the three doors."""
+    request = LessonRequest("gravity")
+    blocks_of_page = page_of(request, answer(request)).blocks
+    (question,) = (block for block in blocks_of_page if isinstance(block, Question))
+    (shown,) = re.findall(r"^```\n(Before.*?)^```", README, re.DOTALL | re.MULTILINE)
+    text = shown.replace("\n  ", "|").replace("\n", " ").strip()
+    expected = [f"Before you read on: {question.text}", *lettered(question)]
+    assert text == "|".join(expected).replace("`", "")
+    places = ("Before you read on", "## Three doors", "servos on   servos off")
+    assert sorted(places, key=README.index) == [*places]
 
 
 # Of each guide with code: what its code prints.

@@ -59,6 +59,7 @@ from statemachine.show.blocks import (
 )
 from statemachine.show.drawing import drawing_of
 from statemachine.show.html import check_target, write_report
+from statemachine.show.html import report as html_of
 from statemachine.show.html.geometry import mesh_as_data, mesh_of
 
 from .support.browser import Tab, browser
@@ -581,6 +582,25 @@ def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
         edge = picture(tab, "#figures .wide >> nth=0")[40:200]
         tab.evaluate("document.documentElement.style.setProperty('--cue', 'transparent')")
         assert changed(edge, picture(tab, "#figures .wide >> nth=0")[40:200]) > 200
+
+
+@pytest.mark.slow
+def test_on_a_phone_words_wrap_and_a_row_leads_to_another(tmp_path: Path) -> None:
+    name, words = "somebody_with_a_long_name.py", "what is said of it, which takes a line or more"
+    rows = Table(("who", "right"), [(TableCell(name, link="there"), "✗")])
+    remarks = Table(
+        ("who", "function", "what"),
+        [(TableCell(name, name="there"), "forward", words)],
+        words=frozenset({0, 1, 2}),
+    )
+    blocks = [rows, Section("remarks", "Remarks", [remarks])]
+    file = tmp_path / "class.html"
+    write_report(file, html_of(Page("A class", "made here", blocks)))
+    with looking(file, width=390, height=844) as tab:
+        wide = tab.locator("section .wide")
+        assert wide.evaluate("(e) => e.scrollWidth") <= wide.evaluate("(e) => e.clientWidth")
+        tab.locator("tbody th a").click()
+        assert tab.locator("th:target").inner_text() == name
 
 
 @pytest.mark.slow

@@ -117,12 +117,16 @@ class TableCell(str):
         verdict: "agrees", "settles" or "differs", if it is one.
         share: The part of a whole that it names, which a bar can show; of either sign.
         code: Whether it is typed or copied as it is.
+        link: Name of the cell or section that it leads to; "" where it leads nowhere.
+        name: What links call it; "" where none leads there.
     """
 
     at: float | None
     verdict: str
     share: float | None
     code: bool
+    link: str
+    name: str
 
     def __new__(
         cls,
@@ -132,9 +136,12 @@ class TableCell(str):
         verdict: str = "",
         share: float | None = None,
         code: bool = False,
+        link: str = "",
+        name: str = "",
     ) -> TableCell:
         cell = super().__new__(cls, text)
         cell.at, cell.verdict, cell.share, cell.code = at, verdict, share, code
+        cell.link, cell.name = link, name
         return cell
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...measures.text import count
-from ...show.blocks import Page, Table
+from ...show.blocks import Page, Table, TableCell
 from ...show.first_screen import with_answer
 from ...show.templates import PageContent, render
 from .alike import ALIKE, NEARLY_ALIKE, AlikeGroup
@@ -163,20 +163,39 @@ def class_page(result: ClassResult) -> Page:
 
 def _content(result: ClassResult) -> ClassPage:
     """Return the content of the page of a class."""
+    places = _places_of_remarks(result.entries)
     return ClassPage(
         result,
-        class_table(result.counted),
+        class_table(result.counted, places),
         functions_table(result.functions),
         mistakes_table(result.mistakes),
         remarks_table(result.entries),
-        class_table(result.strangers),
+        class_table(result.strangers, places),
     )
 
 
-def class_table(entries: Sequence[ClassEntry]) -> Table:
-    """Make the table of a class, without columns in which nothing stands."""
+def _places_of_remarks(entries: Sequence[ClassEntry]) -> dict[str, str]:
+    """Return what links call the first remark on a student, by the student; nothing without one."""
+    places: dict[str, str] = {}
+    for remark in _remarks_of(entries):
+        places.setdefault(remark.student, f"remarks-{len(places) + 1}")
+    return places
+
+
+def class_table(entries: Sequence[ClassEntry], places: Mapping[str, str]) -> Table:
+    """Make the table of a class, without columns in which nothing stands.
+
+    Args:
+        entries: A row each.
+        places: Where the remarks on a student begin, by the student.
+    """
+
+    def label(entry: ClassEntry) -> TableCell:
+        """Return who handed it in, or its name; it leads to the remarks."""
+        return TableCell(entry.label, link=places.get(entry.label, ""))
+
     columns: dict[str, Callable[[ClassEntry], str]] = {}
-    columns["student" if any(entry.student for entry in entries) else "file"] = _label
+    columns["student" if any(entry.student for entry in entries) else "file"] = label
     columns["right"] = _right_of
     for name in JUDGES:
         columns[_short(name)] = _marker_of(name)
@@ -212,6 +231,26 @@ def mistakes_table(mistakes: Sequence[Mistake]) -> Table:
 
 def remarks_table(entries: Sequence[ClassEntry]) -> Table:
     """Make the table of what is not right: all of it, a row for each student and remark."""
+    remarks, places = _remarks_of(entries), _places_of_remarks(entries)
+    first: dict[str, _Remark] = {}
+    for remark in remarks:
+        first.setdefault(remark.student, remark)
+
+    def student(remark: _Remark) -> TableCell:
+        """Return of whom it is; links lead to the first remark on a student."""
+        is_first = first[remark.student] is remark
+        return TableCell(remark.student, name=places[remark.student] if is_first else "")
+
+    columns: dict[str, Callable[[_Remark], str]] = {
+        "student": student,
+        "function": lambda remark: remark.function if remark.function else "file",
+        "what is not right": lambda remark: remark.text,
+    }
+    return Table.of(remarks, columns, words=columns)
+
+
+def _remarks_of(entries: Sequence[ClassEntry]) -> list[_Remark]:
+    """Return what is not right, a remark for each student and text."""
     remarks: list[_Remark] = []
     for entry in entries:
         reasons = entry.reasons_not_judged
@@ -221,12 +260,7 @@ def remarks_table(entries: Sequence[ClassEntry]) -> Table:
                 functions.setdefault(remark.text, []).append(_short(remark.function))
         for text, names in functions.items():
             remarks.append(_Remark(entry.label, ", ".join(names), text))
-    columns: dict[str, Callable[[_Remark], str]] = {
-        "student": lambda remark: remark.student,
-        "function": lambda remark: remark.function if remark.function else "file",
-        "what is not right": lambda remark: remark.text,
-    }
-    return Table.of(remarks, columns, words=columns)
+    return remarks
 
 
 def _functions_of(mistake: Mistake) -> str:
@@ -234,11 +268,6 @@ def _functions_of(mistake: Mistake) -> str:
     if mistake.functions == tuple(JUDGES):
         return "all"
     return ", ".join(map(_short, mistake.functions))
-
-
-def _label(entry: ClassEntry) -> str:
-    """Return who handed a submission in, or its name."""
-    return entry.label
 
 
 def _unbroken(name: str) -> str:

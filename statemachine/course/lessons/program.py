@@ -21,7 +21,7 @@ def program_of(request: LessonRequest) -> str:
         MissingEngineError: The engine is not installed here.
         StateMachineError: The model cannot be loaded.
     """
-    backend = one_backend(request.backends, "the code of a lesson")
+    backend = one_backend(request.backends, "lesson --code")
     name = request.model or request.lesson.model
     model = load_on(backend, name, request.menagerie)
     values = fitted(request.lesson, model, request.values)

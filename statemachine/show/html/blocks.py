@@ -127,7 +127,7 @@ def table(block: Table) -> Html:
     signed = _signed_columns(block)
     rows = []
     for number, row in enumerate(block.rows):
-        cells = [tag("th", _content(row[0], 0 in signed), scope="row")]
+        cells = [tag("th", _content(row[0], 0 in signed), scope="row", id=_name_of(row[0]))]
         for k in range(1, len(row)):
             cells.append(tag("td", _content(row[k], k in signed), class_=_look(row[k], looks[k])))
         rows.append(tag("tr", *cells, class_="most" if number in block.emphasis else None))
@@ -140,6 +140,13 @@ def table(block: Table) -> Html:
         role="region",
         aria_label=block.title,
     )
+
+
+def _name_of(text: str) -> str | None:
+    """Return what links call a cell; None where none leads there."""
+    if isinstance(text, TableCell) and text.name:
+        return text.name
+    return None
 
 
 def _look(text: str, look: str | None) -> str | None:
@@ -170,6 +177,8 @@ def _content(text: str, signed: bool) -> object:
         return badge(text.verdict)
     if text.share is not None:
         return _bar(text.share, text, signed)
+    if text.link:
+        return tag("a", str(text), href=f"#{text.link}")
     if text.code:
         return tag("code", str(text), class_="digest" if len(text) == _DIGEST else None)
     return text
