@@ -39,6 +39,9 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if os.name == "posix":
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    # Where bytecode is not kept, each of the processes that tests start compiles what it imports.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     unknown = REQUIRED - set(ENGINES) - {"render", "shared", "browser"}
     if unknown:
         raise pytest.UsageError(f"STATEMACHINE_REQUIRE names no engine: {sorted(unknown)}")

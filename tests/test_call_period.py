@@ -111,20 +111,19 @@ def test_most_of_the_gap_is_the_period_and_not_the_timestep(files: Path) -> None
 
 def test_the_first_screen_says_both_periods_before_the_worst_rows(files: Path) -> None:
     text = _words(_compared(files, 5))
-    assert 0 < text.index("25 ms on the left") < text.index("5 ms on the right")
-    assert text.index("5 ms on the right") < text.index("the worst")
+    assert 0 < text.index("25 ms") < text.index(" 5 ms") < text.index("the worst")
 
 
 def test_the_first_screen_proposes_the_same_period_where_they_differ(files: Path) -> None:
     text = _words(_compared(files, 5))
     assert "--every 5ms" in text
-    assert "but the timestep differs" not in text
+    assert "timestep differs" not in text
 
 
 def test_with_the_same_period_nothing_but_the_timestep_differs(files: Path) -> None:
     text = _words(_compared(files, "5ms"))
-    assert "but the timestep differs" in text
-    assert "on the left and every" not in text
+    assert "timestep differs" in text
+    assert "25 ms" not in text
 
 
 def _explained(files: Path, every: int | str) -> ExplainResult:
@@ -155,7 +154,7 @@ def test_the_page_of_causes_says_both_periods_where_they_differ(
     files: Path, every: int | str, differ: bool
 ) -> None:
     words = _words(_explained(files, every))
-    assert ("every 5 ms on the left and every 1 ms on the right" in words) == differ
+    assert ("every 1 ms" in words) == differ
     assert "--every 5ms --why" in words
 
 
@@ -181,7 +180,7 @@ def test_periods_that_differ_stand_on_the_page_of_finer_steps(files: Path) -> No
         what=f"{files / 'rate.py'}:rate", seconds=_SECONDS, every=5,
     )  # fmt: skip
     words = _words(result)
-    assert "25 ms on the left" in words
+    assert "25 ms" in words
     assert "--every 5ms --converge" in words
 
 
@@ -230,7 +229,7 @@ def test_the_command_takes_a_time(here: Cli) -> None:
     words = ("rate.py:rate", "scene.xml", "timestep=0.005", "scene.xml", "timestep=0.001")
     refused = here("compare", *words, "--every", "7ms", "--seconds", "0.1")
     assert refused.returncode == 2
-    assert "1.4 steps of 5 ms" in refused.stderr
+    assert "1.4 steps" in refused.stderr
 
 
 _HINTS = """
@@ -252,7 +251,7 @@ def test_that_a_function_writes_the_state_stands_on_the_first_screen(
     scene = str(files / "scene.xml")
     what = f"{files / 'hints.py'}:{name}"
     result = lab.compare(scene, scene, what=what, seconds=0.05, chaos=False)
-    assert ("51 of 51 rows" in _words(result)) == says_so
+    assert ("51 of 51" in _words(result)) == says_so
 
 
 def test_only_functions_of_the_file_are_proposed(files: Path) -> None:

@@ -41,6 +41,8 @@ from .support.requirements import need_engine
 
 # A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
 # derived array, a State, a variant of the model, two Data.
+# What the recorder calls the worlds of PyBullet, each with whose it is.
+WORLD, STILL_COPY, LOOK_AHEAD = "the world of", "the still copy of", "the look-ahead of"
 WHOLE = """\
 import statemachine as sm
 model = sm.load("so101/scene_box", backend="{engine}")
@@ -222,9 +224,9 @@ def test_objects_live_and_are_as_long_as_without_a_recorder(code: str, printed: 
 @pytest.mark.usefixtures("bullet")
 def test_a_world_is_not_taken_for_the_next_of_its_number() -> None:
     lines = short("pybullet", "data.close()\nother = sm.make_data(model)\nsm.step(model, other)")
-    assert [call.on for call in lines[0].calls] == ["the world of data"]
-    assert "the world of data" not in {call.on for line in lines[1:] for call in line.calls}
-    assert "the world of other" in {call.on for call in lines[2].calls}
+    assert [call.on for call in lines[0].calls] == [f"{WORLD} data"]
+    assert f"{WORLD} data" not in {call.on for line in lines[1:] for call in line.calls}
+    assert f"{WORLD} other" in {call.on for call in lines[2].calls}
 
 
 @pytest.mark.parametrize("ending", ["pass", "1 / 0", "raise KeyboardInterrupt", "def"])
@@ -323,7 +325,7 @@ def test_several_data_are_told_apart(engine: str) -> None:
         "more = [sm.make_data(model) for _ in range(2)]\n"
         "sm.step(model, more[1])\nsm.step(model, data, 2)\nmore[1].close(); more.clear()",
     )
-    step, world = ("mj_step", "{}") if engine == "mujoco" else ("stepSimulation", "the world of {}")
+    step, world = ("mj_step", "{}") if engine == "mujoco" else ("stepSimulation", f"{WORLD} {{}}")
     stepped = [
         [(call.on, call.count) for call in line.calls if call.function == step] for line in lines
     ]
@@ -334,8 +336,8 @@ def test_several_data_are_told_apart(engine: str) -> None:
     if engine == "pybullet":
         ended = [(c.function, c.on, c.changed) for line in lines[3:] for c in line.calls]
         assert ended == [
-            ("disconnect", "the world of more[1]", (CLOSED,)),
-            ("disconnect", "the world of more[0]", (CLOSED,)),
+            ("disconnect", f"{WORLD} more[1]", (CLOSED,)),
+            ("disconnect", f"{WORLD} more[0]", (CLOSED,)),
         ]
 
 
@@ -363,7 +365,7 @@ def test_pybullet_computes_poses_on_its_still_copy_when_they_are_read(
 ) -> None:
     line = lines_of_reads[read]
     asked = {call.function: call.on for call in line.calls if call.engine == "pybullet"}
-    assert asked["getLinkStates"] == "the still copy of model"
+    assert asked["getLinkStates"] == f"{STILL_COPY} model"
     assert_has(line, changed=("data.site_xpos",), due=())
 
 
@@ -378,7 +380,7 @@ def test_a_step_of_pybullet_moves_its_world_and_reads_it(
 ) -> None:
     line = lines_of_reads["step"]
     assert_has(line, changed=("data.qpos", "data.qvel", "data.time"), due=("data",))
-    of_the_world = {call.function: call for call in line.calls if call.on == "the world of data"}
+    of_the_world = {call.function: call for call in line.calls if call.on == f"{WORLD} data"}
     moved = of_the_world["stepSimulation"]
     assert moved.count == 4
     assert {"joint positions", "joint velocities"} <= set(moved.changed)
@@ -402,17 +404,17 @@ def test_the_still_copy_is_never_stepped(whole_run: Recording) -> None:
     calls = calls_of(whole_run)
     assert_in(
         calls,
-        ("the still copy of model", "calculateMassMatrix"),
-        ("the look-ahead of model", "stepSimulation"),
+        (f"{STILL_COPY} model", "calculateMassMatrix"),
+        (f"{LOOK_AHEAD} model", "stepSimulation"),
     )
-    assert ("the still copy of model", "stepSimulation") not in calls
+    assert (f"{STILL_COPY} model", "stepSimulation") not in calls
 
 
 def test_every_world_of_a_run_has_a_name(whole_run: Recording) -> None:
     assert {name for name, _ in calls_of(whole_run)} <= {
-        *("the still copy of model", "the still copy of off"),
-        *("the look-ahead of model", "the look-ahead of off"),
-        *("the world of data", "the world of other"),
+        *(f"{STILL_COPY} model", f"{STILL_COPY} off"),
+        *(f"{LOOK_AHEAD} model", f"{LOOK_AHEAD} off"),
+        *(f"{WORLD} data", f"{WORLD} other"),
         "a world that is gone again",  # in which load tries what it wrote
     }
 
@@ -626,7 +628,7 @@ def test_a_page_shows_each_line_once_with_the_engine_that_differs(
 
 def test_a_page_says_how_many_steps_an_engine_took_itself(both_pages: tuple[Page, str]) -> None:
     flat = " ".join(both_pages[1].split())
-    assert_in(flat, "in this run: 0.", "in this run: 1.", "steps there: 0.")
+    assert_in(flat, "this run: 0.", "this run: 1.", "steps there: 0.")
 
 
 def test_a_page_says_why_the_run_ended() -> None:

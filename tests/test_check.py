@@ -31,7 +31,7 @@ from statemachine.errors import MissingEngineError
 from statemachine.processes import sandbox
 
 from .support.backends import slow_on
-from .support.claims import assert_in, refused
+from .support.claims import assert_has, assert_in, refused
 from .support.exercises import RIGHT, SOLUTION, TEMPLATE, WRONG, Attempt
 from .support.files import written, written_all
 from .support.processes import (
@@ -122,7 +122,7 @@ def test_a_command_that_was_written_for_nothing_is_mentioned(prepared: Prepare) 
     right = {attempt.name: attempt for attempt in RIGHT}
     needless = right["forward-command_written_too"]
     (remark,) = _verdict(needless, prepared(needless.solves, "mujoco")).remarks
-    assert "you wrote ctrl, too, which moved nothing" in remark
+    assert "you wrote ctrl" in remark
 
 
 def test_every_wrong_solution_has_a_message_of_its_own() -> None:
@@ -289,8 +289,9 @@ def test_what_does_not_get_ready_is_not_judged(monkeypatch: pytest.MonkeyPatch) 
         assert not judgement.judged
         assert_in(
             _one(judgement),
-            "nothing could be judged: the judge itself ended the process with code 7",
-            "Your code was not run",
+            "the judge itself",
+            "with code 7",
+            "was not run",
         )
 
 
@@ -530,16 +531,16 @@ def test_a_file_that_is_saved_as_utf_16_is_told_as_any_other_encoding(
     worlds, rights = prepared("demo_gravity", "mujoco")
     answers = answers_of_file(exercise.python_file(file), "demo_gravity", worlds)
     judgement = judgement_of("demo_gravity", worlds, rights, answers)
-    assert "it is saved as UTF-16" in _one(judgement)
+    assert "UTF-16" in _one(judgement)
     assert judgement is not None
     assert judgement.judged
 
 
 @pytest.mark.parametrize("backend", slow_on("pybullet"), indirect=True)
 def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:
-    done = here("check", str(SOLUTION), "--backend", backend, code=0)
+    done = here("check", str(SOLUTION), "--backend", backend, "--json", code=0)
     assert done.stderr == ""
-    assert "4 of 4 functions right" in done.stdout
+    assert_has(json.loads(done.stdout), right=4, passed=True)
 
 
 def test_the_students_file_is_still_to_be_written(here: Cli) -> None:

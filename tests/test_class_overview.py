@@ -53,12 +53,19 @@ def _entry(name: str, *said: str, refusal: str = "", student: str = "") -> Class
     return ClassEntry(name, "", functions, refusal, "mujoco", student=student)
 
 
+# What was wrong of each student's.
+ANN_S = "reading 2: 4.5 mm away"
+BOB_S = "reading 3: 27 mm away"
+CY_S = "line 7: NameError (in `x = y`)"
+DEE_S = "line 12: NameError (in `a`)"
+EVE_S = "reading 2: 1 mm away"
+
 ENTRIES = (
-    _entry("ann", RIGHT, RIGHT, "reading 2: 4.5 mm away", "ctrl[2] was written | nan at 1 s"),
-    _entry("bob", RIGHT, "", "reading 3: 27 mm away", RIGHT),
-    _entry("cy", *(["line 7: NameError (in `x = y`)"] * 4)),
-    _entry("dee", *(["line 12: NameError (in `a`)"] * 4)),
-    _entry("eve", "? it reads bob/a.py", "? it reads bob/a.py", "reading 2: 1 mm away", RIGHT),
+    _entry("ann", RIGHT, RIGHT, ANN_S, "ctrl[2] was written | nan at 1 s"),
+    _entry("bob", RIGHT, "", BOB_S, RIGHT),
+    _entry("cy", *([CY_S] * 4)),
+    _entry("dee", *([DEE_S] * 4)),
+    _entry("eve", "? it reads bob/a.py", "? it reads bob/a.py", EVE_S, RIGHT),
     _entry("fay", refusal="a notebook"),
     _entry("gus", refusal="a notebook"),
     _entry("hal", refusal=NOTHING, student=""),
@@ -92,16 +99,16 @@ def test_remarks_that_differ_in_figures_are_one_mistake(result: ClassResult) -> 
 
 
 def test_a_figure_that_all_have_is_shown() -> None:
-    said = ("0.8 rad, 3 mm away", "0.8 rad, 5 mm away")
+    said = ("0.8 rad, 3 mm", "0.8 rad, 5 mm")
     entries = [_entry(f"{k}", text, RIGHT, RIGHT, RIGHT) for k, text in enumerate(said)]
     (mistake,) = class_result(entries).mistakes
-    assert mistake.remark == "0.8 rad, … mm away"
+    assert mistake.remark.partition(",") == ("0.8 rad", ",", " … mm")
 
 
 def test_one_student_with_a_mistake_in_four_functions_is_one_student() -> None:
-    said = [f"the file has no function {name}" for name in JUDGES]
+    said = [f"no function {name}" for name in JUDGES]
     (mistake,) = class_result([_entry("ann", *said)]).mistakes
-    assert (mistake.remark, mistake.count) == ("the file has no function …", 1)
+    assert (mistake.remark, mistake.count) == ("no function …", 1)
     assert mistake.functions == tuple(JUDGES)
 
 
@@ -130,13 +137,13 @@ def test_a_remark_is_a_row_for_each_student_and_function_uncut() -> None:
     entries = [*ENTRIES, _entry("ida", long, f"wrong | {LOOK}: a.txt", RIGHT, "a | b")]
     rows = remarks_table(entries).rows
     assert rows == [
-        ["ann", "forward", "reading 2: 4.5 mm away"],
+        ["ann", "forward", ANN_S],
         ["ann", "replay", "ctrl[2] was written; nan at 1 s"],
         ["bob", "state", "not written"],
-        ["bob", "forward", "reading 3: 27 mm away"],
-        ["cy", "file", "line 7: NameError (in `x = y`)"],
-        ["dee", "file", "line 12: NameError (in `a`)"],
-        ["eve", "forward", "reading 2: 1 mm away"],
+        ["bob", "forward", BOB_S],
+        ["cy", "file", CY_S],
+        ["dee", "file", DEE_S],
+        ["eve", "forward", EVE_S],
         ["hal", "file", NOTHING],
         ["ida", "gravity", long],
         ["ida", "state", "wrong"],
@@ -174,7 +181,7 @@ def test_a_group_of_short_functions_is_no_sign_of_copying(result: ClassResult) -
 def test_a_group_that_is_like_the_solution_says_so() -> None:
     same = replace(GROUP, least=1.0, is_short=False, is_solution=True)
     text = " ".join(shown(class_page(class_result(ENTRIES, (same,)))).split())
-    assert_in(text, "alike, 100%: ann, bob.", "solution")
+    assert_in(text, "100%", "ann, bob", "solution")
     assert "short functions" not in text
 
 
@@ -211,7 +218,7 @@ def test_each_part_of_a_result_is_in_the_json(
 def test_the_answer_and_the_table_are_first(result: ClassResult) -> None:
     page = class_page(result)
     assert page.headline is not None
-    assert page.headline.lead.startswith("0 of 8 files")
+    assert page.headline.lead.startswith("0 of 8")
     assert isinstance(page.blocks[0], Table)
     assert page.blocks[0].headers[0] == "file"
 
@@ -225,12 +232,12 @@ def test_the_remarks_are_folded_at_the_end(result: ClassResult) -> None:
     last = class_page(result).blocks[-1]
     assert isinstance(last, Section)
     (table,) = [block for block in last.blocks if isinstance(block, Table)]
-    assert table.headers[-1] == "what is not right"
+    assert [list(row) for row in table.rows] == remarks_table(result.entries).rows
 
 
 def test_the_html_of_a_class_has_mistakes_and_remarks(result: ClassResult) -> None:
     html = report(class_page(result)).replace("\u00a0", " ")
-    assert_in(html, "reading 2: 4.5 mm away", "reading …: … mm away", "short functions", "eve")
+    assert_in(html, result.mistakes[0].remark, remarks_table(result.entries).rows[0][-1], "eve")
 
 
 def test_a_row_of_the_class_leads_to_the_remarks_on_its_student(result: ClassResult) -> None:
@@ -253,10 +260,10 @@ def test_a_row_of_the_class_fits_80_columns(result: ClassResult) -> None:
 
 
 def test_a_mistake_in_both_runs_is_one() -> None:
-    said = [f"servos {word}: you return 2 at 1 s" for word in ("on", "off")]
+    said = [f"servos {word}: 2 rad" for word in ("on", "off")]
     entries = [_entry(name, " | ".join(said), RIGHT, RIGHT, RIGHT) for name in ("ann", "bob")]
     (mistake,) = class_result(entries).mistakes
-    assert (mistake.remark, mistake.count) == ("servos …: you return 2 at 1 s", 2)
+    assert (mistake.remark.partition(":")[0], mistake.count) == ("servos …", 2)
 
 
 def test_remarks_that_the_same_students_got_on_a_function_are_a_line() -> None:
@@ -265,9 +272,9 @@ def test_remarks_that_the_same_students_got_on_a_function_are_a_line() -> None:
     mistakes = class_result(entries).mistakes
     assert [mistake.remark for mistake in mistakes] == ["time is 6", "x"]
     assert mistakes[0].others == ("no box", "no base")
-    assert [row[2] for row in mistakes_table(mistakes).rows] == [
-        "time is 6 (and 2 other remarks)", "x",
-    ]  # fmt: skip
+    first, second = (row[2] for row in mistakes_table(mistakes).rows)
+    assert_in(first, "time is 6", "2 other")
+    assert second == "x"
 
 
 def test_the_same_remark_on_several_functions_is_a_row() -> None:
@@ -297,7 +304,6 @@ def test_files_of_nobody_on_the_roster_stand_below_a_heading() -> None:
     ]
     page = class_page(class_result(entries))
     (section,) = [each for each in blocks(page, Section) if each.name == "strangers"]
-    assert section.heading == "Not on the roster (1 file)"
     assert [row[0] for table in blocks(page, Table)[:1] for row in table.rows] == ["Ann"]
     (strangers,) = [block for block in section.blocks if isinstance(block, Table)]
     assert [row[0] for row in strangers.rows] == ["x2.py"]
@@ -305,7 +311,7 @@ def test_files_of_nobody_on_the_roster_stand_below_a_heading() -> None:
 
 def test_without_a_roster_nobody_is_a_stranger(result: ClassResult) -> None:
     assert result.strangers == ()
-    assert "Not on the roster" not in shown(class_page(result))
+    assert not [each for each in blocks(class_page(result), Section) if each.name == "strangers"]
 
 
 def test_whom_one_is_most_like_is_told_from_85_percent_on() -> None:
@@ -320,4 +326,4 @@ def test_whom_one_is_most_like_is_told_from_85_percent_on() -> None:
 def test_nearly_alike_is_told_without_a_group() -> None:
     pairs = (AlikePair(("ann", "bob"), 0.8999),)
     text = " ".join(shown(class_page(class_result(ENTRIES, nearly_alike=pairs))).split())
-    assert "Nearly alike, 89%: ann, bob." in text
+    assert_in(text, "89%", "ann, bob")

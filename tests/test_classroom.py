@@ -188,7 +188,7 @@ def test_several_files_with_written_functions_are_not_chosen_from(
     written_all(tmp_path / "ann", {names[0]: text.replace("0.8", "0.7"), names[1]: text})
     (found,) = submissions([tmp_path])
     assert found.path is None
-    assert found.refusal == f"2 files in it have the functions: {', '.join(names)}"
+    assert found.refusal.endswith(": " + ", ".join(names))
 
 
 def test_the_template_beside_a_written_file_does_not_count(tmp_path: Path) -> None:
@@ -267,7 +267,7 @@ def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[st
 def test_remarks_are_a_line_a_function_uncut_and_details_have_all(tmp_path: Path) -> None:
     texts = (
         "right on 2 other models, too",
-        "ctrl was written ([0 0]): here it must stay",
+        "ctrl was written",
         "x" * 500,
         "TODO",
     )
@@ -278,7 +278,7 @@ def test_remarks_are_a_line_a_function_uncut_and_details_have_all(tmp_path: Path
     entry = ClassEntry("ann.py", "1" * 64, marks, "", "mujoco")
     (row,) = _table([entry])
     assert row["remarks"].split("\n") == [
-        "state: ctrl was written ([0 0]): here it must stay",
+        "state: ctrl was written",
         f"forward: {'x' * 500}",
         "replay: not written",
         "please look at this: it reads a.txt",
@@ -459,7 +459,7 @@ def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
     found = [each for each in submissions([folder]) if each.name in ("ann", "gus.py")]
     ann, gus = judge_all(found, "mujoco")
     assert (ann.right, gus.judged) == (4, False)
-    assert "helper.py, which was not handed in with it" in gus.functions[0].remarks[0]
+    assert "helper.py" in gus.functions[0].remarks[0]
 
 
 class Resumed:
@@ -583,8 +583,8 @@ def test_gradescope_reads_the_remarks_below_the_verdict(
 
 
 def test_gradescope_reads_at_each_function_why_there_is_no_grade() -> None:
-    read = json.loads(gradescope_results(None, "there is no file"))
-    assert [each["output"] for each in read["tests"]] == ["there is no file"] * len(JUDGES)
+    read = json.loads(gradescope_results(None, "no file"))
+    assert [each["output"] for each in read["tests"]] == ["no file"] * len(JUDGES)
 
 
 @pytest.mark.parametrize("option", ["--csv", "--gradescope"])

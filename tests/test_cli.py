@@ -239,7 +239,7 @@ def test_gravity_of_a_slide_and_of_an_equality(here: Cli, tmp_path: Path) -> Non
         "<equality><joint joint1='j'/></equality><actuator><position joint='j' kp='1'/></actuator>",
     )
     page = here("lesson", "gravity", "--model", file, "--joint", "j", code=0)
-    assert re.search(r"held by +equality +equality", page.stdout)
+    assert re.search(r"by +equality +equality", page.stdout)
     assert_in(page.stdout, "[N]", "mm")
 
 

@@ -392,7 +392,7 @@ def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
     found = compare(*run_sides(Request(("hold",), ("mujoco:engine", "pybullet:engine"))).traces)
     assert np.degrees(by_name(found)["elbow_flex"].max) > 13
     notes = " ".join(found.notes)
-    assert_in(notes, "gravity differs: 0 0 -9.81 and 0 0 0", "timesteps differ")
+    assert_in(notes, "gravity differs", "-9.81", "timesteps differ")
 
 
 @pytest.mark.usefixtures("bullet")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -560,7 +561,7 @@ def test_a_call_that_fails_is_the_exit_code() -> None:
         ROOT,
     )
     assert (done.returncode, done.stderr) == (1, "")
-    assert "✗ mujoco, recompute: it ran, and what it should do did not happen" in done.stdout
+    assert "mujoco, recompute" in re.findall(r"✗ (\w+, \w+):", done.stdout)
 
 
 # An engine that has no room, or less in it.

@@ -84,7 +84,7 @@ def test_a_line_break_in_a_name_breaks_no_table(capsys: pytest.CaptureFixture[st
 def test_a_line_break_in_a_heading_breaks_no_table() -> None:
     table = Table(("time", "mujoco\nservos on"), [("0 s", "0.000°")], title="t")
     _, _, *lines = md.block_as_markdown(table, lambda _: "").splitlines()
-    assert lines[0] == "| time | mujoco servos on |"
+    assert [cell.strip() for cell in lines[0].split("|")[1:-1]] == ["time", "mujoco servos on"]
     assert [line.count("|") for line in lines] == [3] * 3
 
 

@@ -26,7 +26,7 @@ from statemachine.lab.recordings import Rerun, Trace, record
 from statemachine.lab.why.gap import Ruler
 from statemachine.show.blocks import Code
 
-from .support.claims import refused
+from .support.claims import assert_in, refused
 from .support.compared import page_of as compared_page
 from .support.files import written
 from .support.pages import blocks, shown
@@ -79,8 +79,6 @@ def test_identical_sides_are_inside_all_the_time(tmp_path: Path) -> None:
     floor = chaos_floor(comparison, (run, run))
     assert {band.inside_from for band in floor.bands} == {0.0}
     assert {band.chance for band in floor.bands} == {None}
-    text = shown(compared_page(comparison, floor=floor, details=True))
-    assert "Every gap lies inside it, all the time." in " ".join(text.split())
 
 
 @pytest.mark.slow
@@ -271,7 +269,7 @@ def test_the_command_line_shows_the_floor(here: Cli) -> None:
     assert json.loads(here(*asked, "--json").stdout)["floor"]["runs"] == RUNS
     assert "chaos" not in here(*asked, "--no-chaos", "--details").stdout
     # Where it is above a tolerance it stands in the table, quantity by quantity.
-    assert re.search("at the end +verdict\n", here(*asked).stdout)
+    assert re.search("the end +verdict\n", here(*asked).stdout)
     assert re.search("rounding +verdict\n", here(*asked, "--uncertainty", "5deg").stdout)
 
 
@@ -383,7 +381,7 @@ def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path
         ends = "--timestep 0.0025 --converge" if found.unclear else "--why --quantity 'joint 0'"
         assert code.lines[0].endswith(ends)
         everything = shown(page(asked(found, "fall"), details=True))
-        assert "Commands come by the step" not in everything
+        assert "Commands come" not in everything
         assert not found.vanishes
 
 
@@ -391,8 +389,7 @@ def test_unlike_timesteps_ask_for_commands_at_unlike_moments() -> None:
     one, two = (sm.load("so101", timestep=timestep) for timestep in (0.002, 0.004))
     found = asked(convergence_of(one, two, 0.1), "hold")
     text = " ".join(shown(page(found, details=True)).split())
-    assert "by the step as given, which is 2 ms on the left and 4 ms on the right" in text
-    assert "timestep=0.004 behind both" in text
+    assert_in(text, "2 ms", "4 ms", "timestep=0.004")
 
 
 def test_a_touch_parts_what_can_be_said(tmp_path: Path) -> None:

@@ -259,8 +259,10 @@ def test_what_tests_catch_is_kept_and_an_error_is_not(
         },
     )
     first = judge_all(submissions([folder]), "mujoco", tests=True)
-    assert [entry.tests for entry in first] == ["0 of 0", "pytest is not here"]
     second = judge_all(submissions([folder]), "mujoco", tests=True)
-    assert [entry.tests for entry in second] == ["0 of 0", "pytest is not here"]
+    for entries in (first, second):
+        fine, error = (entry.tests for entry in entries)
+        assert fine == "0 of 0"
+        assert "pytest" in error
     assert sorted(ran) == ["error", "error", "fine"]
     assert [entry.tests for entry in judge_all(submissions([folder]), "mujoco")] == ["", ""]

@@ -27,6 +27,7 @@ from .support.backends import RELEASES
 from .support.files import written
 from .support.pages import blocks
 
+LIMITED_KV = "kv of a limited servo"  # the known change
 OLD = RELEASES[0]
 PROBES = Path(known_changes.__file__).with_name("release_probes.py")
 
@@ -79,7 +80,7 @@ def test_kv_of_a_servo_at_its_limit_is_told_with_the_part_that_plain_mujoco_has_
 ) -> None:
     file = written(tmp_path / "m.xml", SERVO.format(integrator=integrator, limit=LIMIT))
     (change,) = pair_of(file).changes
-    assert (change.name, change.probe) == ("kv of a limited servo", integrator)
+    assert (change.name, change.probe) == (LIMITED_KV, integrator)
     assert change.elements == ("servo",)
     # A step from rest gives v = h F / (I + h c kv), with the part c of kv.
     for python, part in ((releases.python_of(OLD), change.left), (sys.executable, change.right)):
@@ -141,7 +142,7 @@ def test_a_comparison_of_two_releases_tells_them_too_and_of_two_files_none(
     for right in (file, other):
         run = Request(("hold",), sides=(Side(file, OLD), Side(right)), seconds=0.5)
         told.append(names(gap.answer(gap.CompareRequest(run, uncertainty=None)).changes))
-    assert told == [["kv of a limited servo"], []]
+    assert told == [[LIMITED_KV], []]
 
 
 def test_causes_of_a_gap_between_two_releases_have_them_too(
@@ -153,7 +154,7 @@ def test_causes_of_a_gap_between_two_releases_have_them_too(
     compared = gap.answer(gap.CompareRequest(run, uncertainty=None))
     result = causes.answer(causes.ExplainRequest(run, uncertainty=None, jobs=1))
     assert result.changes == compared.changes
-    assert names(result.changes) == ["kv of a limited servo"]
+    assert names(result.changes) == [LIMITED_KV]
     (items,) = blocks(why.page(result), Items)
     assert OLD.partition("==")[2] in items.texts[0]
 

@@ -14,6 +14,7 @@ from .support.files import written
 from .support.processes import Cli
 from .support.two_files import causes_of_texts, compared_texts
 
+ORDER = "order of the joints a, b of p"  # the cause
 X_HINGE = '<joint name="a" axis="1 0 0"/>'
 Y_HINGE = '<joint name="b" axis="0 1 0"/>'
 Z_HINGE = '<joint name="c" axis="0 0 1"/>'
@@ -93,15 +94,15 @@ def test_the_row_says_which_joint_hangs_on_which(tmp_path):
     left, right = _model((X_HINGE, Y_HINGE)), _model((Y_HINGE, X_HINGE))
     (row,) = _orders(compared_texts(tmp_path, left, right))
     assert (row.subject, row.element, row.matters) == ("structure", "b", True)
-    assert (row.left, row.right) == ("b hangs on a", "a hangs on b")
-    assert row.cause == "order of the joints a, b of p"
+    assert [str(side).split()[::3] for side in (row.left, row.right)] == [["b", "a"], ["a", "b"]]
+    assert row.cause == ORDER
 
 
 def test_only_the_joints_that_changed_places_are_told(tmp_path):
     left = _model((X_HINGE, Y_HINGE, Z_HINGE))
     right = _model((X_HINGE, Z_HINGE, Y_HINGE))
     (row,) = _orders(compared_texts(tmp_path, left, right))
-    assert (row.left, row.right) == ("c hangs on b", "b hangs on c")
+    assert [str(side).split()[::3] for side in (row.left, row.right)] == [["c", "b"], ["b", "c"]]
 
 
 def test_files_whose_joints_come_in_another_order_differ(here: Cli, tmp_path):
@@ -116,7 +117,7 @@ def test_what_hangs_on_the_body_still_hangs_on_it(tmp_path, wrist):
     right = _model((Y_HINGE, X_HINGE), CHILD.replace("wrist", wrist))
     comparison = compared_texts(tmp_path, left, right)
     causes = {row.cause for row in comparison.differences if row.cause}
-    assert causes == {"order of the joints a, b of p"}
+    assert causes == {ORDER}
 
 
 SERVOS = (
@@ -130,7 +131,7 @@ def test_why_names_the_order_as_what_cannot_be_made_the_same(tmp_path):
     right = _model((Y_HINGE, X_HINGE), actuators=SERVOS)
     result = explained(tmp_path, left, right, scenario=SCENARIOS["waves"])
     refused = [share.name for share in result.shares if share.share is None]
-    assert "order of the joints a, b of p" in refused
+    assert ORDER in refused
     assert not any(name.startswith("parent") for name in refused)
     assert (result.explained, result.unexplained) == (0, 1)
 

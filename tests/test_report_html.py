@@ -345,14 +345,12 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     def said(**more: Any) -> Headline:
         return headline_of_page(hold, explanation=explanation_of(hold, **more))
 
-    assert said().lead.startswith("Joint wrist_flex is up to 2.58° apart")
-    assert said().causes == (
-        "Servo law, kp 998.2 on the left and its motors on the right: 60.0 % of the 2.58°.",
-    )
+    assert_in(said().lead, "wrist_flex", "2.58°")
+    (cause,) = said().causes
+    assert_in(cause, "Servo law", "kp 998.2", "60.0 %", "2.58°")
     # What the run shows itself comes before.
     touch = FirstTouch(0.27, "gripper on floor", before=3e-16, moments=54)
-    before = "Until the first touch, gripper on floor at 0.270 s, the gap of the joints is 2e-14°"
-    assert said(touch=touch).causes[0].startswith(f"{before} at most")
+    assert_in(said(touch=touch).causes[0], "gripper on floor", "0.270 s", "2e-14°")
     late = FirstTouch(0.27, "finger on floor", before=0.01, moments=54)  # they were apart before
     assert len(said(touch=late).causes) == 1
     # Of two that are as far apart the page names one, here and where it counts agreements.
@@ -360,7 +358,8 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     tied = (replace(lead, max=lead.max * (1 - 1e-9)), *hold[0].agreements)
     assert explained_quantity(replace(hold[0], agreements=tied), explanation_of(hold)) is lead
     # Of another quantity than any that is compared no cause stands beside the lead.
-    assert said(quantity="box relative to gripperframe").causes == ()
+    relative = "box relative to gripperframe"
+    assert said(quantity=relative).causes == ()
 
 
 def refused_cause(name: str, why: str) -> Share:
@@ -455,8 +454,8 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     for shares, missing in (((rows[0], *tiny), True), (rows, False)):
         changes = steps(explanation_of(hold, shares=shares, **several))
         texts = [block.text for block in changes if isinstance(block, Text)]
-        assert any("of the gap of the joints stays" in text for text in texts)
-        assert any("another quantity may be missing" in text for text in texts) is missing
+        assert any("gap of the joints" in text for text in texts)
+        assert any("may be missing" in text for text in texts) is missing
     for explanation, column, cells in (
         (explanation_of(hold, floor=0.2 * worse.gap), 3, ["60.0 %", "< 20.0 %", "50.0 %*"]),
         (
@@ -470,7 +469,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     # Where something cannot be brought to the same, a location is not an explanation.
     row = refused_cause("shape of box", "another size")
     found = (replace(contact, share=1.0),)
-    assert parts(worse).endswith("Of the 3.22°, 100.0 % is localised and < 0.1 % unexplained")
+    assert_in(parts(worse), "3.22°", "100.0 %", "< 0.1 %")
     assert [each.verdict.holds for each in (located, worse, still)] == [True, False, False]
     assert not replace(located, shares=(row,), found_in=found).verdict.holds
 
@@ -493,9 +492,8 @@ def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
         found = [bar(row) for row in ("Servo law", "Armature", "Contact")]
         np.testing.assert_allclose(found, bars, atol=0.02)
         steps = tab.locator("#agree ul li").all_inner_texts()  # all that was brought over
-        assert [step.replace("\u00a0", " ") for step in steps] == [
-            f"{name}: its motors → kp 998.2" for name in ("servo law", "armature")
-        ]
+        assert [step.partition(":")[0] for step in steps] == ["servo law", "armature"]
+        assert all("998.2" in step for step in steps)
     assert 'id="agree"' not in page_of(hold)
 
 
@@ -560,7 +558,7 @@ def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
 
 def test_between_compared_moments_the_figures_are_of_the_last_one(uneven: Made) -> None:
     text = page_of(uneven)
-    assert_in(text, "at the first common moment, 0.025\u00a0s", "meet every 25\u00a0ms")
+    assert_in(text, "0.025\u00a0s", "25\u00a0ms")
     data = data_of(text)
     shown, compared = (np.frombuffer(base64.b64decode(data[name])) for name in ("time", "compared"))
     assert compared == pytest.approx(0.025 * np.floor(shown / 0.025 + 1e-6), abs=1e-9)
@@ -949,8 +947,8 @@ def test_other_traces(hold: Made, kind: str, seen: Seen) -> None:
         go(tab, int(tab.locator("#slider").get_attribute("max")))
         assert tab.locator("#clock").inner_text() == f"{made[0].until:.3f} s"
         text = tab.locator("body").inner_text().replace("\u00a0", " ")
-        assert ("it diverged at 0.745 s" in text) == (kind == "ended")
-        assert ("are the same in all" in text) == (kind == "same")
+        assert ("0.745 s" in text) == (kind == "ended")
+        assert ("the same in all" in text) == (kind == "same")
         assert "NaN" not in text
         assert tab.locator("#play").is_visible() == (kind != "single")
 
@@ -965,7 +963,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(uneven: Made, se
     assert rows_at(two, times)[1].any()
     with seen(uneven) as tab:
         go(tab, 7)
-        assert tab.locator("#now").inner_text() == "0.035 s (figures of 0.025 s)"
+        assert_in(tab.locator("#now").inner_text(), "0.035 s", "0.025 s")
         cell = tab.locator("#readout tr", has_text="elbow_flex").locator("td").last.inner_text()
         apart = abs(one.qpos[5, 2] - two.qpos[6, 2])
         assert float(cell.strip("● °")) == pytest.approx(np.degrees(apart), rel=0.01)
@@ -999,10 +997,10 @@ def test_a_page_without_matplotlib_says_where_its_charts_are(
 ) -> None:
     monkeypatch.setattr(
         "statemachine.show.html.chart.chart",
-        Mock(side_effect=MissingEngineError("a figure needs matplotlib")),
+        Mock(side_effect=MissingEngineError("matplotlib is missing")),
     )
     text = page_of(hold)
-    assert "No chart: a figure needs matplotlib" in text
+    assert "matplotlib is missing" in text
     assert "<polyline" not in text
 
 

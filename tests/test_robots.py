@@ -342,7 +342,7 @@ def test_an_error_in_one_part_costs_that_part(
     monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
     tell = Mock()
     row = examine.examine(folder / "good.xml", ExaminedModel("good.xml", "", ""), True, 0, tell)
-    assert row.faults[0] == "restore, mujoco: ZeroDivisionError: division by zero"
+    assert row.faults[0].startswith("restore, mujoco: ZeroDivisionError")
     assert row.backends["mujoco"].equals_engine
     stages = {call.args[1] for call in tell.call_args_list}
     assert "gap without contacts, pybullet" in stages or "pybullet" not in row.backends
@@ -354,7 +354,7 @@ def test_an_error_in_one_part_costs_that_part(
     )(monkeypatch)
     row = examine.examine(folder / "good.xml", row, True, 0, tell)
     assert row.backends["mujoco"].equals_engine is False
-    assert "mujoco: not the bits of the engine without us" in row.wrong("mujoco")
+    assert any("not the bits" in fault for fault in row.wrong("mujoco"))
 
 
 ROW = ExaminedModel(

@@ -123,18 +123,18 @@ def test_paragraphs_of_engines_stand_in_the_order_of_the_template(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     source = (
-        "{% if odd %}\nFirst.\n\n{% endif %}\nIt is {{ number }}.\n\n"
+        "{% if odd %}\nFirst.\n\n{% endif %}\nNumber {{ number }}.\n\n"
         "{% if odd %}\nLast.\n{% endif %}\n"
     )
     assert _said_of(source, monkeypatch, y=_EVEN, x=_ODD) == [
-        Text("y: It is 0."), Text("x: First."), Text("x: It is 1."), Text("x: Last."),
+        Text("y: Number 0."), Text("x: First."), Text("x: Number 1."), Text("x: Last."),
     ]  # fmt: skip
 
 
 def test_a_verdict_says_whose_it_is_and_a_table_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    source = "{% call verdict(odd) %}It is odd.{% endcall %}\n\n{{ table(sizes) }}\n"
+    source = "{% call verdict(odd) %}Odd.{% endcall %}\n\n{{ table(sizes) }}\n"
     assert _said_of(source, monkeypatch, x=_ODD, y=_EVEN) == [
-        Verdict("x: It is odd.", True), Verdict("y: It is odd.", False), _ODD.sizes,
+        Verdict("x: Odd.", True), Verdict("y: Odd.", False), _ODD.sizes,
     ]  # fmt: skip
 
 
@@ -348,6 +348,8 @@ def test_a_table_that_fits_has_a_line_for_each_row() -> None:
 
 
 def test_a_piped_quiz_has_its_choices_and_the_answer() -> None:
-    question = Question("Which of `a` and b?", ("the `first`", "the second"), 1, "So it is.", True)
-    text = text_of(Page("t", "o", [question]))
-    assert "Which of `a` and b?\n\na) the `first`\nb) the second\n\nAnswer: b) the second." in text
+    question = Question("`a` or b?", ("the `first`", "the second"), 1, "So it is.", True)
+    lines = text_of(Page("t", "o", [question])).splitlines()
+    asked = lines.index("`a` or b?")
+    assert lines[asked + 1 : asked + 4] == ["", "a) the `first`", "b) the second"]
+    assert "Answer: b)" in lines[asked + 5]

@@ -26,7 +26,7 @@ from statemachine.lab.recordings import (
     write,
 )
 
-from .support.claims import assert_has, refused
+from .support.claims import assert_has, assert_in, refused
 from .support.compared import page_of
 from .support.files import written_all
 from .support.pages import shown
@@ -58,14 +58,14 @@ def test_what_is_no_number_never_agrees(column: str, quantity: str, box: Trace) 
     found = compare(box, changed(box, None, **{column: added(box[column], 20, np.nan)}))
     assert not found.agrees
     assert (named(found)[quantity].verdict, found.worst.name) == ("differs", quantity)
-    assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
+    assert any(note.startswith(f"{quantity}: no number") for note in found.notes)
     assert "nan" not in shown(page_of(found, details=True))
 
 
 def test_a_column_that_is_not_told_is_not_compared_and_that_is_said(box: Trace) -> None:
     for column, what in (("site_xpos", "fingertip"), ("contact_force", "contact forces")):
         found = compare(box, changed(box, None, **{column: np.full_like(box[column], np.nan)}))
-        assert f"not compared, for one side does not tell it: {what}" in found.notes
+        assert any(note.endswith(f": {what}") for note in found.notes)
         assert len(found.agreements) < len(compare(box, box).agreements)
     bare = {n: a for n, a in box.columns.items() if not n.startswith("contact_")}
     found = compare(box, Trace(box.header, bare))
@@ -84,16 +84,14 @@ def test_who_ended_early_does_not_agree(box: Trace) -> None:
     assert {each.verdict for each in found.agreements} == {"agrees"}
     assert_has(found, ended=True, agrees=False)
     assert not page_of(found).holds
-    assert any("0.02 s is not compared" in note for note in found.notes)
+    assert any("0.02 s" in note for note in found.notes)
 
 
 def test_a_shorter_run_is_compared_as_far_as_it_goes_and_that_is_said(box: Trace) -> None:
     found = compare(cut(box, 30), box)
     assert found.agrees
-    assert [note for note in found.notes if "s long" in note] == [
-        "the runs are 0.145 and 0.3 s long: what "
-        f"{box.header.label} (second) does after 0.145 s is not compared"
-    ]
+    (note,) = (note for note in found.notes if "s long" in note)
+    assert_in(note, "0.145 and 0.3", f"{box.header.label} (second)")
     # Other commands are found in runs of other lengths, too.
     notes = compare(cut(box, 30), changed(box, ctrl=added(box.ctrl, 3, 0.1))).notes
     assert any("the commands differ" in note for note in notes)

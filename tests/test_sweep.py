@@ -269,8 +269,8 @@ def test_a_name_of_nothing_of_both_or_without_effect_is_refused_in_one_line(
     message = str(caught.value)
     assert "\n" not in message
     if not word.startswith("gain["):  # what there is
-        assert_in(message, "gain and friction", "motor.xml has actuation, gravity")
-        assert "kp" not in message.partition("motor.xml has actuation")[2]
+        assert_in(message, "gain and friction", "motor.xml has", "actuation, gravity")
+        assert "kp" not in message.partition("motor.xml has")[2]
 
 
 def test_a_parameter_of_the_function_and_one_of_the_robot_vary_in_one_sweep(tmp_path: Path) -> None:
@@ -321,7 +321,7 @@ def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
     )
     said = [line for word in words for line in prepare_sweep(small("hold", word)).notes]
     (line,) = (line for line in said if "outside" in line)
-    assert line.startswith("qpos[elbow_flex]=-3 starts outside the range of the joint")
+    assert line.startswith("qpos[elbow_flex]=-3 ")
     assert f"{low:.4g} to {high:.4g} rad" in line
 
 
