@@ -143,7 +143,10 @@ def test_bars_of_a_name_stand_below_each_other(axes: Any) -> None:
 def _size(content: bytes) -> tuple[float, float]:
     """Return width and height of an SVG [pt]."""
     words = content.decode().split("<svg", 1)[1].split(">", 1)[0]
-    return tuple(float(words.split(f'{name}="')[1].split("pt")[0]) for name in ("width", "height"))
+    width, height = (
+        float(words.split(f'{name}="')[1].split("pt")[0]) for name in ("width", "height")
+    )
+    return width, height
 
 
 def test_pictures_stand_above_each_other_each_in_its_height() -> None:

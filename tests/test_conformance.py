@@ -389,6 +389,35 @@ def test_a_check_fails_where_a_verb_does_something_else(
         conformance.CHECKS[check](mujoco_lab)
 
 
+def _refuses_of_its_own(model: sm.Model, data: sm.Data, *_: Any) -> None:
+    assert data.model is model
+    raise BadInputError("an entry is infinite")
+
+
+def test_an_infinite_ctrl_may_be_refused_by_every_verb(
+    mujoco_lab: conformance.Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for verb in ("forward", "get_state", "step"):
+        _replaced(monkeypatch, verb, _refuses_of_its_own)
+    conformance.CHECKS["infinite_ctrl_is_refused_or_clamped"](mujoco_lab)
+
+
+@pytest.mark.parametrize("entry", [2, 3])
+def test_a_mass_that_does_not_double_what_hangs_on_it_is_no_mass(
+    mujoco_lab: conformance.Lab, monkeypatch: pytest.MonkeyPatch, entry: int
+) -> None:
+    usual = mujoco_lab.arm.body_mass
+
+    def elsewhere(model: sm.Model, data: sm.Data) -> None:
+        if not np.array_equal(model.body_mass, usual):
+            data.qpos[entry] += 0.1
+        sm.forward(model, data)
+
+    monkeypatch.setattr("statemachine.conformance.options.forward", elsewhere)
+    with pytest.raises(AssertionError):
+        conformance.CHECKS["mass_scales_weight_and_inertia"](mujoco_lab)
+
+
 # The forces of a body's contacts as an engine may tell them wrongly: the sum, how many, the normals
 @pytest.mark.parametrize(
     ("check", "wrong"),

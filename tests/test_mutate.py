@@ -6,13 +6,16 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from coverage import CoverageData
 
+pytest.importorskip("resource", reason="mutants are tried where processes can be forked")
 from tools.mutants import __main__ as run
 from tools.mutants import places
-from tools.mutants.contexts import few
+from tools.mutants.contexts import pytest_collection_modifyitems
 from tools.mutants.covered import Chosen, Covered
 from tools.mutants.draw import Site, all_sites, by_code, find, sites
 from tools.mutants.places import Place
@@ -171,7 +174,7 @@ def test_tests_are_chosen_by_line_room_and_time(tmp_path: Path) -> None:
     inside = next(site for site in found if site.lines == range(8, 9))
     covered = Covered(tmp_path)
     names = [test.partition("::")[2] for test in covered.chosen(inside, 60).tests]
-    assert names == ["slow", "quick", "first", "second"]
+    assert names == ["quick", "slow", "first", "second"]
     assert len(covered.chosen(inside, 6.5).tests) == len(covered.chosen(inside, 40).tests) == 2
     outside = next(site for site in found if not site.called)
     assert len(covered.chosen(outside, 60).tests) == 5
@@ -190,12 +193,20 @@ def _covered(folder: Path, contexts: dict[str, int], seconds: dict[str, float]) 
 
 
 def test_the_tests_of_a_file_are_run_one_after_the_other(tmp_path: Path) -> None:
-    seconds = {"tests/test_a.py::x": 1, "tests/test_b.py::x": 2, "tests/test_a.py::y": 3}
+    seconds = {"tests/test_a.py::x": 1.0, "tests/test_b.py::x": 2.0, "tests/test_a.py::y": 3.0}
     covered = _covered(tmp_path, {f"{test} (call)": 8 for test in seconds}, seconds)
     [site, *_] = [site for site in sites(_module(tmp_path), tmp_path) if 8 in site.lines]
     chosen = covered.chosen(site, 60)
     assert chosen.tests == ("tests/test_a.py::x", "tests/test_a.py::y", "tests/test_b.py::x")
     assert chosen.seconds == 6
+
+
+def test_a_case_of_each_test_comes_before_the_second_of_one(tmp_path: Path) -> None:
+    seconds = {f"tests/test_a.py::{name}": 1.0 for name in ("x[1]", "x[2]", "x[3]", "y")}
+    covered = _covered(tmp_path, {f"{test} (call)": 8 for test in seconds}, seconds)
+    [site, *_] = [site for site in sites(_module(tmp_path), tmp_path) if 8 in site.lines]
+    names = [test.partition("::")[2] for test in covered.chosen(site, 2.5).tests]
+    assert names == ["x[1]", "y"]
 
 
 @pytest.mark.parametrize(("context", "is_at_import"), [("", True), ("tests/t.py::x (call)", False)])
@@ -207,8 +218,12 @@ def test_a_statement_that_no_test_runs_is_one_of_the_import(
     assert covered.chosen(site, 60).at_import is is_at_import
 
 
-def test_three_cases_of_a_test_are_measured() -> None:
-    assert few([*range(10)]) == [0, 4, 9]  # the first, the middle, the last
+def test_a_case_of_each_test_is_measured_before_the_second_of_one() -> None:
+    names = ["a.py::x[1]", "a.py::x[2]", "a.py::y", "a.py::x[3]", "a.py::z[1]", "b.py::x[1]"]
+    items: Any = [Mock(nodeid=name) for name in names]
+    pytest_collection_modifyitems(items)
+    ordered = ["a.py::x[1]", "a.py::y", "a.py::z[1]", "a.py::x[2]", "a.py::x[3]", "b.py::x[1]"]
+    assert [item.nodeid for item in items] == ordered
 
 
 # A fault is tried

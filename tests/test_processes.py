@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -228,8 +229,9 @@ def test_a_view_has_python_and_the_files_of_a_module_that_is_needed(
 # A command under limits
 
 
-def _run(code: str, folder: Path, **limits: float) -> sandbox.ProcessOutcome:
-    told = sandbox.Limits(**{"cpu": 20.0, "wall": 120.0, **limits})
+def _run(code: str, folder: Path, **limits: Any) -> sandbox.ProcessOutcome:
+    named: dict[str, Any] = {"cpu": 20.0, "wall": 120.0, **limits}
+    told = sandbox.Limits(**named)
     return sandbox.run([sys.executable, "-c", code], told, cwd=folder, writable=folder)
 
 

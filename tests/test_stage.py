@@ -48,6 +48,7 @@ BALL = """
 </body>
 """
 STEPS = 60
+ROWS: Any = np.arange(STEPS + 1) * 0.005  # [s]
 
 
 def falling(folder: Path, height: float, timestep: float = 0.005) -> tuple[sm.Model, Trace]:
@@ -138,7 +139,7 @@ def test_a_position_that_is_no_number_is_the_last_that_was() -> None:
 def test_all_moments_of_a_short_run_are_shown(sides: tuple[sm.Model, Trace, Trace]) -> None:
     _, left, right = sides
     times, hidden = moments_of(left, right)
-    assert times == pytest.approx(np.arange(STEPS + 1) * 0.005)
+    assert times == pytest.approx(ROWS)
     assert hidden == 0
 
 
@@ -219,13 +220,13 @@ def test_a_body_that_moves_on_either_side_is_marked(
     still = changed(left, xpos=np.repeat(left["xpos"][:1], STEPS + 1, axis=0))
     still = changed(still, xquat=np.repeat(left["xquat"][:1], STEPS + 1, axis=0))
     look = drawing_of(model)
-    alone = scene_of(runs_of(still, still), (look, look), np.arange(3) * 0.005)
+    alone = scene_of(runs_of(still, still), (look, look), ROWS[:3])
     assert alone.data["moving"] == [0, 0, 0]
 
 
 def test_one_look_is_one_mesh_and_two_are_two(sides: tuple[sm.Model, Trace, Trace]) -> None:
     model, left, right = sides
-    times, runs = np.arange(3) * 0.005, runs_of(left, right)
+    times, runs = ROWS[:3], runs_of(left, right)
     look, other = drawing_of(model), drawing_of(model)
     same = scene_of(runs, (look, look), times)
     assert [side["mesh"] for side in same.data["sides"]] == [0, 0]
@@ -319,7 +320,8 @@ def test_a_camera_sees_where_the_bodies_go(sides: tuple[sm.Model, Trace, Trace])
 
 
 def test_the_corners_of_a_turned_part_are_turned() -> None:
-    part = Part("box", 0, 1, *vars(box((1.0, 2.0, 3.0))).values(), (1, 1, 1, 1))
+    shape = box((1.0, 2.0, 3.0))
+    part = Part("box", 0, 1, shape.vertices, shape.faces, (1, 1, 1, 1))
     drawing = Drawing((part,), (0, 0, 0), 1.0, 0.0, 0.0)
     turn = np.array([math.sqrt(0.5), 0, 0, math.sqrt(0.5)])  # a quarter about z
     motion = Motion(drawing, np.full((1, 2, 3), 10.0), np.array([[turn, turn]]))
@@ -394,7 +396,7 @@ def test_values_are_whole_numbers_of_their_box() -> None:
 
 
 def test_marked_rows_count_until_the_next() -> None:
-    time = np.arange(6) * 0.1
+    time = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
     mask = np.array([True, False, True, True, False, True])
     assert np.array(spans(mask, time, 0.1, 0.5)) == pytest.approx(
         np.array([[0.0, 0.1], [0.2, 0.4], [0.5, 0.5]])
@@ -451,7 +453,7 @@ def test_poses_that_are_no_numbers_are_not_drawn(sides: tuple[sm.Model, Trace, T
     for name in ("xpos", "xquat"):
         bad = left[name].copy()
         bad[4, 1, 0] = np.nan
-        broken = changed(left, **{name: bad})
+        broken = Trace(left.header, {**left.columns, name: bad})
         assert len(motion_of(broken, model, np.array([0.0])).xpos) == 1
         with pytest.raises(TraceError):
             motion_of(broken, model, np.array([0.0, 0.02]))
@@ -465,7 +467,7 @@ def test_the_points_of_a_way_are_as_far_apart_on_it_as_each_other(
 ) -> None:
     model, left, right = sides
     look = drawing_of(model)
-    times = np.arange(0, STEPS + 1, 3) * 0.005
+    times = ROWS[::3]
     runs = runs_of(left, right)
     assert runs.comparison.tip == "tip"
     for side, trace in zip(

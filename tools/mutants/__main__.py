@@ -13,7 +13,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from queue import SimpleQueue
@@ -28,7 +28,7 @@ from .renew import NOT_TRIED, Row, renewed
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results.json"
 SECOND = HERE / "second.json"
-SECONDS = 5.0  # processor time of the tests that judge a mutant, as coverage.py measured it
+SECONDS = 20.0  # processor time of the tests that judge a mutant, as coverage.py measured it
 _STATES = ("killed", "survived", "timed out", "not covered", "gone", NOT_TRIED)
 
 
@@ -89,7 +89,7 @@ def read_tried(log: Path) -> list[Tried]:
 
 
 def _run(mutants: Sequence[Mutant], seconds: float) -> list[Row]:
-    """Return every mutant with what became of it.
+    """Return every mutant with what became of it; those that an interrupt leaves are not tried.
 
     Args:
         mutants: The mutants.
@@ -126,14 +126,22 @@ def _run(mutants: Sequence[Mutant], seconds: float) -> list[Row]:
                     known = replace(known, result=result, test=test)
                 with writing, log.open("a", encoding="utf-8") as lines:
                     lines.write(json.dumps(asdict(known)) + "\n")
+                tried[str(mutant)] = known
             result = f"{known.result:12} {mutant.file} {mutant.scope} {mutant.kind} {known.test}"
             print(result, flush=True)
+            return row_of(number)
+
+        def row_of(number: int) -> Row:
+            mutant, site = found[number]
+            known = tried.get(str(mutant), Tried(str(mutant), NOT_TRIED, "", 0.0))
             return Row(site.mutant if site else mutant, known.result, known.test)
 
         # In an order that says nothing of their rooms: what is interrupted is a sample of them.
         order = random.Random(len(found)).sample(range(len(found)), len(found))
-        rows = dict(zip(order, pool.map(one, order), strict=True))
-        return [rows[number] for number in range(len(found))]
+        with suppress(KeyboardInterrupt):
+            for _ in pool.map(one, order):
+                pass
+        return [row_of(number) for number in range(len(found))]
 
 
 def _room(file: str) -> str:

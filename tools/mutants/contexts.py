@@ -5,8 +5,8 @@ that a test starts reads the name from PYTEST_CURRENT_TEST (`covered.INI`). The 
 depends on what else the machine does, so what is written is the time of the processors, with that
 of the processes that a test started and waited for.
 
-Measuring all tests takes most of an hour, and more of the same rarely notices more. So of the cases
-of a test, three are measured; and of a file, what comes within `FILE_SECONDS`.
+Measuring all tests takes most of an hour, and more of the same rarely notices more. So of a file is
+measured what comes within `FILE_SECONDS`: first a case of each test, then another of each.
 """
 
 from __future__ import annotations
@@ -14,18 +14,16 @@ from __future__ import annotations
 import json
 import os
 import threading
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
 
 import pytest
 from coverage import Coverage
 
-_Case = TypeVar("_Case")
-CASES = 3  # of one test
-FILE_SECONDS = 8.0  # of a file, under coverage.py; the test that exceeds them is the last
+_STAGES = ("processor setup", "processor call")  # properties of a report
+FILE_SECONDS = 12.0  # of a file, under coverage.py; the test that exceeds them is the last
 
 _seconds: dict[str, float] = defaultdict(float)
 _fixtures: dict[str, float] = defaultdict(float)
@@ -64,18 +62,19 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the first, the middle and the last of the cases of a test."""
-    cases: dict[str, list[pytest.Item]] = defaultdict(list)
+    """Let the first cases of all tests of a file come first, then the second ones."""
+    count: Counter[str] = Counter()
+    place: dict[str, int] = {}
     for item in items:
-        cases[item.nodeid.partition("[")[0]].append(item)
-    items[:] = [case for same in cases.values() for case in few(same)]
+        test = item.nodeid.partition("[")[0]
+        place[item.nodeid] = count[test]
+        count[test] += 1
+    files = {file: number for number, file in enumerate(dict.fromkeys(map(_file_of, items)))}
+    items.sort(key=lambda item: (files[_file_of(item)], place[item.nodeid]))
 
 
-def few(same: list[_Case]) -> list[_Case]:
-    """Return `CASES` of them at most, as far from each other as they are."""
-    if len(same) <= CASES:
-        return same
-    return [same[place * (len(same) - 1) // (CASES - 1)] for place in range(CASES)]
+def _file_of(item: pytest.Item) -> str:
+    return _file(item.nodeid)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -97,9 +96,9 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         _unused.add(report.nodeid)
     if report.when != "teardown":
         return
-    spent = dict(report.user_properties)
-    setup = float(spent.get("processor setup", 0.0))
-    _seconds[report.nodeid] = setup + float(spent.get("processor call", 0.0))
+    spent = {name: float(str(took)) for name, took in report.user_properties if name in _STAGES}
+    setup = spent.get(_STAGES[0], 0.0)
+    _seconds[report.nodeid] = setup + spent.get(_STAGES[1], 0.0)
     file = _file(report.nodeid)
     _fixtures[file] = max(_fixtures[file], setup)
 
