@@ -15,7 +15,7 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ...measures.text import command
 from ...program import NAME
-from ..validate.battery import measure
+from ..validate.case_runs import measure
 from ..validate.cases import CASES
 from ..validate.variants import OWN, Variant, variants_of
 from .cited_case import CitedCase, SideInCase, nearer_side
