@@ -278,6 +278,20 @@ def test_way_along_the_diagonal_is_that_of_plain_mujoco() -> None:
     assert way == pytest.approx(math.hypot(*end[:2]), rel=1e-9)
 
 
+@pytest.mark.slow
+@pytest.mark.network
+@pytest.mark.usefixtures("old_releases")
+def test_boxes_of_an_old_release_sink_by_twice_the_distance_of_their_contact() -> None:
+    soft = SoftContact()
+    floor = soft.depth_at_rest(contact_rest.STACK * GRAVITY / 4.0)
+    sag = 2.0 * contact_rest.sag() - floor  # all but the floor count twice
+    assert measured("stack-sag", "mujoco==3.3.7", 0.002) == pytest.approx(sag, rel=0.001)
+    result = answer(ValidateRequest(("mujoco==3.3.7",), ("stack-sag",), (0.002,)))
+    notes = {row.expectation.note for row in result.results if row.expectation is not None}
+    assert result.holds
+    assert all(notes)
+
+
 def test_sphere_rolls_as_in_plain_pybullet() -> None:
     bullet = pytest.importorskip("pybullet")
     client = bullet.connect(bullet.DIRECT)

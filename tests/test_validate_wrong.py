@@ -12,6 +12,7 @@ from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.variants import Variant, variants_of
 from tools.validate_faults.__main__ import blind, nowhere
 from tools.validate_faults.matrix import Cell, outcome_of
+from tools.validate_faults.other_cases import OTHER_CASES
 from tools.validate_faults.table import FAULTS, Fault
 
 NAMES = [fault.name for fault in FAULTS]
@@ -48,7 +49,10 @@ def test_no_wrong_parameter_is_on_record_as_missed() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
 def test_wrong_parameter_is_noticed_with_each_integrator_of_mujoco(fault: Fault) -> None:
-    assert outcomes(fault, "mujoco") == {"noticed"}
+    case = CASES[fault.case]
+    for variant in variants_of(parse_backend("mujoco")):
+        expected = fault.with_discrete if variant.integrator == "discrete" else "noticed"
+        assert outcome_of(fault, case, variant, sound(case.name, variant)) == expected
 
 
 @pytest.mark.slow
@@ -61,6 +65,21 @@ def test_wrong_parameter_is_noticed_on_pybullet_if_it_is_read(fault: Fault) -> N
 @pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
 def test_wrong_parameter_is_not_missed_where_pybullet_as_it_comes_is_right(fault: Fault) -> None:
     assert outcomes(fault, "pybullet:engine") == {fault.as_it_comes}
+
+
+def test_for_every_case_a_wrong_parameter_is_named_that_it_notices() -> None:
+    named = {fault.case for fault in FAULTS}
+    assert named | set(OTHER_CASES) == set(CASES)
+    assert not named & set(OTHER_CASES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OTHER_CASES)
+def test_a_case_that_no_wrong_parameter_names_notices_one(name: str) -> None:
+    word, integrator = OTHER_CASES[name]
+    (fault,) = [each for each in FAULTS if each.name == word]
+    variant = Variant(parse_backend("mujoco"), integrator)
+    assert outcome_of(fault, CASES[name], variant, sound(name, variant)) == "noticed"
 
 
 def test_a_case_that_notices_nothing_is_reported() -> None:

@@ -39,6 +39,15 @@ def reordered(*order: int) -> Edit:
     return edit
 
 
+def moved(distance: float) -> Edit:
+    """Return the edit that moves a place along x by a distance [m]."""
+
+    def edit(numbers: list[float]) -> list[float]:
+        return [numbers[0] + distance, *numbers[1:]]
+
+    return edit
+
+
 def leaning(angle: float) -> Edit:
     """Return the edit that turns a vector about y by a small angle [rad]."""
 
@@ -86,16 +95,20 @@ def _with_mjcf(case: Case, root: ET.Element) -> Case:
     return replace(case, mjcf="".join(ET.tostring(part, encoding="unicode") for part in root))
 
 
-def without(tags: str, name: str) -> Change:
-    """Return the change that leaves an attribute out of all elements of some tags."""
+def without(tags: str, names: str) -> Change:
+    """Return the change that leaves attributes out of all elements of some tags.
+
+    Args:
+        tags: Separated by spaces.
+        names: Of the attributes, separated by spaces.
+    """
 
     def change(case: Case) -> Case:
         root = ET.fromstring(f"<root>{case.mjcf}</root>")
         changed = False
         for element in root.iter():
-            if element.tag in tags.split() and name in element.attrib:
-                del element.attrib[name]
-                changed = True
+            for name in names.split() if element.tag in tags.split() else ():
+                changed = element.attrib.pop(name, None) is not None or changed
         if not changed:
             return case
         return _with_mjcf(case, root)

@@ -10,6 +10,7 @@ from .changes import (
     attribute,
     gravity,
     leaning,
+    moved,
     option,
     reordered,
     scaled,
@@ -39,6 +40,7 @@ class Fault:
         name: What is wrong, and by how much.
         case: Name of the case that has to notice it, on every engine that reads the parameter.
         change: Makes it wrong in a case.
+        with_discrete: What the case does on MuJoCo with its integrator discrete.
         on_pybullet: What the case does there with our backend.
         as_it_comes: What it does on PyBullet as its own users meet it.
     """
@@ -46,6 +48,7 @@ class Fault:
     name: str
     case: str
     change: Change
+    with_discrete: Outcome = "noticed"
     on_pybullet: Outcome = "noticed"
     as_it_comes: Outcome = "noticed"
 
@@ -55,7 +58,11 @@ _FRICTION = attribute("geom", "friction", scaled(1.01, 0, 1))
 _LESS_FRICTION = attribute("geom", "friction", scaled(0.99, 0, 1))
 _TORSION = attribute("geom", "friction", scaled(1.01, 1, 1))
 _ROLLING = attribute("geom", "friction", scaled(1.01, 2, 1))
+_PLACE = 0.001  # [m]
 _ONE_MASS = attribute(_BODIES, "mass", _BY_ONE_PERCENT, only_first=True)
+
+_MASS = attribute(_BODIES, "mass", _BY_ONE_PERCENT)
+_MORE_GRAVITY, _LESS_GRAVITY = gravity(_BY_ONE_PERCENT), gravity(scaled(0.99))
 
 FAULTS: tuple[Fault, ...] = (
     # Gravity and time.
@@ -220,5 +227,121 @@ FAULTS: tuple[Fault, ...] = (
         "quaternion of the inverse rotation",
         "rocking-time",
         attribute("geom body", "quat", scaled(-1.0, 1, 3)),
+    ),
+    # Of one case each, which notices no smaller or no other fault.
+    Fault("weight of a pin 1 % too large", "reaction-at-rest", _MASS, as_it_comes="refused"),
+    Fault(
+        "gravity of a pin 1 % too large", "reaction-moving", _MORE_GRAVITY, as_it_comes="refused"
+    ),
+    Fault(
+        "gravity 1 % too small of what swings on a pin",
+        "pinned-energy",
+        _LESS_GRAVITY,
+        as_it_comes="refused",
+    ),
+    Fault(
+        "gravity of a linkage 1 % too large",
+        "four-bar-period",
+        _MORE_GRAVITY,
+        as_it_comes="refused",
+    ),
+    Fault(
+        "bars of a linkage 1 % too long",
+        "four-bar-closure",
+        attribute("body", "pos", _BY_ONE_PERCENT),
+        as_it_comes="refused",
+    ),
+    Fault(
+        "time constant of a weld twice as long",
+        "weld-payload",
+        written("weld", "solref", "0.04 1"),
+        as_it_comes="refused",
+    ),
+    Fault(
+        "time constant of a loop twice as long",
+        "weld-loop",
+        written("weld", "solref", "0.04 1"),
+        as_it_comes="refused",
+    ),
+    Fault("gravity of a payload 1 % too large", "weld-droop", _MORE_GRAVITY, as_it_comes="refused"),
+    Fault(
+        "gear of a follower 1 % too large",
+        "mimic",
+        attribute("joint", "polycoef", _BY_ONE_PERCENT),
+        as_it_comes="refused",
+    ),
+    Fault("weight on a limit 1 % too large", "limit-force", _MASS, as_it_comes="refused"),
+    Fault("no limit", "limit-rebound", without("joint", "range limited"), as_it_comes="not read"),
+    Fault(
+        "time constant of friction 1 % too short",
+        "creep-of-solref",
+        written("geom", "solref", "0.0198 1"),
+        on_pybullet="not read",
+        as_it_comes="not read",
+    ),
+    Fault(
+        "slope of a roll 1 % too steep",
+        "sphere-rolls",
+        gravity(scaled(1.01, 0, 1)),
+        as_it_comes="wrong anyway",
+    ),
+    Fault(
+        "gravity on spheres 1 % too large", "sphere-grid", _MORE_GRAVITY, as_it_comes="wrong anyway"
+    ),
+    Fault(
+        "mass of a sphere on its shell",
+        "sphere-slides-then-rolls",
+        written("geom", "shellinertia", "true"),
+        as_it_comes="not read",
+    ),
+    Fault(
+        "friction of a sphere 1 % too small",
+        "sliding-time",
+        _LESS_FRICTION,
+        as_it_comes="not read",
+    ),
+    Fault(
+        "restitution of a bounce 1 % too small",
+        "bounce",
+        attribute("geom", "solref", scaled(_LESS_BOUNCE, 1, 1)),
+        with_discrete="wrong anyway",
+        on_pybullet="not read",
+        as_it_comes="not read",
+    ),
+    Fault(
+        "friction of a skid 1 % too large",
+        "sphere-skids",
+        _FRICTION,
+        as_it_comes="not read",
+    ),
+    Fault(
+        "gravity on a stack 1 % too large",
+        "stack-sag",
+        _MORE_GRAVITY,
+        on_pybullet="wrong anyway",
+        as_it_comes="wrong anyway",
+    ),
+    Fault(
+        "friction a third of what it is",
+        "held-box",
+        attribute("geom", "friction", scaled(1 / 3, 0, 1)),
+        as_it_comes="not read",
+    ),
+    Fault(
+        "place of one body 1 mm off",
+        "order-of-bodies",
+        attribute("body", "pos", moved(_PLACE), only_first=True),
+    ),
+    Fault(
+        "slope a tenth too steep",
+        "tipping-threshold",
+        gravity(scaled(1.1, 0, 1)),
+        as_it_comes="wrong anyway",
+    ),
+    Fault("gravity a fifth too small", "rocking-energy", gravity(scaled(0.8))),
+    Fault(
+        "block a tenth too wide",
+        "rocking-rebound",
+        attribute("geom", "size", scaled(1.1, 0, 1)),
     ),
 )

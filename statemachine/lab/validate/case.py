@@ -40,6 +40,7 @@ Discrete = Mapping[Integrator, Callable[[float], float]]  # of the timestep [s]
 
 GRAVITY = 9.81  # [m/s²]
 TIMESTEPS = (0.005, 0.002, 0.001, 0.0005)  # [s]
+FEW_TIMESTEPS = (0.005, 0.002, 0.001)  # [s] of an error that does not depend on the timestep
 ROUNDING = 1e-9  # the largest error that counts as exact, unless a case says another
 SLACK = 1.25  # what another make of processor or another compiler may add to an error
 EVERY = "*"  # every engine or integrator that no other key names
@@ -55,12 +56,14 @@ class Expectation:
         order: With which power of the timestep the error vanishes; None where it does not, or
             where rounding or chaos hides it.
         cause: What the error comes from.
+        note: More of the cause, in a sentence; "" where there is nothing to add.
     """
 
     verdict: Verdict
     within: float
     order: float | None
     cause: Cause
+    note: str = ""
 
 
 def exact(within: float = ROUNDING) -> Expectation:
@@ -83,9 +86,9 @@ def bounded(within: float, cause: Cause) -> Expectation:
     return Expectation("bounded", within * SLACK, None, cause)
 
 
-def wrong(within: float, cause: Cause, order: float | None = None) -> Expectation:
+def wrong(within: float, cause: Cause, order: float | None = None, note: str = "") -> Expectation:
     """Return the expectation of an engine that is known to be wrong, and by how much."""
-    return Expectation("wrong", within * SLACK, order, cause)
+    return Expectation("wrong", within * SLACK, order, cause, note)
 
 
 # Of an engine as it comes, whose motors hold each joint still that nothing drives.

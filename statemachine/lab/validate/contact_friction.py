@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from ...interface import Data
-from .case import GRAVITY, Case, bounded, converges, exact, wrong
-from .contact_incline import DIAGONAL, FRICTION, SLIDING, STICKS, block
+from .case import GRAVITY, Case, bounded, converges, exact, exact_steps, wrong
+from .contact_incline import DIAGONAL, FRICTION, SLIDING, STICKS, Incline, block
+from .contact_steps import skid
 from .contact_tools import PYRAMIDAL, ROUND, on_engines
 from .run import Run
 from .soft_contact import SoftContact
@@ -64,6 +65,20 @@ def creep_speed() -> float:
     """Return the speed at which a block creeps that MuJoCo's manual gives [m/s]."""
     pull, load = GRAVITY * math.sin(STICKS.angle), GRAVITY * math.cos(STICKS.angle)
     return SoftContact().creep_speed(load, pull)
+
+
+_SKID_TIME = 0.5  # [s]
+_SKIDS = Incline(1.2)
+_LOAD, _PULL = GRAVITY * math.cos(_SKIDS.angle), GRAVITY * math.sin(_SKIDS.angle)
+
+
+def _skidded(run: Run) -> float:
+    run.advance(_SKID_TIME)
+    return _position(run.data)
+
+
+def _skid() -> float:
+    return _SKIDS.acceleration() * _SKID_TIME**2 / 2.0
 
 
 CASES: tuple[Case, ...] = (
@@ -131,5 +146,29 @@ CASES: tuple[Case, ...] = (
         option=ROUND,
         relative=True,
         rounding=1e-7,
+    ),
+    Case(
+        name="sphere-skids",
+        group="contact",
+        description=(
+            "A sphere that cannot turn skids down an incline of 1.2 of the friction; its "
+            "way in half a second is measured."
+        ),
+        mjcf=_ON_SLIDES,
+        measure=_skidded,
+        truth=_skid,
+        unit="m",
+        source=SLIDING,
+        expected=on_engines(
+            mujoco=exact_steps(0.00083),
+            pybullet=converges(1.0, 0.00113),
+            own=wrong(0.106, "engine's own"),
+            rk4=converges(1.5, 1.4e-5, "contact model"),
+            discrete=converges(1.0, 0.00102),
+        ),
+        gravity=_SKIDS.gravity,
+        option=ROUND,
+        discrete=skid(SoftContact(), FRICTION, (_LOAD, _PULL), _SKID_TIME),
+        tolerance=0.001,
     ),
 )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from ...interface import Data
-from .case import GRAVITY, Case, bounded, converges, exact, wrong
+from .case import GRAVITY, Case, converges, exact, exact_steps, wrong
+from .contact_steps import Step, each_step, on_spring
 from .contact_tools import on_engines
 from .run import Run, zero
 from .soft_contact import spring_of_restitution
@@ -21,11 +22,13 @@ _POESCHEL = (
     "Matter 9 (2007)"
 )
 _RADIUS = 0.1  # [m]
+_GAP = 0.02  # [m] between the two that collide, at the start
+_FALL = math.sqrt(2.0 * HEIGHT / GRAVITY)  # [s]
 _TWO = (
-    f'<worldbody><body name="light" pos="-0.11 0 0"><freejoint/><geom type="sphere" '
-    f'size="{_RADIUS!r}" mass="{MASSES[0]!r}" {SOFT.mjcf}/></body>'
-    f'<body name="heavy" pos="0.11 0 0"><freejoint/><geom type="sphere" size="{_RADIUS!r}" '
-    f'mass="{MASSES[1]!r}" {SOFT.mjcf}/></body></worldbody>'
+    f'<worldbody><body name="light" pos="{-_RADIUS - _GAP / 2.0!r} 0 0"><freejoint/>'
+    f'<geom type="sphere" size="{_RADIUS!r}" mass="{MASSES[0]!r}" {SOFT.mjcf}/></body>'
+    f'<body name="heavy" pos="{_RADIUS + _GAP / 2.0!r} 0 0"><freejoint/>'
+    f'<geom type="sphere" size="{_RADIUS!r}" mass="{MASSES[1]!r}" {SOFT.mjcf}/></body></worldbody>'
 )
 _BALL = (
     f'<worldbody><geom type="plane" size="0 0 1" {SPRING.mjcf}/>'
@@ -58,6 +61,15 @@ def _restitution(run: Run) -> float:
     return parting / (VELOCITIES[0] - VELOCITIES[1])
 
 
+def _stepwise_restitution(step: Step, h: float) -> float:
+    """Return the same of steps of the length h [s], by the distance between the two."""
+    approach = VELOCITIES[0] - VELOCITIES[1]
+    place, speed = _GAP, -approach
+    for _ in range(round(1.0 / h)):
+        place, speed = step(on_spring(SOFT, 0.0), place, speed, h)
+    return speed / approach
+
+
 def _restitution_of_spring() -> float:
     return SOFT.restitution
 
@@ -68,10 +80,21 @@ def _height(data: Data) -> float:
 
 def _bounce(run: Run) -> float:
     """Return the height of the first bounce over that of the fall."""
-    fall = math.sqrt(2.0 * HEIGHT / GRAVITY)
-    run.advance(1.15 * fall)
-    heights = run.sample(1.7 * fall, _height).values
+    run.advance(1.15 * _FALL)
+    heights = run.sample(1.7 * _FALL, _height).values
     return float(heights.max()) / HEIGHT
+
+
+def _stepwise_bounce(step: Step, h: float) -> float:
+    """Return the same of steps of the length h [s]."""
+    place, speed = HEIGHT, 0.0
+    heights: list[float] = []
+    skipped = round(1.15 * _FALL / h)
+    for k in range(skipped + round(1.7 * _FALL / h)):
+        place, speed = step(on_spring(SPRING, GRAVITY), place, speed, h)
+        if k >= skipped:
+            heights.append(place)
+    return max(heights) / HEIGHT
 
 
 def _bounce_of_spring() -> float:
@@ -113,14 +136,15 @@ CASES: tuple[Case, ...] = (
         unit="",
         source=_POESCHEL,
         expected=on_engines(
-            mujoco=bounded(4e-4, "discretisation"),
+            mujoco=exact_steps(4e-4, None),
             pybullet=wrong(0.54, "computed by our backend"),
             own=wrong(0.54, "engine's own"),
-            rk4=converges(1.0, 0.0016),
+            rk4=exact_steps(0.0016),
             discrete=converges(0.8, 0.024),
         ),
         gravity=(0.0, 0.0, 0.0),
         tolerance=0.004,
+        discrete=each_step(_stepwise_restitution),
         timesteps=(0.002, 0.001, 0.0005, 0.00025),
     ),
     Case(
@@ -137,12 +161,13 @@ CASES: tuple[Case, ...] = (
         unit="",
         source=_POESCHEL,
         expected=on_engines(
-            mujoco=converges(0.5, 1.39),
+            mujoco=exact_steps(1.39),
             pybullet=wrong(0.301, "computed by our backend"),
             own=wrong(0.2982, "engine's own"),
-            rk4=converges(0.5, 0.094),
+            rk4=exact_steps(0.094),
             discrete=wrong(0.2, "discretisation"),
         ),
+        discrete=each_step(_stepwise_bounce),
         timesteps=(0.005, 0.002, 0.001, 0.0005, 0.00025),
     ),
     Case(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...interface.records import Array
-from .case import GRAVITY, Case, bounded, converges, exact, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
 from .contact_tools import PYRAMIDAL, ROUND, net_force, on_engines, one, tilted_gravity
 from .run import Run, zero
 
@@ -216,6 +216,7 @@ CASES: tuple[Case, ...] = (
         option=ROUND,
         tolerance=0.006,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="block-slides",

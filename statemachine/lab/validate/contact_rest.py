@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .case import GRAVITY, Case, bounded, exact, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, exact, wrong
 from .contact_tools import ROUND, forces_on, net_force, on_engines
 from .run import Run, zero
 from .soft_contact import SoftContact
@@ -79,6 +79,17 @@ def sag() -> float:
         inverse_mass = 1.0 if k == 0 else 2.0
         total += SoftContact().depth_at_rest(inverse_mass * (STACK - k) * GRAVITY / 4.0)
     return total
+
+
+# Measured on 3.0.1, 3.3.7, 3.4.0, 3.5.0, 3.7.0, 3.9.0 and 4.0.0.
+_HALF_OF_OVERLAP = wrong(
+    0.791,
+    "engine's own",
+    note=(
+        "Up to release 3.3.7 the distance of a contact between two boxes is half of their "
+        "overlap, so that they sink twice as deep; from 3.4.0 on it is all of it."
+    ),
+)
 
 
 def _weight_of_stack() -> float:
@@ -167,6 +178,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         rounding=1e-6,
         tolerance=0.001,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="contact-depth",
@@ -187,6 +199,7 @@ CASES: tuple[Case, ...] = (
         ),
         relative=True,
         rounding=1e-6,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="stack-force",
@@ -202,6 +215,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         rounding=1e-4,
         tolerance=0.002,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="stack-sag",
@@ -219,10 +233,12 @@ CASES: tuple[Case, ...] = (
             mujoco=exact(1e-5),
             pybullet=wrong(0.98, "contact model"),
             own=wrong(0.98, "contact model"),
-        ),
+        )
+        | {"mujoco==3.3.7 *": _HALF_OF_OVERLAP, "mujoco==3.0.1 *": _HALF_OF_OVERLAP},
         option=ROUND,
         relative=True,
         rounding=1e-5,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="groove-force",
@@ -239,12 +255,13 @@ CASES: tuple[Case, ...] = (
         relative=True,
         rounding=1e-6,
         tolerance=0.001,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="held-box",
         group="contact",
         description=(
-            "Two fingers press a box with 10 N each, four times what friction needs; how "
+            "Two fingers press a box with 10 N each, twice what friction needs; how "
             "far it slips in 1 s is measured."
         ),
         mjcf=_HELD,
@@ -260,6 +277,7 @@ CASES: tuple[Case, ...] = (
         option=ROUND,
         tolerance=0.005,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="order-of-bodies",
@@ -282,5 +300,6 @@ CASES: tuple[Case, ...] = (
         rounding=1e-6,
         tolerance=0.001,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
 )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Data
 from ...interface.records import Array
-from .case import GRAVITY, Case, bounded, converges, exact, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
 from .contact_tools import ROUND, on_engines, one, tilted_gravity, turned_about
 from .run import Run, Samples
 
@@ -212,6 +212,7 @@ CASES: tuple[Case, ...] = (
         option=ROUND,
         tolerance=0.006,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="sphere-slides-then-rolls",

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Data
 from ...interface.records import Array
-from .case import GRAVITY, Case, bounded, converges, exact, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
 from .contact_tools import ROUND, on_engines, one, tilted_gravity
 from .run import Run, Samples, zero, zero_crossings
 
@@ -152,6 +152,7 @@ CASES: tuple[Case, ...] = (
         option=ROUND,
         tolerance=0.04,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="rocking-time",
@@ -216,5 +217,6 @@ CASES: tuple[Case, ...] = (
         relative=True,
         tolerance=0.05,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
 )

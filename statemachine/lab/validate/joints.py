@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ...interface import Data
-from .case import GRAVITY, Case, bounded, converges, exact, refused, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, refused, wrong
 from .run import Run, zero
 
 _BODY = (
@@ -196,6 +196,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={"own": wrong(1.0, "engine's own"), "*": exact(5e-9)},
         rounding=5e-9,
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="servo-step",
@@ -246,6 +247,7 @@ CASES: tuple[Case, ...] = (
         source="Spong, section 6.1 (the speed of a motor without load)",
         relative=True,
         expected={"own": wrong(1.0, "engine's own"), "*": exact()},
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="dry-friction-below",
@@ -262,6 +264,7 @@ CASES: tuple[Case, ...] = (
             "own": exact(),
             "*": bounded(9.5e-4, "engine's own"),
         },
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="dry-friction-above",
@@ -274,6 +277,7 @@ CASES: tuple[Case, ...] = (
         source="Coulomb's law; Popov: Contact Mechanics and Friction (2010), section 10.2",
         relative=True,
         expected={"own": wrong(1.0, "engine's own"), "*": exact()},
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="dry-friction-stop",
@@ -302,6 +306,7 @@ CASES: tuple[Case, ...] = (
         source="Siciliano, section 7.2.1 (inertia of the rotor)",
         relative=True,
         expected={"own": wrong(1.0, "engine's own"), "*": exact()},
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="reflected-inertia",
@@ -314,6 +319,7 @@ CASES: tuple[Case, ...] = (
         source="Siciliano, section 5.2.1 (gears multiply an inertia by the square)",
         relative=True,
         expected={"own": refused(), "*": exact()},
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="mimic",
@@ -330,5 +336,6 @@ CASES: tuple[Case, ...] = (
             "own": refused(),
             "*": bounded(1.14e-4, "engine's own"),
         },
+        timesteps=FEW_TIMESTEPS,
     ),
 )

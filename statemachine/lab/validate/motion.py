@@ -13,6 +13,7 @@ import numpy as np
 from ...interface import Data
 from ...interface.records import Array
 from .case import (
+    FEW_TIMESTEPS,
     GRAVITY,
     NO_MOTION,
     Case,
@@ -319,6 +320,7 @@ CASES: tuple[Case, ...] = (
         unit="m/s",
         source="Goldstein, section 1.5 (friction proportional to the velocity)",
         expected={"own": wrong(2.46, "engine's own"), "*": exact()},
+        timesteps=FEW_TIMESTEPS,
     ),
     Case(
         name="order-of-branches",
@@ -331,5 +333,6 @@ CASES: tuple[Case, ...] = (
         unit="rad",
         source="Landau and Lifshitz, section 2 (the names of coordinates do not matter)",
         expected={"own": NO_MOTION, "*": exact()},
+        timesteps=FEW_TIMESTEPS,
     ),
 )

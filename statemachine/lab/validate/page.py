@@ -36,7 +36,7 @@ class _CasePart:
         work: Table of what each error costs: time of the run at each timestep, and steps a second.
         curves: Work against precision, a curve for each engine and integrator; none where
             there is no error to draw.
-        refusals: Sentences about the engines that do not take the case.
+        notes: Sentences about causes, and about the engines that do not take the case.
     """
 
     result: CaseResult
@@ -44,7 +44,7 @@ class _CasePart:
     verdicts: Table
     work: Table
     curves: Sequence[Traces]
-    refusals: Sequence[str]
+    notes: Sequence[str]
 
     @property
     def truth(self) -> str:
@@ -203,11 +203,11 @@ def _worst(results: Sequence[CaseResult], most: int) -> Table:
         worst.setdefault((row.name, row.backend), row)
     for row in list(worst.values())[:most]:
         error = row.measurements[0].error if row.measurements else None
-        rows.append((row.name, row.way, _error(row, error), _order(row), _verdict(row)))
+        rows.append((row.name, row.way, error_of_row(row, error), order_text(row), _verdict(row)))
     return Table(headers, rows, words=frozenset({0, 1, 4}))
 
 
-def _error(row: CaseResult, error: float | None) -> str:
+def error_of_row(row: CaseResult, error: float | None) -> str:
     """Return an error of a case as it is read."""
     return error_text(error, row.error_unit)
 
@@ -228,8 +228,9 @@ def error_text(error: float | None, unit: str) -> str:
     return quantity(error, unit)
 
 
-def _order(row: CaseResult) -> str:
-    return NO_NUMBER if row.order is None else f"{row.order:.1f}"
+def order_text(row: CaseResult) -> str:
+    """Return the order as it is read; a dash where none is seen."""
+    return NO_NUMBER if row.order is None else f"{row.order:z.1f}"
 
 
 def _verdict(row: CaseResult) -> str:
@@ -245,13 +246,15 @@ def _part(rows: Sequence[CaseResult]) -> _CasePart:
     errors: list[tuple[str, ...]] = []
     verdicts: list[tuple[str, ...]] = []
     work: list[tuple[str, ...]] = []
-    refusals: list[str] = []
+    notes: list[str] = []
     for row in rows:
         if not row.measurements:
-            refusals.append(f"{row.way}: {row.refusal}")
+            notes.append(f"{row.way}: {row.refusal}")
             continue
-        sizes = [_error(row, measurement.error) for measurement in row.measurements]
-        errors.append((row.way, *sizes, _order(row)))
+        if row.expectation is not None and row.expectation.note:
+            notes.append(f"{row.backend}: {row.expectation.note}")
+        sizes = [error_of_row(row, measurement.error) for measurement in row.measurements]
+        errors.append((row.way, *sizes, order_text(row)))
         cause = NO_NUMBER if row.cause is None else row.cause
         verdicts.append((row.way, row.verdict, cause, row.status))
         work.append((row.way, *_costs(row)))
@@ -261,7 +264,7 @@ def _part(rows: Sequence[CaseResult]) -> _CasePart:
         verdicts=Table(_VERDICT_HEADERS, verdicts, words=frozenset(range(4))),
         work=Table(("engine", *steps, "steps/s"), work),
         curves=_curves(rows),
-        refusals=refusals,
+        notes=list(dict.fromkeys(notes)),
     )
 
 
@@ -327,9 +330,9 @@ def junit_of(result: ValidateResult) -> str:
 
 def _failure(row: CaseResult) -> str:
     """Return what a failed test says: what came of it, and what is on record."""
-    sizes = ", ".join(_error(row, measurement.error) for measurement in row.measurements)
+    sizes = ", ".join(error_of_row(row, measurement.error) for measurement in row.measurements)
     record = "nothing"
     if row.expectation is not None:
         within = quantity(row.expectation.within, row.error_unit)
         record = f"{row.expectation.verdict}, within {within}"
-    return f"{row.verdict} (errors {sizes}, order {_order(row)}); on record: {record}"
+    return f"{row.verdict} (errors {sizes}, order {order_text(row)}); on record: {record}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...interface import Data
 from ...interface.records import Array
-from .case import GRAVITY, NO_MOTION, Case, bounded, converges, exact
+from .case import FEW_TIMESTEPS, GRAVITY, NO_MOTION, Case, bounded, converges, exact
 from .run import Run, largest_deviation, zero, zero_crossings
 
 # A pendulum: a point mass at 1 m.
@@ -226,5 +226,6 @@ CASES: tuple[Case, ...] = (
         },
         tolerance=0.2,
         is_chaotic=True,
+        timesteps=FEW_TIMESTEPS,
     ),
 )
