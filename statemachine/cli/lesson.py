@@ -166,7 +166,7 @@ def run(options: argparse.Namespace) -> int:
         shown = dropwhile(lambda block: not isinstance(block, Heading), page.blocks)
         page = replace(page, blocks=list(shown))
     names = list(LESSONS)
-    later = names[names.index(request.name) + 1 :]
+    later = [] if request.lesson.ends_course else names[names.index(request.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else SAY("exercise")
     footer = SAY("next", command=command_as_called(following))
     try:

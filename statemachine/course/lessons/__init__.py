@@ -61,6 +61,7 @@ class Lesson:
         options: On the command line.
         on_path: Whether the guided path has it.
         plots: Whether it has pictures for a file.
+        ends_course: Whether the exercises come next, and no further lesson.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Lesson:
     options: tuple[Option, ...] = ()
     on_path: bool = True
     plots: bool = False
+    ends_course: bool = False
 
     @property
     def defaults(self) -> dict[str, Any]:
@@ -192,7 +194,28 @@ _LESSONS = (
         "What can you do now, and what is next?",
         "so101/scene_box",
     ),
-    Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),
+    Lesson(
+        "questions",
+        "Check yourself: six questions.",
+        "so101/scene_box",
+        on_path=False,
+        ends_course=True,
+    ),
+    Lesson(
+        "step",
+        "What does one step do?",
+        "so101/scene",
+        (Option("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),),
+        on_path=False,
+    ),
+    Lesson(
+        "energy",
+        "Which integrator keeps energy?",
+        "tumbling",
+        (Option("--seconds", "S", "simulated time (default 20)", {"default": 20.0}),),
+        on_path=False,
+        plots=True,
+    ),
 )
 
 # Lessons that were, and the command that now shows what they taught.

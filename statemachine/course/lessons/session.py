@@ -197,7 +197,7 @@ class LessonRun:
         result: What its module measured, a dataclass of that module.
         code: Its code as it was typed.
         printed: What the code printed.
-        arm: Whether it was taken on an SO-101, which is what its text is about.
+        arm: Whether it was taken on what its text is about, the SO-101 but for a few lessons.
         calls: What the code made the engine do; None where that was not asked for, or where the
             engine's room cannot tell.
         diagram: What its module draws of the model; None where it draws nothing.
@@ -242,7 +242,14 @@ def take(
     recording = _recorded(code, backend) if calls else None
     draw = getattr(lesson_module, "diagram", None)
     diagram = draw(model) if draw else None
-    return LessonRun(result, code, play.printed, is_so101(model), recording, diagram)
+    return LessonRun(
+        result=result,
+        code=code,
+        printed=play.printed,
+        arm=is_so101(model) or not lesson.model.startswith("so101/"),
+        calls=recording,
+        diagram=diagram,
+    )
 
 
 def code_as_typed(

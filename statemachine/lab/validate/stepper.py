@@ -142,23 +142,35 @@ class Stepper:
             DivergedError: A coordinate stopped being finite.
         """
         for _ in range(nstep):
-            self._step_once()
+            self.advance_once()
 
-    def _step_once(self) -> None:
-        timestep = self.model.timestep
+    def advance_once(self) -> None:
+        """Make one step: every term of it has a line.
+
+        Raises:
+            DivergedError: A coordinate stopped being finite.
+        """
+        h = self.model.timestep
         mass_matrix = self.mass_matrix()
         force = self.servo_force() + self.damping_force() - self.bias()
         force += self.friction_force(mass_matrix, force)
-        implicit_mass = mass_matrix + timestep * np.diag(self.implicit_damping())
+        implicit_mass = mass_matrix + h * np.diag(self.implicit_damping())
         acceleration = np.linalg.solve(implicit_mass, force)
         old_velocity = self.qvel.copy()
-        self.qvel += timestep * acceleration
-        if self.terms.position_update == "new velocity":
-            self.qpos += timestep * self.qvel
-        else:
-            self.qpos += timestep * old_velocity
-        self.time += timestep
+        self.qvel += h * acceleration
+        self.qpos += h * self.velocity_of_positions(old_velocity)
+        self.time += h
         self._check_is_finite()
+
+    def velocity_of_positions(self, old_velocity: Array) -> Array:
+        """Return the velocity that moves the positions (nv,): the new one, or that before the step.
+
+        Args:
+            old_velocity: (nv,) [rad/s; of a slide, m/s].
+        """
+        if self.terms.position_update == "old velocity":
+            return old_velocity
+        return self.qvel
 
     def mass_matrix(self) -> Array:
         """Return the mass matrix (nv, nv) by the composite rigid body algorithm, with armature."""
@@ -168,7 +180,7 @@ class Stepper:
     def bias(self) -> Array:
         """Return what gravity and rotation exert (nv,), by the recursive Newton-Euler algorithm.
 
-        It is the force that holds the joints at an acceleration of zero [N m; of a slide, N].
+        It holds the joints at an acceleration of zero [N m; of a slide, N].
         """
         velocity = self.qvel if self.terms.coriolis else np.zeros(self.model.nv)
         at_rest = np.zeros(self.model.nv)
@@ -188,10 +200,7 @@ class Stepper:
         return on_joints
 
     def damping_force(self) -> Array:
-        """Return what the joint damping exerts at the velocity before the step (nv,).
-
-        It is in N m; of a slide, in N.
-        """
+        """Return the joint damping at the velocity before the step (nv,) [N m; of a slide, N]."""
         if self.terms.damping == "none":
             return np.zeros(self.model.nv)
         return -self.model.dof_damping * self.qvel
@@ -288,9 +297,8 @@ def bounded_force(
 ) -> Array:
     """Return the force f (n,) with compliance f = target, each within its limit.
 
-    Where the force of a row would be beyond its limit, it is at its limit. Each row is solved in
-    turn until none changes (the projected Gauss-Seidel method, which converges for a symmetric
-    positive definite matrix).
+    Each row is solved in turn until none changes: the projected Gauss-Seidel method, which
+    converges for a symmetric positive definite matrix.
 
     Args:
         compliance: (n, n) Acceleration of each row for the force of each.
