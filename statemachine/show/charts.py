@@ -124,7 +124,7 @@ def write_pictures(blocks: Sequence[Block], path: Path) -> int:
 
 
 def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
-    """Pictures one above the other, as svg, png or pdf.
+    """Draw pictures one above the other, as svg, png or pdf.
 
     Raises:
         MissingEngineError: matplotlib is not installed.
@@ -159,7 +159,7 @@ def draw_picture(axes: Any, picture: Drawn) -> None:
 
 
 def chart(picture: Traces, size: tuple[float, float], box: Box) -> str:
-    """Curves as SVG without a legend, where something of the caller's goes along the axis of time.
+    """Draw curves as SVG without a legend, where something goes along the axis of time.
 
     Args:
         picture: The curves.
@@ -271,7 +271,7 @@ def _log_axis(axes: Any, values: Array, tolerance: float | None) -> float:
 
 
 def _parted(x: Array, y: Array) -> tuple[Array, Array]:
-    """Points of a line that is broken where it comes from zero or goes there.
+    """Return points of a line that is broken where it comes from zero or goes there.
 
     Between zero and another value lie all powers of ten, and the line was at none of them.
     """
@@ -280,7 +280,7 @@ def _parted(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _bars(axes: Any, picture: Bars) -> None:
-    """Bars from left to right, those of a name one below the other."""
+    """Draw bars from left to right, those of a name one below the other."""
     high = 0.8 / len(picture.bars)
     for k, (what, bars) in enumerate(picture.bars.items()):
         places = [n + (k + 0.5) * high - 0.4 for n in range(len(bars))]

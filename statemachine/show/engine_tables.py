@@ -39,7 +39,7 @@ class Origin(Protocol):
 
     @property
     def timestep(self) -> float:
-        """Simulated time of a step [s]."""
+        """Return the simulated time of a step [s]."""
         ...
 
     @property

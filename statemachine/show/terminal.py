@@ -188,7 +188,7 @@ class Printer:
 
 
 def spelled(error: Any) -> tuple[str, int]:
-    """Error handler of a stream that is written to: what its encoding lacks, in ASCII.
+    """Replace what the encoding of a stream lacks, in ASCII, as its error handler.
 
     A page has it replaced before its tables are laid out; this is for every other line.
     """

@@ -191,7 +191,7 @@ def _as_typed(text: str, is_code: bool) -> str:
 
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
-    """Engines that printed the same, once: their names and the text."""
+    """Return the engines that printed the same, once: their names and the text."""
     from ..measures.text import grouped  # its room loads NumPy
 
     engines = grouped((text, name) for name, text in by_engine.items())
@@ -257,7 +257,7 @@ def _broken(cell: str, width: int) -> str:
 
 
 def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> Sequence[int]:
-    """Widths of columns, which break no number, and of names the longest, as far as they can."""
+    """Return widths of columns, which break no number, and of names the longest if they can."""
     columns = list(zip(*rows, strict=True))
     least = least_widths(rows, words)
     free = width - sum(least) - _GAP * (len(least) - 1)

@@ -73,7 +73,7 @@ class ClassPage(PageContent):
 
     @property
     def made_with(self) -> str:
-        """Versions and settings."""
+        """Return versions and settings."""
         return self.result.entries[0].made_with
 
     @property
@@ -96,12 +96,12 @@ class ClassPage(PageContent):
 
     @property
     def groups(self) -> list[_Group]:
-        """Groups of submissions that are alike."""
+        """Return groups of submissions that are alike."""
         return [_Group(group) for group in self.result.alike]
 
     @property
     def pairs(self) -> list[_Pair]:
-        """Submissions that are nearly alike, two by two."""
+        """Return submissions that are nearly alike, two by two."""
         return [_Pair(each.students, _percent(each.likeness)) for each in self.result.nearly_alike]
 
     @property

@@ -87,7 +87,7 @@ class ClassEntry:
     @property
     @only_on_pages
     def reasons_not_judged(self) -> tuple[str, ...]:
-        """Why there is no verdict on it, or on some of its functions, each reason once."""
+        """Return why it, or some of its functions, has no verdict, each reason once."""
         if self.judged:
             return ()
         if self.refusal:

@@ -162,7 +162,7 @@ class ExerciseJudge(ExitStack):
         time_limit: float = TIME_LIMIT,
         wall_limit: float = WALL_LIMIT,
     ) -> None:
-        """Arguments as `run` has them."""
+        """Take the arguments of `run`."""
         super().__init__()
         check_settings(backend, time_limit)
         engine = backend_engine(backend)

@@ -45,12 +45,12 @@ class StudentCode:
 
     @cached_property
     def all_shingles(self) -> frozenset[str]:
-        """Digests of all shingles."""
+        """Return the digests of all shingles."""
         return frozenset().union(*self.shingles.values())
 
     @property
     def size(self) -> int:
-        """Number of different shingles: about one for each token."""
+        """Return the number of different shingles: about one for each token."""
         return len(self.all_shingles)
 
     def without(self, other: frozenset[str]) -> StudentCode:

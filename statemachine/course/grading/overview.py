@@ -58,7 +58,7 @@ class Mistake:
 
     @property
     def count(self) -> int:
-        """Number of students who made it."""
+        """Return the number of students who made it."""
         return len(self.students)
 
 
@@ -100,13 +100,13 @@ class ClassResult:
     @property
     @only_on_pages
     def counted(self) -> Sequence[ClassEntry]:
-        """Submissions that count: with a roster, files of nobody on it do not."""
+        """Return the submissions that count: with a roster, files of nobody on it do not."""
         return counted(self.entries)
 
     @property
     @only_on_pages
     def strangers(self) -> Sequence[ClassEntry]:
-        """Submissions of nobody on the roster; none without a roster."""
+        """Return the submissions of nobody on the roster; none without a roster."""
         if not any(entry.student for entry in self.entries):
             return ()
         return [entry for entry in self.entries if not entry.student]

@@ -78,13 +78,13 @@ class FaultsPage(PageContent):
 
     @property
     def failures(self) -> list[str]:
-        """Tests that fail on the healthy arm, each with the beginning of what it says."""
+        """Return the tests that fail on the healthy arm, each with the start of what it says."""
         failures = self.examination.failures
         return [_cut(f"{failure.test}: {failure.why}", _SHOWN) for failure in failures]
 
     @property
     def idle_tests(self) -> tuple[str, ...]:
-        """Tests that caught none of several faults."""
+        """Return the tests that caught none of several faults."""
         return self.examination.idle if len(self.examination.trials) > 1 else ()
 
 

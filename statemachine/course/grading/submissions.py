@@ -41,7 +41,7 @@ class Submission:
 
     @property
     def files(self) -> dict[str, Path]:
-        """Files that belong to it, by their names in its folder; alone in that of a class."""
+        """Return the files that belong to it, by their names in its folder; alone in a class's."""
         if self.folder:
             return in_folder(self.folder)
         return {self.path.name: self.path} if self.path else {}

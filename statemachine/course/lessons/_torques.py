@@ -36,12 +36,12 @@ class Torques:
 
     @property
     def most(self) -> Array:
-        """(k,) the largest in the run [N·m; of a slide, N]."""
+        """Return the largest in the run (k,) [N·m; of a slide, N]."""
         return np.abs(self.exerted).max(axis=0)
 
     @property
     def last(self) -> Array:
-        """(k,) that in the last step [N·m; of a slide, N]."""
+        """Return that in the last step (k,) [N·m; of a slide, N]."""
         return self.exerted[-1]
 
     @property

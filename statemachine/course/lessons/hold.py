@@ -80,12 +80,12 @@ class HoldResult:
 
     @property
     def error(self) -> Array:
-        """(n+1,) the worst joint's distance to the target [rad; of a slide, m]."""
+        """Return the worst joint's distance to the target (n+1,) [rad; of a slide, m]."""
         return self.distances().max(axis=1)
 
     @property
     def first_contact(self) -> float | None:
-        """When the robot first touches something, or itself [s]; None if it never does."""
+        """Return when the robot first touches something, or itself [s]; None if it never does."""
         for time, pairs in zip(self.time, self.pairs, strict=True):
             if pairs:
                 return float(time)

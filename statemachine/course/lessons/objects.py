@@ -85,7 +85,7 @@ class ObjectsResult:
 
 
 def run(play: CodeRun, options: Options, progress: Progress) -> ObjectsResult:
-    """Time the parts, then let several Data of the Model step in turn."""
+    """Measure the parts' times, then let several Data of the Model step in turn."""
     model, worlds = play.model, options["worlds"]
     before = _arrays(model)
     play()

@@ -88,7 +88,7 @@ class ReplayResult:
 
     @property
     def qpos(self) -> Array:
-        """(nq,) at the end of the first run."""
+        """Return qpos (nq,) at the end of the first run."""
         return self.first_run[-1]
 
     @property
@@ -103,12 +103,12 @@ class ReplayResult:
 
     @property
     def difference(self) -> Array:
-        """(n+1,) largest |qpos difference| after each step [rad, m or part of a quaternion]."""
+        """Return the largest |qpos difference| after each step (n+1,) [rad, m or quaternion]."""
         return np.abs(self.first_run - self.second_run).max(axis=1)
 
     @property
     def apart(self) -> Array | None:
-        """(n+1,) distance of the free body's positions in the two runs [m]; None without one."""
+        """Return the distance of the free body in the two runs (n+1,) [m]; None without one."""
         if self.free is None:
             return None
         gap = self.first_run - self.second_run
@@ -116,7 +116,7 @@ class ReplayResult:
 
     @property
     def travel(self) -> float:
-        """Largest movement of a hinge in the first run [rad]."""
+        """Return the largest movement of a hinge in the first run [rad]."""
         hinges = self.first_run[:, list(self.hinges)]
         return float(np.ptp(hinges, axis=0).max(initial=0.0))
 

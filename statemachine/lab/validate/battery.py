@@ -90,7 +90,7 @@ class CaseResult:
 
     @property
     def way(self) -> str:
-        """The engine and how it steps: "mujoco Euler"."""
+        """Return the engine and how it steps: "mujoco Euler"."""
         return self.backend if self.integrator == OWN else f"{self.backend} {self.integrator}"
 
     @property
@@ -105,32 +105,32 @@ class CaseResult:
 
     @property
     def description(self) -> str:
-        """What happens and what is measured."""
+        """Return what happens and what is measured."""
         return self.case.description
 
     @property
     def source(self) -> str:
-        """Textbook and section, or paper, of the closed form."""
+        """Return textbook and section, or paper, of the closed form."""
         return self.case.source
 
     @property
     def unit(self) -> str:
-        """Unit of the truth and of what is measured."""
+        """Return the unit of the truth and of what is measured."""
         return self.case.unit
 
     @property
     def error_unit(self) -> str:
-        """Unit of the errors; "" where they are relative."""
+        """Return the unit of the errors; "" where they are relative."""
         return self.case.error_unit
 
     @property
     def cause(self) -> Cause | None:
-        """What the error comes from; None where that is not on record."""
+        """Return what the error comes from; None where that is not on record."""
         return None if self.expectation is None else self.expectation.cause
 
     @property
     def worst(self) -> float | None:
-        """Largest size of an error [error_unit]; None if a run has none."""
+        """Return the largest size of an error [error_unit]; None if a run has none."""
         sizes: list[float] = []
         for measurement in self.measurements:
             if measurement.error is None:
@@ -140,7 +140,7 @@ class CaseResult:
 
     @property
     def holds(self) -> bool:
-        """Whether the engine is right, or as wrong as its record says."""
+        """Tell whether the engine is right, or as wrong as its record says."""
         if self.status == "not on record":
             return self.verdict not in ("wrong", "diverges")
         return self.status != "worse"
@@ -162,7 +162,7 @@ class ValidateResult:
 
     @property
     def holds(self) -> bool:
-        """Whether all is as its record says, or better."""
+        """Tell whether all is as its record says, or better."""
         return all(result.holds for result in self.results)
 
 

@@ -163,7 +163,7 @@ class Case:
 
     @property
     def error_unit(self) -> str:
-        """Unit of its error; "" for a relative one."""
+        """Return the unit of its error; "" for a relative one."""
         return "" if self.relative else self.unit
 
     def error_of(self, measured: float, truth: float) -> float:

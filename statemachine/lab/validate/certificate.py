@@ -33,17 +33,17 @@ class _OfEngines:
 
     @property
     def version(self) -> str:
-        """Version of the witness."""
+        """Return the version of the witness."""
         return self.result.provenance.versions[WITNESS]
 
     @property
     def seed(self) -> str:
-        """Seed of the random poses."""
+        """Return the seed of the random poses."""
         return str(self.result.provenance.seed)
 
     @property
     def choice(self) -> _Choice:
-        """How the sites or bodies were chosen."""
+        """Return how the sites or bodies were chosen."""
         if not self.result.chosen:
             return "asked for"
         if not self.result.has_one_tip:
@@ -52,36 +52,36 @@ class _OfEngines:
 
     @property
     def renamed_tip(self) -> bool:
-        """Whether the one site or body goes by another name for the witness."""
+        """Tell whether the one site or body goes by another name for the witness."""
         return self.result.has_one_tip and self.result.has_other_names
 
     @property
     def balanced(self) -> tuple[str, ...]:
-        """Bodies whose inertia was balanced."""
+        """Return the bodies whose inertia was balanced."""
         repairs = [repair for repair in self.result.repairs if not repair.is_massless]
         return tuple(repair.name for repair in repairs if repair.quantity == "inertia")
 
     @property
     def massless(self) -> tuple[str, ...]:
-        """Bodies that move without mass, and got the least that the engine takes."""
+        """Return the bodies that move without mass, and got the least that the engine takes."""
         names = [repair.name for repair in self.result.repairs if repair.is_massless]
         return tuple(dict.fromkeys(names))
 
     @property
     def left_out_meshes(self) -> tuple[str, ...]:
-        """Meshes that were left out."""
+        """Return the meshes that were left out."""
         repairs = self.result.repairs
         return tuple(repair.name for repair in repairs if repair.kind == "mesh")
 
     @property
     def renamed_joints(self) -> tuple[str, ...]:
-        """Joints of other names for the witness, each with that name."""
+        """Return the joints of other names for the witness, each with that name."""
         pairs = self.result.renamed_joints
         return tuple(f"{pair.joint} is {pair.witness_joint}" for pair in pairs)
 
     @property
     def offset(self) -> str:
-        """How far the two frames are apart."""
+        """Return how far the two frames are apart."""
         return _offset(self.result.frames)
 
 

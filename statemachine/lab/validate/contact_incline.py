@@ -36,17 +36,17 @@ class Incline:
 
     @property
     def angle(self) -> float:
-        """Angle of the incline [rad]."""
+        """Return the angle of the incline [rad]."""
         return math.atan(self.steepness * FRICTION)
 
     @property
     def gravity(self) -> tuple[float, float, float]:
-        """Gravity in the axes of the plane [m/s²]."""
+        """Return gravity in the axes of the plane [m/s²]."""
         return tilted_gravity(self.angle, self.direction)
 
     @property
     def downhill(self) -> Array:
-        """Unit vector along the slope, (2,)."""
+        """Return the unit vector along the slope, (2,)."""
         return np.array([math.cos(self.direction), math.sin(self.direction)])
 
     def acceleration(self) -> float:

@@ -48,7 +48,7 @@ class _CasePart:
 
     @property
     def truth(self) -> str:
-        """The closed form, with its unit."""
+        """Return the closed form, with its unit."""
         return quantity(self.result.truth, self.result.unit)
 
 
@@ -90,28 +90,28 @@ class ValidatePage(PageContent):
 
     @property
     def origin(self) -> str:
-        """The engines, each with its version."""
+        """Return the engines, each with its version."""
         versions = self.result.versions.items()
         return ", ".join(f"{backend} ({version})" for backend, version in versions)
 
     @property
     def total(self) -> int:
-        """Number of results."""
+        """Return the number of results."""
         return len(self.result.results)
 
     @property
     def wrong(self) -> int:
-        """Number of results that are wrong or diverge."""
+        """Return the number of results that are wrong or diverge."""
         return _count(self.result.results, _WRONG)
 
     @property
     def worse(self) -> list[str]:
-        """What is worse than its record, each as "case on engine"."""
+        """Return what is worse than its record, each as "case on engine"."""
         return [_label(row) for row in self.result.results if not row.holds]
 
     @property
     def better(self) -> list[str]:
-        """What is better than its record, each as "case on engine"."""
+        """Return what is better than its record, each as "case on engine"."""
         return [_label(row) for row in self.result.results if row.status == "better"]
 
 

@@ -46,7 +46,7 @@ class Run:
 
     @property
     def timestep(self) -> float:
-        """Length of a step [s]."""
+        """Return the length of a step [s]."""
         return self.model.timestep
 
     def advance(self, duration: float) -> None:

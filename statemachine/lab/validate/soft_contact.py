@@ -42,12 +42,12 @@ class SoftContact:
 
     @property
     def damping(self) -> float:
-        """Factor b of the speed [1/s]."""
+        """Return the factor b of the speed [1/s]."""
         return 2.0 / (self.most * self.time_constant)
 
     @property
     def stiffness(self) -> float:
-        """Factor k of the depth [1/s²]."""
+        """Return the factor k of the depth [1/s²]."""
         return 1.0 / (self.most * self.time_constant * self.damping_ratio) ** 2
 
     def depth_at_rest(self, load: float) -> float:
@@ -102,7 +102,7 @@ class Spring:
 
     @property
     def mjcf(self) -> str:
-        """The attributes of a geom without friction that make it."""
+        """Return the attributes of a geom without friction that make it."""
         return (
             f'condim="1" solref="{-self.stiffness!r} {-self.damping!r}" '
             f'solimp="{self.impedance!r} {self.impedance!r} 0.001"'
@@ -110,7 +110,7 @@ class Spring:
 
     @property
     def restitution(self) -> float:
-        """Speed after a collision over that before, without gravity.
+        """Return the speed after a collision over that before, without gravity.
 
         The contact ends where its force does, before the spring is relaxed: it cannot pull.
         """
@@ -149,7 +149,7 @@ class Spring:
 
     @property
     def _rates(self) -> tuple[float, float]:
-        """Decay [1/s] and frequency [rad/s] of the damped spring."""
+        """Return decay [1/s] and frequency [rad/s] of the damped spring."""
         decay = self.damping / 2.0
         return decay, math.sqrt(self.stiffness - decay**2)
 

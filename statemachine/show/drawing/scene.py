@@ -42,7 +42,7 @@ class Camera:
 
     @property
     def axes(self) -> tuple[Array, Array, Array]:
-        """Unit vectors (3,): right, up and forward in the picture."""
+        """Return unit vectors (3,): right, up and forward in the picture."""
         a, e = math.radians(self.azimuth), math.radians(self.elevation)
         right = np.array([math.sin(a), -math.cos(a), 0.0])
         forward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
@@ -50,17 +50,17 @@ class Camera:
 
     @property
     def eye(self) -> Array:
-        """(3,) where it stands [m]."""
+        """Return where it stands (3,) [m]."""
         return np.asarray(self.target) - self.distance * self.axes[2]
 
     @property
     def near(self) -> float:
-        """Nearest that is drawn [m]."""
+        """Return the nearest that is drawn [m]."""
         return 0.05 * self.distance
 
     @property
     def far(self) -> float:
-        """Farthest that is drawn [m]."""
+        """Return the farthest that is drawn [m]."""
         return 20.0 * self.distance
 
 
@@ -108,7 +108,7 @@ class Motion:
     xquat: Array
 
     def corners(self) -> Array:
-        """Corners (n, 3) of boxes about all that belongs to a body, at some of the moments."""
+        """Return corners (n, 3) of boxes about all that belongs to a body, at some moments."""
         rows = np.unique(np.linspace(0, len(self.xpos) - 1, _MOMENTS).astype(int))
         xpos, turn = self.xpos[rows], matrix_from_quat(self.xquat[rows])
         finite = [part for part in self.drawing.parts if not part.endless]
@@ -133,7 +133,7 @@ def posed(model: Model, qpos: Array) -> Iterator[Data]:
 
 
 def poses_through(model: Model, qpos: Array) -> tuple[Array, Array]:
-    """Xpos (n, nbody, 3) and xquat (n, nbody, 4) of qpos (n, nq), by MuJoCo's kinematics."""
+    """Return xpos (n, nbody, 3) and xquat (n, nbody, 4) of qpos (n, nq), by MuJoCo."""
     xpos, xquat = (np.empty((len(qpos), model.nbody, size)) for size in (3, 4))
     for k, data in enumerate(posed(on_default(model), qpos)):
         xpos[k], xquat[k] = data.xpos, data.xquat

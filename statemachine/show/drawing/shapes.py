@@ -191,7 +191,7 @@ class Drawing:
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Ids of the bodies that have a part."""
+        """Return the ids of the bodies that have a part."""
         return tuple(sorted({part.body for part in self.parts}))
 
 

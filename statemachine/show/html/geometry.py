@@ -100,7 +100,7 @@ def packed(array: Any, kind: str) -> str:
 
 
 def quantised(values: Any, low: Any, span: Any) -> Any:
-    """Values from `low` to `low + span` as whole numbers from 0 to 65535."""
+    """Return values from `low` to `low + span` as whole numbers from 0 to 65535."""
     scaled = (np.asarray(values, dtype=np.float64) - low) / span
     return np.round(np.clip(scaled, 0.0, 1.0) * 65535)
 

@@ -77,7 +77,7 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
 
 
 def joined(parts: Iterable[object]) -> Html:
-    """Parts one after the other."""
+    """Join parts one after the other."""
     return Html("".join(escaped(part) for part in parts))
 
 
@@ -103,5 +103,5 @@ def data_of(value: Any) -> Html:
 
 
 def _printable(text: str) -> str:
-    """Without characters that a browser refuses, or that turn the text around."""
+    """Remove characters that a browser refuses, or that turn the text around."""
     return _TURNS.sub(" ", "".join(c if c >= " " else " " for c in text))

@@ -65,12 +65,12 @@ class Examination:
 
     @property
     def missed(self) -> tuple[Fault, ...]:
-        """Faults that no test caught."""
+        """Return the faults that no test caught."""
         return tuple(trial.fault for trial in self.trials if not trial.caught)
 
     @property
     def idle(self) -> tuple[str, ...]:
-        """Tests that caught no fault."""
+        """Return the tests that caught no fault."""
         busy: set[str] = set()
         for trial in self.trials:
             busy.update(failure.test for failure in trial.caught_by)

@@ -178,7 +178,7 @@ def com_for_frame(data: Data, right: Array) -> Array:
 
 @partial(hook, "_recompute")
 def no_forward(_data: Data, _right: Callable[[], None]) -> None:
-    """Nobody does the arithmetic."""
+    """Leave the arithmetic to nobody."""
 
 
 @partial(hook, "_recompute")
@@ -215,7 +215,7 @@ _hidden = random.Random(1)  # outside of every State
 
 @advancing
 def no_replay(data: Data, right: Callable[[int], None], nstep: int) -> None:
-    """Something that decides the future and is not part of the State."""
+    """Keep something that decides the future and is not part of the State."""
     ctrl = data.ctrl.copy()
     data.ctrl[:] += 1e-9 * _hidden.random()
     try:
@@ -239,7 +239,7 @@ def _scale_angles(data: Data, by: float) -> None:
 
 
 def _turn_spin(data: Data, from_world: bool) -> None:
-    """Between world axes and body axes, by the orientation of the moment."""
+    """Turn the spin between world and body axes, by the orientation of the moment."""
     model = data.model
     for joint in np.flatnonzero(model.jnt_type == JointType.FREE):
         quat = data.qpos[model.jnt_qposadr[joint] + 3 :][:4]
