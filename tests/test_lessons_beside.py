@@ -22,7 +22,7 @@ from statemachine.course.lessons.session import LessonRun, page_of_lesson, take
 from statemachine.course.lessons.step import LINES, StepLessonResult, StepLine, step_source
 from statemachine.course.lessons.step_page import ASKED
 from statemachine.errors import BadInputError, MissingEngineError, UnsupportedError
-from statemachine.lab.validate.battery import measure
+from statemachine.lab.validate.case_runs import measure
 from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.stepper import StepTerms
 from statemachine.lab.validate.variants import Variant

@@ -108,12 +108,12 @@ class EnergyChange:
 
     @property
     def longest(self) -> float:
-        """The largest relative change in the last 2 s at the longest timestep."""
+        """Return the largest relative change in the last 2 s at the longest timestep."""
         return float(self.by_timestep[0])
 
     @property
     def order(self) -> float | None:
-        """With which power of the timestep the change vanishes; None where it does not."""
+        """Return with which power of the timestep the change vanishes; None where it does not."""
         sizes = np.abs(self.by_timestep)
         if not (self.is_supported and (sizes > 0).all() and (np.diff(sizes) < 0).all()):
             return None

@@ -40,7 +40,7 @@ class SideInCase:
 
     @property
     def size(self) -> float:
-        """Size of the error [error_unit]; infinite where the run diverged."""
+        """Return the size of the error [error_unit]; infinite where the run diverged."""
         if self.error is None or math.isnan(self.error):
             return math.inf
         return abs(self.error)

@@ -33,22 +33,22 @@ class CitedCasePage(PageContent):
 
     @property
     def nearer(self) -> SideInCase:
-        """The side that is nearer to the truth."""
+        """Return the side that is nearer to the truth."""
         return self.cited.left if self.is_nearer_left else self.cited.right
 
     @property
     def farther(self) -> SideInCase:
-        """The other side."""
+        """Return the other side."""
         return self.cited.right if self.is_nearer_left else self.cited.left
 
     @property
     def nearer_error(self) -> str:
-        """The size of the error of the nearer side, with its unit."""
+        """Return the size of the error of the nearer side, with its unit."""
         return error_text(self.nearer.size, self.nearer.error_unit)
 
     @property
     def farther_error(self) -> str:
-        """The size of the error of the other side, with its unit."""
+        """Return the size of the error of the other side, with its unit."""
         return error_text(self.farther.size, self.farther.error_unit)
 
     @property
@@ -58,7 +58,7 @@ class CitedCasePage(PageContent):
 
     @property
     def timesteps(self) -> str:
-        """The timestep of both sides, or of the left and then of the right."""
+        """Return the timestep of both sides, or of the left and then of the right."""
         steps = dict.fromkeys((self.cited.left.timestep, self.cited.right.timestep))
         return " and ".join(milliseconds(step) for step in steps)
 
