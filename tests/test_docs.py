@@ -31,7 +31,7 @@ from tools.docs_pages import make_path
 
 from .support.backends import slow_on
 from .support.claims import assert_in, refused
-from .support.pages import blocks
+from .support.pages import blocks, need_engines_of
 from .support.processes import of_python
 from .support.requirements import ROOT, need_engine
 
@@ -157,6 +157,7 @@ class PathPage:
 @pytest.fixture(scope="module", params=LESSONS)
 def path_page(request: pytest.FixtureRequest) -> PathPage:
     """The page of each lesson of the path, on MuJoCo."""
+    need_engines_of(request.param)
     entry = LESSONS[request.param]
     taken = take(entry, sm.load(entry.model), "mujoco", _SMALL.get(request.param, {}))
     page = page_of_lesson(entry, {"mujoco": taken})

@@ -48,7 +48,7 @@ from statemachine.show.progress import progress
 
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
-from .support.pages import blocks, lesson_result, shown, with_figures
+from .support.pages import blocks, lesson_result, need_engines_of, shown, with_figures
 from .support.processes import Cli, of_python, one_line
 from .support.requirements import ROOT
 
@@ -231,6 +231,7 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(arm: sm.Model) -> Non
 def test_the_run_of_a_lesson_is_the_one_that_is_seen(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    need_engines_of(name)
     played: list[str] = []
     lines = CodeRun.lines
 

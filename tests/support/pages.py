@@ -12,6 +12,8 @@ from statemachine.interface import Model
 from statemachine.show import terminal
 from statemachine.show.blocks import Page
 
+from .requirements import need_engine
+
 T = TypeVar("T")
 # Options with which a lesson of many steps is a short one.
 QUICK = {
@@ -20,6 +22,12 @@ QUICK = {
     "gravity": ("--longer", "0"),
     "replay": ("--steps", "100"),
 }
+
+
+def need_engines_of(lesson: str) -> None:
+    """Skip a test of a lesson that computes with Pinocchio where that is not."""
+    if lesson == "step":
+        need_engine("pinocchio")
 
 
 def lesson_result(name: str, model: Model, **options: Any) -> Any:
