@@ -88,6 +88,17 @@ def test_the_page_fits_a_terminal(spring: ValidateResult) -> None:
     assert max(map(len, text.splitlines())) <= 80
 
 
+def test_the_page_of_all_cases_fits_a_terminal(spring: ValidateResult) -> None:
+    rows: list[CaseResult] = []
+    for case in CASES.values():
+        for row in spring.results:
+            if row.name == SPRING:
+                rows += [replace(row, case=case), replace(row, case=case, backend="pybullet")]
+    text = shown(page(replace(spring, results=tuple(rows)))).strip("\n")
+    assert len(text.splitlines()) <= 24
+    assert max(map(len, text.splitlines())) <= 80
+
+
 def test_the_worst_row_is_the_first_on_the_page(spring: ValidateResult) -> None:
     worst = max(spring.results, key=badness)
     assert (worst.name, worst.integrator) == (SPRING, "discrete")

@@ -107,10 +107,11 @@ def test_push_of_a_spring_is_that_of_its_complementarity(state: tuple[float, flo
 
 def test_steps_on_a_linear_spring_are_powers_of_their_matrices() -> None:
     stiffness, damping, h = 40.0, 0.7, 0.01
-    start = np.array([0.3, -0.2])
+    place, speed = 0.3, -0.2
+    start = np.array([place, speed])
 
-    def of(place: float, speed: float) -> float:
-        return -stiffness * place - damping * speed
+    def of(at: float, rate: float) -> float:
+        return -stiffness * at - damping * rate
 
     rates = np.array([[0.0, 1.0], [-stiffness, -damping]])
     series = np.eye(2)
@@ -118,10 +119,12 @@ def test_steps_on_a_linear_spring_are_powers_of_their_matrices() -> None:
     for k in range(1, 5):
         term = term @ rates * h / k
         series = series + term
-    assert rk4_step(of, *start, h) == pytest.approx(tuple(series @ start), rel=1e-12)
+    assert rk4_step(of, place, speed, h) == pytest.approx(tuple(series @ start), rel=1e-12)
     assert series == pytest.approx(expm(rates * h), abs=1e-6)
     velocity_first = np.array([[1.0, h], [0.0, 1.0]]) @ (np.eye(2) + h * rates * [[0], [1]])
-    assert euler_step(of, *start, h) == pytest.approx(tuple(velocity_first @ start), rel=1e-12)
+    assert euler_step(of, place, speed, h) == pytest.approx(
+        tuple(velocity_first @ start), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", ["bounce", "collision-restitution", "sphere-skids"])

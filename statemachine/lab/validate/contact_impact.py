@@ -24,10 +24,11 @@ _POESCHEL = (
 _RADIUS = 0.1  # [m]
 _GAP = 0.02  # [m] between the two that collide, at the start
 _FALL = math.sqrt(2.0 * HEIGHT / GRAVITY)  # [s]
+_AT = _RADIUS + _GAP / 2.0  # [m] of each of the two, from the middle between them
 _TWO = (
-    f'<worldbody><body name="light" pos="{-_RADIUS - _GAP / 2.0!r} 0 0"><freejoint/>'
+    f'<worldbody><body name="light" pos="{-_AT!r} 0 0"><freejoint/>'
     f'<geom type="sphere" size="{_RADIUS!r}" mass="{MASSES[0]!r}" {SOFT.mjcf}/></body>'
-    f'<body name="heavy" pos="{_RADIUS + _GAP / 2.0!r} 0 0"><freejoint/>'
+    f'<body name="heavy" pos="{_AT!r} 0 0"><freejoint/>'
     f'<geom type="sphere" size="{_RADIUS!r}" mass="{MASSES[1]!r}" {SOFT.mjcf}/></body></worldbody>'
 )
 _BALL = (

@@ -16,8 +16,8 @@ from ...show.templates import PageContent, render
 from .battery import CaseResult, ValidateResult
 from .case import Verdict
 
-_LINES = 13  # of a terminal's page that both tables share
-_LEAST_ROWS = 4
+_LINES = 9  # of a terminal's page that both tables share
+_LEAST_ROWS = 2
 _MOST_ENGINES = 8
 _EXACT: tuple[Verdict, ...] = ("exact", "exact discrete form")
 _WRONG: tuple[Verdict, ...] = ("wrong", "diverges")
@@ -196,15 +196,15 @@ def _worst(results: Sequence[CaseResult], most: int) -> Table:
 
     Of a case and a backend one integrator stands for all.
     """
-    headers = ("case", "engine", "error", "order", "verdict")
+    headers = ("case", "engine", "error", "verdict")
     rows: list[tuple[str, ...]] = []
     worst: dict[tuple[str, str], CaseResult] = {}
     for row in sorted(results, key=badness, reverse=True):
         worst.setdefault((row.name, row.backend), row)
     for row in list(worst.values())[:most]:
         error = row.measurements[0].error if row.measurements else None
-        rows.append((row.name, row.way, error_of_row(row, error), order_text(row), _verdict(row)))
-    return Table(headers, rows, words=frozenset({0, 1, 4}))
+        rows.append((row.name, row.way, error_of_row(row, error), _verdict(row)))
+    return Table(headers, rows, words=frozenset({0, 1, 3}))
 
 
 def error_of_row(row: CaseResult, error: float | None) -> str:
@@ -240,7 +240,6 @@ def _verdict(row: CaseResult) -> str:
 
 def _part(rows: Sequence[CaseResult]) -> _CasePart:
     """Return what is shown of one case."""
-    first = rows[0]
     timesteps = next((row.measurements for row in rows if row.measurements), ())
     steps = [milliseconds(measurement.timestep) for measurement in timesteps]
     errors: list[tuple[str, ...]] = []
@@ -258,11 +257,14 @@ def _part(rows: Sequence[CaseResult]) -> _CasePart:
         cause = NO_NUMBER if row.cause is None else row.cause
         verdicts.append((row.way, row.verdict, cause, row.status))
         work.append((row.way, *_costs(row)))
+    words = frozenset(range(len(_VERDICT_HEADERS)))
+    verdict_table = Table(_VERDICT_HEADERS, verdicts, words=words)
+    work_table = Table(("engine", *steps, "steps/s"), work)
     return _CasePart(
-        result=first,
+        result=rows[0],
         errors=Table(("engine", *steps, "order"), errors),
-        verdicts=Table(_VERDICT_HEADERS, verdicts, words=frozenset(range(4))),
-        work=Table(("engine", *steps, "steps/s"), work),
+        verdicts=verdict_table,
+        work=work_table,
         curves=_curves(rows),
         notes=list(dict.fromkeys(notes)),
     )
