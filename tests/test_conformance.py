@@ -337,6 +337,12 @@ def _takes_two_of_numpy_for_one(model: sm.Model, data: sm.Data, nstep: Any = 1) 
     sm.step(model, data, 1 if isinstance(nstep, np.integer) else nstep)
 
 
+def _derives_at_a_keyframe(model: sm.Model, data: sm.Data, keyframe: Any = None) -> None:
+    sm.reset(model, data, keyframe=keyframe)
+    if keyframe is not None:
+        sm.forward(model, data)
+
+
 def _refuses(*_: Any, **__: Any) -> None:
     raise BadInputError("it does not want to")
 
@@ -354,6 +360,7 @@ def _does_nothing(*_: Any, **__: Any) -> None:
     [
         ("nstep_is_a_positive_whole_number", "step", _takes_anything),
         ("nstep_is_a_positive_whole_number", "step", _takes_two_of_numpy_for_one),
+        ("fresh_and_reset_are_zero", "reset", _derives_at_a_keyframe),
         ("inputs_made_read_only_are_found", "reset", _refuses_without_a_name),
         ("inputs_made_read_only_are_found", "reset", _does_nothing),
         ("infinite_ctrl_is_refused_or_clamped", "forward", _refuses),

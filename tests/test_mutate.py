@@ -357,3 +357,52 @@ def test_a_test_that_fails_without_the_fault_has_noticed_nothing(counting: _Coun
 @pytest.mark.slow
 def test_a_fault_that_no_test_runs_is_not_covered(counting: _Count) -> None:
     assert counting.outcome("number", "n = n - 1") == ("not covered", "")
+
+
+# What is written
+
+
+@pytest.fixture
+def pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder into which the score is written."""
+    for name, file in (("HERE", ""), ("RESULTS", "results.json"), ("SECOND", "second.json")):
+        monkeypatch.setattr(run, name, tmp_path / file)
+    return tmp_path
+
+
+def _judged(folder: Path) -> list[Row]:
+    """Return two faults, of which one was noticed."""
+    one, two, *_ = (site.mutant for site in sites(_module(folder), folder))
+    return [Row(one, "killed", "tests/test_arm.py::near"), Row(two, "survived", "", "Equal.")]
+
+
+def test_what_was_written_is_read(pages: Path) -> None:
+    rows = _judged(pages)
+    run.write(rows)
+    assert run.read() == rows
+
+
+def test_the_score_is_of_what_was_tried(pages: Path) -> None:
+    rows = _judged(pages)
+    run.write([*rows, *(Row(row.mutant, NOT_TRIED, "") for row in rows)])
+    [line] = [line for line in (pages / "SCORE.md").read_text().splitlines() if "**all**" in line]
+    assert [cell.strip() for cell in line.split("|")[2:-1]] == [
+        "4", "1", "1", "0", "0", "0", "2", "50%",
+    ]  # fmt: skip
+
+
+def test_what_a_reader_found_stands_beside_a_survivor(pages: Path) -> None:
+    run.write(_judged(pages))
+    [line] = [line for line in (pages / "SCORE.md").read_text().splitlines() if line[:2] == "- "]
+    assert line.endswith(". Equal.")
+
+
+def test_another_draw_stands_beside_the_list_and_leaves_it(pages: Path) -> None:
+    rows = _judged(pages)
+    run.write(rows)
+    run.write_second(rows[:1], 77)
+    assert run.read() == rows
+    scores = [line for line in (pages / "SCORE.md").read_text().splitlines() if "**all**" in line]
+    assert [line.split("|")[-2].strip() for line in scores] == ["50%", "100%"]
+    told = json.loads((pages / "second.json").read_text("utf-8"))
+    assert (told["seed"], len(told["mutants"])) == (77, 1)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
 import pytest
 
+from statemachine.lab.runs.reporter import QuietReporter
 from statemachine.lab.validate.battery import CaseResult, ValidateRequest, answer
 from statemachine.lab.validate.cases import CASES
 
@@ -32,3 +36,28 @@ def test_what_is_measured_is_the_truth_where_that_is_on_record(name: str) -> Non
         scale = abs(case.truth()) if case.relative else 1.0
         gap = abs(measurement.measured - case.truth())
         assert gap <= expected.within * scale * (1 + 1e-9)
+
+
+class Listening(QuietReporter):
+    """A reporter that remembers what it was told.
+
+    Attributes:
+        fractions: What was done of each stage, as it was told.
+    """
+
+    def __init__(self) -> None:
+        self.fractions: list[float] = []
+
+    @contextmanager
+    def stage(
+        self, what: str, runs_at_once: int = 0, expected_seconds: float | None = None
+    ) -> Iterator[Callable[[float], None]]:
+        yield self.fractions.append
+
+
+def test_a_reporter_is_told_how_many_runs_are_done() -> None:
+    listening = Listening()
+    request = ValidateRequest(("mujoco",), ("free-fall", "pendulum-60"), (0.005,))
+    count = len(answer(request, listening).results)
+    expected = [done / count for done in range(1, count + 1)]
+    assert listening.fractions == pytest.approx(expected)
