@@ -36,7 +36,7 @@ def as_count(value: Any, name: str) -> int:
     """
     number = whole_number(value)
     if number is None or number < 1:
-        rounding = f": round({value})" if isinstance(value, float) and value >= 1 else ""
+        rounding = f": type round({value})" if isinstance(value, float) and value >= 1 else ""
         raise BadInputError(
             f"{name} must be a whole number of at least 1; got {shown(value)}{rounding}"
         )

@@ -205,6 +205,6 @@ def _admit(model: Model, data: Data) -> None:
 
         maker, other = distinct_labels(data._model, model)
         raise ForeignDataError(
-            f"this Data was made by {maker}, and is used with {other}: make one of this Model, "
-            "sm.make_data(model); a State moves between the two"
+            f"this Data was made by {maker}, and is used with {other}: make a Data of the Model "
+            "that you step, sm.make_data(model)"
         )

@@ -161,9 +161,9 @@ class Printer:
         if isinstance(block, Heading):
             self._headings.append(block)
             return
-        # What was printed may say it first; a text explains it.
-        is_text = isinstance(block, Text)
-        shown = [*self._predicted, block] if is_text else [block, *self._predicted]
+        # What was printed may say it first; a text explains it, and a verdict confirms it.
+        explains = isinstance(block, Text | Verdict)
+        shown = [*self._predicted, block] if explains else [block, *self._predicted]
         self.write([*self._headings, *shown])
         self._headings.clear()
         if self._reader and self._predicted:

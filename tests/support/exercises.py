@@ -210,6 +210,14 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             "you took 200 steps for a second, and at 4 ms a step a second has 250",
             {"round(1 / model.timestep)": "200"},
         ),
+        "timestep_taken_for_granted, once too often": (
+            "you took 200 steps for a second, and at 4 ms a step a second has 250",
+            {
+                "round(1 / model.timestep)": "200",
+                "range(seconds)": "range(seconds + 1)",
+                "return angles": "return angles[:-1]",
+            },
+        ),
         "the_start_left_out": (
             "that is the arm 1 s later",
             {"range(seconds)": "range(seconds + 1)", "return angles": "return angles[1:]"},
@@ -513,7 +521,7 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {COMMAND: "data.qpos[:] = ctrl"},
         ),
         "steps_as_a_float": (
-            "nstep must be a whole number of at least 1; got 600.0: round(600.0)",
+            "nstep must be a whole number of at least 1; got 600.0: type round(600.0)",
             {RUN: "sm.step(model, data, nstep / 1)"},
         ),
         "one_data_no_copy": (

@@ -211,9 +211,14 @@ def _mistake(
 
 
 def _is_last_number(trace: Array, expected: Array) -> bool:
-    """Return whether a trace is the right last number at every moment, the first included."""
-    repeated = np.full(len(trace), expected[-1])
-    return near(trace, repeated, TOLERANCE) and not near(expected, repeated, TOLERANCE)
+    """Return whether a trace is the right last number at every moment, the first included.
+
+    It is one number then, to the bit: an arm at rest has nearly the same ones.
+    """
+    repeated = np.full(len(trace), trace[-1])
+    is_one_number = np.array_equal(trace, repeated)
+    is_last = near(trace, np.full(len(trace), expected[-1]), TOLERANCE)
+    return is_one_number and is_last and not near(expected, repeated, TOLERANCE)
 
 
 def _gives(mistaken: Array, trace: Array, expected: Array) -> bool:
@@ -272,8 +277,11 @@ def _other_entries(limp: int, model: Model, falls: Falls) -> Iterator[_Mistake]:
 def _other_rates(limp: int, model: Model, falls: Falls, answer: Answer) -> Iterator[_Mistake]:
     """Yield what other numbers of steps a second give; arguments as of `_why`."""
     marks, angles = falls.marks, falls.angles[limp]
-    for nstep in dict.fromkeys(run.nstep for run in answer.runs):
-        rate = nstep // (len(marks) - 1)
+    rates: list[int] = []
+    for run in answer.runs:
+        # A loop over the moments takes steps after the last of them, too.
+        rates += [run.nstep // (len(marks) - 1), run.nstep // len(marks)]
+    for rate in dict.fromkeys(rates):
         if rate != marks[1] and (len(marks) - 1) * rate < len(angles):
             remark = OfGravity.STEPS_A_SECOND.filled(
                 steps=count(rate, "step"), timestep=model.timestep * 1e3, needed=marks[1]
