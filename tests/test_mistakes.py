@@ -76,6 +76,11 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
 
 
 @pytest.mark.usefixtures("needed")
+def files_of(folder: Path) -> list[Path]:
+    """Return all files, but for the bytecode that Python keeps of a program."""
+    return sorted(path for path in folder.rglob("*") if "__pycache__" not in path.parts)
+
+
 @pytest.mark.parametrize(
     ("command", "says"),
     [
@@ -340,6 +345,6 @@ def test_a_mistake_is_one_line(
     command: str, says: str, folder: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
-    there = sorted(folder.rglob("*"))
+    there = files_of(folder)
     one_line(here(*(word.replace("ROOT", str(ROOT)) for word in shlex.split(command))), says)
-    assert sorted(folder.rglob("*")) == there
+    assert files_of(folder) == there

@@ -163,7 +163,7 @@ def test_the_time_in_sleep_is_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None
     model = sm.load("so101/scene_box")
     found = lesson_result("time", model, steps=20, realtime=True, seconds=0.5)
     assert len(slept) >= 20
-    assert found.waited == pytest.approx(sum(slept), rel=0.02, abs=0.01)
+    assert found.waited == pytest.approx(sum(slept), rel=0.1, abs=0.02)
     assert found.waited <= found.paced
 
 
