@@ -57,7 +57,7 @@ def test_they_come_after_the_end_of_the_course() -> None:
 @pytest.mark.slow
 def test_one_leads_to_the_other(here: Cli, pinocchio: None) -> None:
     shown = here("lesson", "step", "--no-questions", code=0).stdout
-    assert shown.endswith("Next: statemachine lesson energy\n")
+    assert shown.endswith("statemachine lesson energy\n")
 
 
 # What does one step do?
