@@ -195,7 +195,7 @@ def test_the_json_has_what_was_found(shown: Shown) -> None:
     expected = json.loads(dumps(shown.found))
     # What both sides were, the command knows, and not who explains two runs.
     differing = {key for key in expected if shown.told[key] != expected[key]}
-    assert differing <= {"shares", "ranking", "bases"}
+    assert differing <= {"shares", "ranking", "bases", "cited_case"}
     assert shown.told["bases"]["differ"] is False
     shares = [{**row, "changes": [], "not_written": ""} for row in shown.told["shares"]]
     assert shares == expected["shares"]
