@@ -6,16 +6,24 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from statemachine.backends import parse_backend
-from statemachine.errors import BadInputError, EngineError, UnknownNameError
+from statemachine.backends import BACKENDS, backend_names, load, parse_backend
+from statemachine.errors import (
+    BadInputError,
+    DivergedError,
+    EngineError,
+    UnknownNameError,
+    UnsupportedError,
+)
+from statemachine.interface import Model, make_data
+from statemachine.interface.records import Defaults
 from statemachine.lab.runs.drive import Progress
 from statemachine.lab.runs.reporter import QuietReporter
 from statemachine.lab.validate.battery import ValidateRequest, answer, run_case
@@ -162,9 +170,20 @@ def test_one_timestep_shows_no_order_and_is_held_by_the_size_of_its_error() -> N
 
 def test_no_error_is_much_smaller_than_on_record_by_chaos_or_a_shorter_timestep() -> None:
     record = bounded(0.01, "contact model")
+    longer = fall(timesteps=(0.008, *STEPS))
     assert status_of(fall(), [0.001, 0.001, 0.001], record) == "better"
     assert status_of(fall(is_chaotic=True), [0.001, 0.001, 0.001], record) == "as expected"
-    assert status_of(fall(timesteps=(0.008,)), [0.001, 0.001, 0.001], record) == "as expected"
+    assert status_of(longer, [0.001, 0.001, 0.001], record) == "as expected"
+
+
+def test_a_record_is_not_compared_at_other_timesteps_than_its_own() -> None:
+    assert status_of(fall(timesteps=(0.008,)), [5.0], exact()) == "other timestep"
+
+
+def test_a_record_is_compared_at_those_of_its_timesteps_that_are_asked_for() -> None:
+    case = fall(timesteps=STEPS[1:])
+    assert status_of(case, [5.0, 0.002, 0.001], converges(1.0, 0.002)) == "as expected"
+    assert status_of(case, [0.001, 5.0, 5.0], converges(1.0, 0.002)) == "worse"
 
 
 def test_a_record_is_found_by_engine_and_integrator_before_integrator_alone() -> None:
@@ -282,7 +301,7 @@ def test_progress_comes_to_its_end_once_for_each_run() -> None:
     assert reporter.fractions == pytest.approx([(k + 1) / count for k in range(count)])
 
 
-def test_a_process_that_ends_in_a_run_is_an_error_that_names_the_case() -> None:
+def test_a_process_that_ends_in_a_run_is_a_run_that_failed() -> None:
     need_engine("mujoco")
     parent = os.getpid()
 
@@ -293,8 +312,8 @@ def test_a_process_that_ends_in_a_run_is_an_error_that_names_the_case() -> None:
 
     variant = Variant(parse_backend("mujoco"), "Euler")
     runs = [CaseRun(fall(measure=measure), variant, step) for step in STEPS]
-    with pytest.raises(EngineError, match="fall on mujoco Euler"):
-        outcomes_of(runs, 2, lambda _fraction: None)
+    outcomes = outcomes_of(runs, 2, lambda _fraction: None)
+    assert [outcome.failed for outcome in outcomes] == [True] * len(runs)
 
 
 def test_no_temporary_file_is_left_by_a_process_that_ends_in_a_run(
@@ -311,6 +330,131 @@ def test_no_temporary_file_is_left_by_a_process_that_ends_in_a_run(
 
     variant = Variant(parse_backend("mujoco"), "Euler")
     runs = [CaseRun(fall(measure=measure), variant, step) for step in STEPS]
-    with pytest.raises(EngineError):
-        outcomes_of(runs, 2, lambda _fraction: None)
+    outcomes_of(runs, 2, lambda _fraction: None)
     assert list(tmp_path.iterdir()) == []
+
+
+# Those whose truth depends on how long is simulated, and that nothing but the timestep is wrong of.
+TIMED = (
+    "free-fall",
+    "thrown-body",
+    "thrown-spin",
+    "symmetric-body",
+    "top-hinges",
+    "gyroscope",
+    "effort-limit",
+    "dry-friction-above",
+    "armature",
+    "reflected-inertia",
+)
+
+
+@pytest.mark.parametrize("name", TIMED)
+@pytest.mark.parametrize("timestep", [0.003, 0.007, 0.03])
+def test_a_case_is_exact_at_a_timestep_that_does_not_divide_its_duration(
+    name: str, timestep: float
+) -> None:
+    need_engine("mujoco")
+    result = run_case(CASES[name], Variant(parse_backend("mujoco"), "RK4"), [timestep])
+    assert result.worst == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["free-fall", "thrown-body", "sinking-speed"])
+def test_the_exact_discrete_form_holds_at_a_timestep_that_does_not_divide_the_duration(
+    name: str,
+) -> None:
+    need_engine("mujoco")
+    result = run_case(CASES[name], Variant(parse_backend("mujoco"), "Euler"), [0.007, 0.003])
+    assert result.verdict == "exact discrete form"
+
+
+@pytest.mark.parametrize(("name", "within"), [("damped-spring", 3e-7), ("servo-step", 5e-8)])
+def test_a_place_is_held_against_the_truth_of_the_time_that_was_simulated(
+    name: str, within: float
+) -> None:
+    need_engine("mujoco")
+    result = run_case(CASES[name], Variant(parse_backend("mujoco"), "RK4"), [0.003])
+    assert result.worst is not None
+    assert result.worst < within
+
+
+@pytest.mark.parametrize("case", [each for each in CASES.values() if each.truth_after is not None])
+def test_the_truth_at_the_duration_of_a_case_is_that_of_its_record(case: Case) -> None:
+    need_engine("mujoco")
+    variant = Variant(parse_backend("mujoco"), "Euler")
+    text = case.model_text(case.timesteps[0], "Euler")
+    with variant.loaded(text, case.timesteps[0]) as model, make_data(model) as data:
+        run = Run(model, data)
+        with suppress(DivergedError):
+            case.measure(run)
+            assert case.truth_of(run.time) == case.truth()
+
+
+@pytest.mark.parametrize("timestep", [1e-320, 1e-300, 1e-9])
+def test_a_timestep_of_too_many_steps_is_refused_and_named(timestep: float) -> None:
+    need_engine("mujoco")
+    with pytest.raises(BadInputError, match=f"free-fall.*{timestep!r}"):
+        answer(ValidateRequest(cases=("free-fall",), timesteps=(timestep,)))
+
+
+# Backends of another package, by their names.
+
+
+def raises_in_its_loader(path: Path, defaults: Defaults) -> Model:
+    raise RuntimeError("out of order")
+
+
+def returns_nothing(path: Path, defaults: Defaults) -> Model:
+    return cast("Model", None)
+
+
+def gives_up_in_a_fall(path: Path, defaults: Defaults) -> Model:
+    text = path.read_text("utf-8")
+    if 'model="free-fall"' in text:
+        raise EngineError("gave up")
+    if "<mujoco><worldbody/></mujoco>" in text:
+        raise UnsupportedError("no bodies")
+    return load(path, "mujoco", defaults=defaults)
+
+
+@pytest.fixture(autouse=True)
+def other_backends(monkeypatch: pytest.MonkeyPatch) -> None:
+    backend_names()
+    for loader in (raises_in_its_loader, returns_nothing, gives_up_in_a_fall):
+        monkeypatch.setitem(BACKENDS, loader.__name__, f"{__name__}:{loader.__name__}")
+
+
+@pytest.mark.parametrize("backend", ["raises_in_its_loader", "returns_nothing"])
+def test_a_backend_whose_loader_fails_is_told_with_its_loader(backend: str) -> None:
+    result = answer(ValidateRequest(backends=(backend,), cases=("free-fall",), jobs=1))
+    assert {row.verdict for row in result.results} == {"failed"}
+    assert all(f"{__name__}:{backend}" in row.refusal for row in result.results)
+    assert not result.holds
+
+
+def test_what_other_backends_and_cases_do_is_not_lost_by_a_run_that_fails() -> None:
+    need_engine("mujoco")
+    backends = ("gives_up_in_a_fall", "mujoco")
+    result = answer(ValidateRequest(backends=backends, cases=("free-fall", "thrown-body"), jobs=1))
+    assert {(row.backend, row.name) for row in result.results if row.verdict == "failed"} == {
+        ("gives_up_in_a_fall", "free-fall")
+    }
+    assert {(row.backend, row.name) for row in result.results if row.holds} == {
+        ("gives_up_in_a_fall", "thrown-body"),
+        ("mujoco", "free-fall"),
+        ("mujoco", "thrown-body"),
+    }
+
+
+def test_a_version_that_cannot_be_read_is_unknown() -> None:
+    need_engine("mujoco")
+    request = ValidateRequest(backends=("gives_up_in_a_fall",), cases=("thrown-body",))
+    assert answer(request).versions == {"gives_up_in_a_fall": "unknown"}
+
+
+def test_a_measure_that_is_no_number_is_a_run_that_diverged() -> None:
+    need_engine("mujoco")
+    case = fall(measure=lambda run: math.nan * run.advance(0.1))
+    result = run_case(case, Variant(parse_backend("mujoco"), "Euler"))
+    assert result.verdict == "diverges"
+    assert [each.error for each in result.measurements] == [None] * len(STEPS)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -228,3 +230,95 @@ def test_the_nearest_of_one_case_has_the_smallest_error() -> None:
     rows = [row for row in result.results if row.verdict != "wrong" and row.worst is not None]
     smallest = min(rows, key=lambda row: row.worst or 0.0)
     assert f"Nearest to the truth is {smallest.way}, " in shown(page(result))
+
+
+def test_what_is_wrong_without_a_record_is_not_told_as_worse_than_it(
+    spring: ValidateResult,
+) -> None:
+    row = replace(of(spring, SPRING, "discrete"), status="not on record", expectation=None)
+    text = " ".join(shown(page(replace(spring, results=(row,)))).split())
+    assert "nothing on record: spring-energy on mujoco discrete" in text
+    assert "Worse than on record" not in text
+
+
+def failed(result: ValidateResult) -> ValidateResult:
+    """The same result where all runs failed."""
+    rows: list[CaseResult] = []
+    for row in result.results:
+        changes = replace(row, measurements=(), order=None, status="worse", refusal="gave up")
+        rows.append(replace(changes, verdict="failed"))
+    return replace(result, results=tuple(rows))
+
+
+@pytest.mark.parametrize("details", [False, True])
+def test_a_run_that_failed_is_told_with_its_case_and_engine(
+    spring: ValidateResult, details: bool
+) -> None:
+    text = " ".join(shown(page(failed(spring), details)).split())
+    assert "free-fall on mujoco Euler" in text
+    assert "gave up" in text
+    assert "Nearest to the truth" not in text
+
+
+def test_a_run_that_failed_is_a_failed_test_of_junit(spring: ValidateResult) -> None:
+    root = ElementTree.fromstring(junit_of(failed(spring)).split("\n", 1)[1])
+    messages = {each.get("message") for each in root.findall(".//testcase/failure")}
+    assert messages == {"failed: gave up"}
+
+
+def test_a_picture_of_nothing_is_a_note_and_json_and_junit_are_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    need_engine("mujoco")
+    case = replace(CASES["free-fall"], measure=lambda run: math.nan * run.advance(0.1))
+    monkeypatch.setitem(CASES, case.name, case)
+    junit, plot = tmp_path / "n.xml", tmp_path / "n.svg"
+    words = ["validate", "--case", "free-fall", "--json", "--jobs", "1"]
+    assert main([*words, "--junit", str(junit), "--plot", str(plot)]) == 1
+    printed = capsys.readouterr()
+    assert {row["verdict"] for row in json.loads(printed.out)["results"]} == {"diverges"}
+    assert ElementTree.parse(junit).getroot().findall(".//failure")
+    assert str(plot) in printed.err
+    assert not plot.exists()
+
+
+def test_two_outputs_of_one_name_are_refused(tmp_path: Path) -> None:
+    file = str(tmp_path / "same.svg")
+    assert main(["validate", "--case", "free-fall", "--plot", file, "--junit", file]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_next_command_keeps_what_was_typed_in_one_line(spring: ValidateResult) -> None:
+    cases = ("spring-energy", "free-fall", "order-of-*")
+    request = ValidateRequest(cases=cases, timesteps=(0.003, 0.001), jobs=2)
+    (line,) = [
+        line
+        for line in shown(page(replace(spring, request=request))).splitlines()
+        if "statemachine validate" in line
+    ]
+    typed = shlex.split(line)
+    assert [typed[k + 1] for k, word in enumerate(typed) if word == "--case"] == list(cases)
+    assert [typed[k + 1] for k, word in enumerate(typed) if word == "--timestep"] == [
+        "0.003",
+        "0.001",
+    ]
+    assert typed[typed.index("--jobs") + 1] == "2"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="children are read from /proc")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_sigterm_leaves_no_file_of_a_case(tmp_path: Path, jobs: str) -> None:
+    need_engine("pybullet")
+    words = ("validate", "--backend", "pybullet", "--case", "weld-*", "--jobs", jobs)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "statemachine", *words],
+        cwd=ROOT,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    assert soon(lambda: any(tmp_path.rglob("case.xml")))
+    run.terminate()
+    assert run.wait(timeout=300) != 0
+    assert list(tmp_path.rglob("case.xml")) == []

@@ -106,8 +106,16 @@ def test_a_result_that_differs_from_the_table_is_told(fall: CaseResult) -> None:
     assert faults_of(fall) == []
     larger = [replace(each, error=1.05 * (each.error or 0.0)) for each in fall.measurements]
     assert len(faults_of(replace(fall, measurements=tuple(larger)))) == 1
-    assert len(faults_of(replace(fall, verdict="wrong"))) == 1
+    assert len(faults_of(replace(fall, verdict="bounded"))) == 1
     assert len(faults_of(replace(fall, order=2.0))) == 1
+
+
+def test_what_is_wrong_at_another_timestep_alone_is_shown_with_it(fall: CaseResult) -> None:
+    errors = {0.005: 3.0, 0.002: 0.0, 0.001: 0.0, 0.0005: 0.0}
+    measurements = [replace(each, error=errors[each.timestep]) for each in fall.measurements]
+    (row,) = rows_of([replace(fall, verdict="wrong", measurements=tuple(measurements))])
+    assert row.error.endswith("at 5 ms")
+    assert row.error_in(fall.error_unit) == 3.0
 
 
 def test_engines_that_do_the_same_share_a_row(fall: CaseResult) -> None:

@@ -22,7 +22,7 @@ from statemachine.lab.validate.cases import GROUPS
 from statemachine.lab.validate.page import error_of_row, order_text
 from statemachine.lab.validate.variants import OWN
 from statemachine.lab.validate.verdict import CaseMeasurement
-from statemachine.measures.text import display_unit
+from statemachine.measures.text import display_unit, milliseconds
 from statemachine.show.blocks import Table
 
 BACKENDS = ("mujoco", "pybullet", "pybullet:engine")
@@ -33,6 +33,7 @@ _HEADERS = ("case", "engine and integrator", "error at 2 ms", "order", "verdict"
 _CELL = re.compile(r"(?<!\\)\|")
 _FIGURE = re.compile(r"(-?[0-9.]+(?:e-?[0-9]+)?) ?(.*)")
 _NONE = "–"
+_AT = " at "  # between an error and its timestep
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class TableRow:
     Attributes:
         case: Name of the case.
         ways: The engines, each with its integrators, or alone for all that it has.
-        error: Its error at 2 ms, as it is read.
+        error: Its error at 2 ms, as it is read; or the largest, with its timestep, where that is
+            wrong and the one at 2 ms is not.
         order: With which power of the timestep the error vanishes; a dash where it does not.
         verdict: How the engines do.
         cause: What the error comes from.
@@ -74,7 +76,7 @@ class TableRow:
         Args:
             unit: SI unit of the error; "" for a ratio.
         """
-        match = _FIGURE.fullmatch(self.error)
+        match = _FIGURE.fullmatch(self.error.partition(_AT)[0])
         if match is None:
             return None
         number = float(match[1])
@@ -84,21 +86,41 @@ class TableRow:
 
 
 def measurement_shown(result: CaseResult) -> CaseMeasurement | None:
-    """Return what is shown of a result; None if it was refused."""
+    """Return what is shown of a result; None if it was refused.
+
+    It is that at 2 ms; of a result that is wrong at other timesteps alone, the largest error.
+    """
     for measurement in result.measurements:
         if measurement.timestep == TIMESTEP:
+            is_right = measurement.error is not None and (
+                abs(measurement.error) <= result.case.tolerance
+            )
+            if result.verdict == "wrong" and is_right:
+                return max(result.measurements, key=_size)
             return measurement
     return None
+
+
+def _size(measurement: CaseMeasurement) -> float:
+    return 0.0 if measurement.error is None else abs(measurement.error)
+
+
+def _error_shown(result: CaseResult) -> str:
+    """Return the error that is shown, with its timestep where that is not 2 ms."""
+    measurement = measurement_shown(result)
+    if measurement is None or result.verdict in ("exact", "refused", "diverges"):
+        return _NONE
+    error = error_of_row(result, measurement.error)
+    if measurement.timestep == TIMESTEP:
+        return error
+    return f"{error}{_AT}{milliseconds(measurement.timestep)}"
 
 
 def rows_of(results: Sequence[CaseResult]) -> list[TableRow]:
     """Return the rows of the results of one case; results that look the same share one."""
     merged: dict[tuple[str, ...], list[CaseResult]] = {}
     for result in results:
-        measurement = measurement_shown(result)
-        error = _NONE if measurement is None else error_of_row(result, measurement.error)
-        if result.verdict in ("exact", "exact discrete form", "refused", "diverges"):
-            error = _NONE if result.verdict != "exact discrete form" else error
+        error = _error_shown(result)
         cause = _NONE if result.cause in (None, "none") else str(result.cause)
         key = (error, order_text(result), result.verdict, cause)
         merged.setdefault(key, []).append(result)

@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
+from ..errors import BadInputError, EngineError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..interface.checks import as_switch
@@ -285,6 +285,8 @@ def load(
         check_takes_read_options(backend, takes, read_options)
         early["read_options"] = read_options
     loaded = loader(path, defaults=defaults, **early)
+    if loaded is None:
+        raise EngineError(f"the loader {place} of backend {backend!r} returned None, and no Model")
     named = deepcopy(options) if takes_options else {}
     vars(loaded).update(read_options=read_options, defaults=defaults, options=named)
     if options and not takes_options:

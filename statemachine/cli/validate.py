@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import BadInputError
 from ..installed import DEFAULT
 from ..typed_numbers import typed_float
 from .common import (
@@ -86,18 +88,31 @@ def run(options: argparse.Namespace) -> int:
     """Validate, and show."""
     from ..atomic_files import check_place, replace_text
     from ..lab.validate.battery import answer
-    from ..lab.validate.page import junit_of, page
-    from ..show.charts import check_suffix, write_pictures
+    from ..lab.validate.page import NO_PICTURE, junit_of, page
+    from ..show.charts import Drawn, check_suffix, write_pictures
 
     request = request_of(options)
     if options.plot is not None:
         check_suffix(options.plot)
+    _check_names(options.junit, options.plot)
     for file in (options.junit, options.plot):
         if file is not None:
             check_place(file)
-    result = answer(request, TerminalReporter())
-    if options.plot is not None:
-        write_pictures(page(result, details=True).blocks, options.plot)
+    reporter = TerminalReporter()
+    result = answer(request, reporter)
     if options.junit is not None:
         replace_text(options.junit, junit_of(result))
-    return show(page(result, options.details), result, options.json)
+    code = show(page(result, options.details), result, options.json)
+    if options.plot is not None:
+        blocks = page(result, details=True).blocks
+        if any(isinstance(block, Drawn) for block in blocks):
+            write_pictures(blocks, options.plot)
+        else:
+            reporter.note(f"{options.plot} is not written: {NO_PICTURE}")
+    return code
+
+
+def _check_names(junit: Path | None, plot: Path | None) -> None:
+    """Raise BadInputError where two outputs are one file."""
+    if junit is not None and plot is not None and junit.resolve() == plot.resolve():
+        raise BadInputError(f"--junit and --plot both name {junit}: name two files")

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 
 from ...backends import BackendChoice
 from ...backends.chosen import ALL, chosen_backends
-from ...errors import BadInputError, MissingEngineError, ModelError, StateMachineError
+from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import DEFAULT
 from ...processes import checked_jobs
+from ...processes.parallel import unwinding
 from ..runs.each_backend import note_missing
 from ..runs.reporter import QUIET, Reporter
 from .case import Case, Cause, Expectation, Group, Integrator, Verdict
@@ -24,9 +25,10 @@ from .case_runs import (
 )
 from .cases import cases_of
 from .variants import OWN, Variant, variants_of
-from .verdict import CaseMeasurement, Status, judgement_of
+from .verdict import CaseMeasurement, Status, failure_judgement, judgement_of
 
 _LONGEST = 0.1  # [s] of a timestep
+_UNKNOWN = "unknown"
 _EMPTY = "<mujoco><worldbody/></mujoco>"
 
 
@@ -71,10 +73,10 @@ class CaseResult:
         truth: The closed form [unit of the case].
         measurements: One for each timestep, from the longest to the shortest; empty if refused.
         order: With which power of the timestep the error vanishes; None where that cannot be seen.
-        verdict: How the engine does.
+        verdict: How the engine does; "failed" if it, or its backend, raised an error.
         status: Whether that is what its record says.
         expectation: The record; None if there is none.
-        refusal: Why it was refused; "" if it was not.
+        refusal: Why it was refused, or how it failed; "" otherwise.
     """
 
     case: Case = field(metadata={"json": False})
@@ -141,6 +143,8 @@ class CaseResult:
     @property
     def holds(self) -> bool:
         """Tell whether the engine is right, or as wrong as its record says."""
+        if self.verdict == "failed":
+            return False
         if self.status == "not on record":
             return self.verdict not in ("wrong", "diverges")
         return self.status != "worse"
@@ -171,11 +175,27 @@ def answer(request: ValidateRequest, reporter: Reporter = QUIET) -> ValidateResu
 
     Raises:
         MissingEngineError: An engine that is named is not installed here, or all are missing.
-        StateMachineError: As an engine raises it, but for refusals and divergence.
+        TimestepError: A case cannot be run at a timestep.
     """
-    cases = cases_of(request.cases)
-    results: list[CaseResult] = []
-    versions: dict[str, str] = {}
+    with unwinding():  # a signal to end leaves no file of a case behind
+        ways = _ways_of(request, reporter)
+        results: list[CaseResult] = []
+        versions: dict[str, str] = {}
+        for backend, variants in ways.items():
+            versions[str(backend)] = version_of_engine(variants[0])
+            results += _run_all(cases_of(request.cases), variants, request, reporter)
+    return ValidateResult(request, versions, tuple(results))
+
+
+def _ways_of(
+    request: ValidateRequest, reporter: Reporter
+) -> dict[BackendChoice, Sequence[Variant]]:
+    """Return the ways in which each backend steps, at least one; what is missing is noted.
+
+    Raises:
+        MissingEngineError: An engine that is named is not installed here, or all are missing.
+    """
+    ways: dict[BackendChoice, Sequence[Variant]] = {}
     missing: list[StateMachineError] = []
     for backend in dict.fromkeys(chosen_backends(request.backends)):
         try:
@@ -184,11 +204,11 @@ def answer(request: ValidateRequest, reporter: Reporter = QUIET) -> ValidateResu
             if ALL not in request.backends:
                 raise
             missing.append(error)
-            continue
-        versions[str(backend)] = version_of_engine(backend, variants)
-        results += _run_all(cases, variants, request, reporter)
-    note_missing(missing, bool(versions), reporter)
-    return ValidateResult(request, versions, tuple(results))
+        else:
+            # One that reads no integrator refuses each case, and tells why.
+            ways[backend] = variants if variants else [Variant(backend, "Euler")]
+    note_missing(missing, bool(ways), reporter)
+    return ways
 
 
 def _run_all(
@@ -211,17 +231,13 @@ def _run_all(
     return results
 
 
-def version_of_engine(backend: BackendChoice, variants: Sequence[Variant]) -> str:
-    """Return the version of the engine that steps.
-
-    Args:
-        backend: The engine.
-        variants: Its ways of stepping, at least one.
-    """
-    if not variants:
-        raise ModelError(f"{backend} reads none of the integrators", backend=backend.name)
-    with variants[0].loaded(_EMPTY, 0.005) as model:
-        return model.engine_version
+def version_of_engine(variant: Variant) -> str:
+    """Return the version of the engine that steps; "unknown" where it takes no empty model."""
+    try:
+        with variant.loaded(_EMPTY, 0.005) as model:
+            return model.engine_version
+    except Exception:  # of another package, which may raise anything: each case tells of it
+        return _UNKNOWN
 
 
 def run_case(case: Case, variant: Variant, timesteps: Sequence[float] = ()) -> CaseResult:
@@ -233,7 +249,7 @@ def run_case(case: Case, variant: Variant, timesteps: Sequence[float] = ()) -> C
         timesteps: [s]; empty for the case's own.
 
     Raises:
-        StateMachineError: As an engine raises it, but for refusals and divergence.
+        TimestepError: The case cannot be run at a timestep.
     """
     outcomes: list[CaseOutcome] = []
     for timestep in timesteps_of(case, timesteps):
@@ -246,14 +262,16 @@ def run_case(case: Case, variant: Variant, timesteps: Sequence[float] = ()) -> C
 def _judged(case: Case, variant: Variant, outcomes: Sequence[CaseOutcome]) -> CaseResult:
     """Return the result of a case from what came of it at each timestep."""
     measurements: list[CaseMeasurement] = []
-    refusal = ""
+    refusal, failed = "", False
     for outcome in outcomes:
         if outcome.measurement is None:
-            measurements, refusal = [], outcome.refusal
+            measurements, refusal, failed = [], outcome.refusal, outcome.failed
             break
         measurements.append(outcome.measurement)
     expectation = case.expectation(str(variant.backend), variant.integrator)
-    judgement = judgement_of(case, measurements, expectation)
+    judgement = failure_judgement(expectation)
+    if not failed:
+        judgement = judgement_of(case, measurements, expectation)
     return CaseResult(
         case=case,
         backend=str(variant.backend),

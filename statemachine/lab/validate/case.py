@@ -34,6 +34,7 @@ Verdict = Literal[
     "wrong",
     "diverges",
     "refused",
+    "failed",
 ]
 
 Discrete = Mapping[Integrator, Callable[[float], float]]  # of the timestep [s]
@@ -126,6 +127,8 @@ class Case:
             the error].
         rounding: Largest size of an error that counts as exact [unit of the error].
         discrete: By integrator the exact discrete truth [unit], a function of the timestep [s].
+        truth_after: Of a truth that depends on the simulated time: returns it for a time [s],
+            which is not the case's own where a timestep does not divide that; None of others.
         option: More attributes of <option>, such as 'cone="elliptic"'.
         gravity: (3,) [m/s²].
         timesteps: At which it is run, from the longest to the shortest [s].
@@ -145,6 +148,7 @@ class Case:
     tolerance: float = 0.02
     rounding: float = ROUNDING
     discrete: Discrete = field(default_factory=dict)
+    truth_after: Callable[[float], float] | None = None
     option: str = ""
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     timesteps: tuple[float, ...] = TIMESTEPS
@@ -160,6 +164,10 @@ class Case:
     def true_value(self) -> float:
         """Return the number of the closed form [unit], computed once: some take a quadrature."""
         return self.truth()
+
+    def truth_of(self, time: float) -> float:
+        """Return the number of the closed form for a simulated time [s]."""
+        return self.true_value if self.truth_after is None else self.truth_after(time)
 
     @property
     def error_unit(self) -> str:

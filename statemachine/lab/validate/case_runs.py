@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
-from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
+from ...backends import BACKENDS
+from ...errors import (
+    DivergedError,
+    ModelError,
+    StateMachineError,
+    UnsupportedError,
+    cut,
+    one_line,
+)
 from ...interface import make_data
-from ...processes.parallel import forks_for, in_forks
+from ...processes.parallel import forks_for, in_forks, unwinding
 from ..runs.drive import Progress
 from .case import TIMESTEPS, Case
-from .run import Run
+from .run import Run, TimestepError
 from .variants import Variant
 from .verdict import CaseMeasurement
 
@@ -42,12 +51,14 @@ class CaseOutcome:
     """What came of a run.
 
     Attributes:
-        measurement: What was measured; None if the model was refused.
-        refusal: Why it was refused; "" if it was not.
+        measurement: What was measured; None if the model was refused, or the run failed.
+        refusal: Why it was refused, or how it failed; "" otherwise.
+        failed: Whether the engine or its backend raised an error that is no refusal.
     """
 
     measurement: CaseMeasurement | None
     refusal: str = ""
+    failed: bool = False
 
 
 def timesteps_of(case: Case, timesteps: Sequence[float]) -> list[float]:
@@ -82,8 +93,7 @@ def outcomes_of(runs: Sequence[CaseRun], jobs: int, progress: Progress) -> list[
         What came of each, in the order of `runs`.
 
     Raises:
-        EngineError: A process ended before its run was done, twice.
-        StateMachineError: As an engine raises it, but for refusals and divergence.
+        TimestepError: A case cannot be run at a timestep.
     """
     count = 0
 
@@ -92,21 +102,30 @@ def outcomes_of(runs: Sequence[CaseRun], jobs: int, progress: Progress) -> list[
         count += 1
         progress(count / len(runs))
 
+    if jobs > 1:
+        return _outcomes_of_forks(runs, jobs, ended)
     outcomes: list[CaseOutcome] = []
-    if jobs == 1:
-        for number, run in enumerate(runs):
-            outcomes.append(outcome_of_run(run))
-            ended(number, outcomes[-1])
-        return outcomes
+    for number, run in enumerate(runs):
+        outcomes.append(outcome_of_run(run))
+        ended(number, outcomes[-1])
+    return outcomes
+
+
+def _outcomes_of_forks(
+    runs: Sequence[CaseRun], jobs: int, ended: Callable[[int, CaseOutcome], None]
+) -> list[CaseOutcome]:
+    """Make runs in forks of this process, as `outcomes_of` does; `ended` is told each outcome."""
     shortest = min(run.timestep for run in runs)
     slowest = _SLOWEST * max(TIMESTEPS[-1] / shortest, 1.0)
+    outcomes: list[CaseOutcome] = []
     # A fork that is killed leaves its files behind: they lie in a folder that is removed here.
-    with tempfile.TemporaryDirectory() as folder:
+    with unwinding(at_once=False) as raise_if_ended, tempfile.TemporaryDirectory() as folder:
         work = [partial(_outcome_in, folder, run) for run in runs]
-        for run, outcome in zip(runs, in_forks(work, jobs, ended, slowest), strict=True):
+        for outcome in in_forks(work, jobs, ended, slowest, raise_if_ended):
             if outcome is None:
-                raise EngineError(f"{run.case.name} on {run.variant} ended its process twice")
-            outcomes.append(outcome)
+                outcomes.append(CaseOutcome(None, "it ended its process twice", failed=True))
+            else:
+                outcomes.append(outcome)
     return outcomes
 
 
@@ -128,16 +147,29 @@ def _temporary_files_in(folder: str) -> Iterator[None]:
 
 
 def outcome_of_run(run: CaseRun) -> CaseOutcome:
-    """Make a run in this process.
+    """Make a run in this process. What an engine or its backend raises is its outcome.
 
     Raises:
-        StateMachineError: As an engine raises it, but for refusals and divergence.
+        TimestepError: The case cannot be run at the timestep.
     """
     with warnings.catch_warnings(action="ignore"):
         try:
             return CaseOutcome(measure(run.case, run.variant, run.timestep))
         except (ModelError, UnsupportedError) as error:
             return CaseOutcome(None, str(error))
+        except TimestepError as error:
+            raise TimestepError(f"{run.case.name}: {error}") from error
+        except Exception as error:  # a backend of another package may raise anything
+            return CaseOutcome(None, _failure(run.variant, error), failed=True)
+
+
+def _failure(variant: Variant, error: Exception) -> str:
+    """Return what is told of an error: of one that is no error of ours, where it comes from."""
+    if isinstance(error, StateMachineError):
+        return cut(one_line(error))
+    name = variant.backend.name
+    place = BACKENDS.get(name, "a release")
+    return cut(one_line(f"{type(error).__name__} in backend {name} ({place}): {error}"))
 
 
 def measure(case: Case, variant: Variant, timestep: float) -> CaseMeasurement:
@@ -157,6 +189,8 @@ def measure(case: Case, variant: Variant, timestep: float) -> CaseMeasurement:
             measured = case.measure(run)
         except DivergedError:
             return CaseMeasurement(timestep, None, None, None, run.steps, None)
+    if math.isnan(measured):
+        return CaseMeasurement(timestep, None, None, None, run.steps, None)
     discrete_error = None
     if variant.integrator in case.discrete:
         discrete_truth = case.discrete[variant.integrator](timestep)
@@ -164,7 +198,7 @@ def measure(case: Case, variant: Variant, timestep: float) -> CaseMeasurement:
     return CaseMeasurement(
         timestep=timestep,
         measured=measured,
-        error=case.error_of(measured, case.true_value),
+        error=case.error_of(measured, case.truth_of(run.time)),
         discrete_error=discrete_error,
         steps=run.steps,
         seconds_per_step=run.seconds / max(run.steps, 1),

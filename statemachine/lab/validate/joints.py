@@ -56,9 +56,9 @@ def _step_response(run: Run) -> float:
     return float(run.data.qpos[0])
 
 
-def _critical() -> float:
-    """Return 1 - (1 + w t) e^(-w t) at w t = 2 [m]."""
-    return 1.0 - 3.0 * math.exp(-2.0)
+def _critical(time: float = 0.2) -> float:
+    """Return 1 - (1 + w t) e^(-w t) at a time [s], w = 10 [m]."""
+    return 1.0 - (1.0 + 10.0 * time) * math.exp(-10.0 * time)
 
 
 # A servo far from its target, whose force is limited to 3 N: it accelerates evenly.
@@ -74,8 +74,8 @@ def _speed_at_limit(run: Run) -> float:
     return float(run.data.qvel[0])
 
 
-def _even_speed() -> float:
-    return 3.0 / 1.5
+def _even_speed(time: float = 1.0) -> float:
+    return 3.0 / 1.5 * time
 
 
 # A motor whose speed is limited by the damping of its joint: torque over damping.
@@ -116,8 +116,8 @@ def _slip(run: Run) -> float:
     run.data.ctrl[0] = 1.1
     run.advance(1.0)
     before = float(run.data.qvel[0])
-    run.advance(1.0)
-    return float(run.data.qvel[0]) - before
+    time = run.advance(1.0)
+    return (float(run.data.qvel[0]) - before) / time
 
 
 def _slip_truth() -> float:
@@ -148,8 +148,8 @@ def _speed_of_rotor(run: Run) -> float:
     return float(run.data.qvel[0])
 
 
-def _rotor_truth() -> float:
-    return 0.4 / (0.15 + 0.05)
+def _rotor_truth(time: float = 1.0) -> float:
+    return 0.4 * time / (0.15 + 0.05)
 
 
 # A joint that turns three times as far as another: its inertia counts nine times.
@@ -171,8 +171,8 @@ def _speed_of_geared(run: Run) -> float:
     return float(run.data.qvel[0])
 
 
-def _geared_truth() -> float:
-    return 0.2 * 0.5 / (0.1 + 3.0**2 * 0.02)
+def _geared_truth(time: float = 0.5) -> float:
+    return 0.2 * time / (0.1 + 3.0**2 * 0.02)
 
 
 def _mimic_error(run: Run) -> float:
@@ -206,6 +206,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_CRITICAL,
         measure=_step_response,
         truth=_critical,
+        truth_after=_critical,
         unit="m",
         source="Landau and Lifshitz, section 25",
         expected={
@@ -225,6 +226,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_WEAK,
         measure=_speed_at_limit,
         truth=_even_speed,
+        truth_after=_even_speed,
         unit="m/s",
         source="Goldstein, section 1.1",
         relative=True,
@@ -302,6 +304,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_ARMATURE,
         measure=_speed_of_rotor,
         truth=_rotor_truth,
+        truth_after=_rotor_truth,
         unit="rad/s",
         source="Siciliano, section 7.2.1 (inertia of the rotor)",
         relative=True,
@@ -315,6 +318,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_MIMIC,
         measure=_speed_of_geared,
         truth=_geared_truth,
+        truth_after=_geared_truth,
         unit="rad/s",
         source="Siciliano, section 5.2.1 (gears multiply an inertia by the square)",
         relative=True,

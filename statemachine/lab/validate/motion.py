@@ -24,7 +24,7 @@ from .case import (
     exact_steps,
     wrong,
 )
-from .run import Run, Samples, largest_deviation, zero, zero_crossings
+from .run import Run, Samples, largest_deviation, simulated_time, zero, zero_crossings
 
 _BEFORE_POSITION: tuple[Integrator, ...] = ("Euler", "implicit", "implicitfast", "discrete")
 
@@ -42,8 +42,8 @@ def _fallen_height(run: Run) -> float:
     return float(run.data.qpos[2])
 
 
-def _fall() -> float:
-    return -GRAVITY / 2.0
+def _fall(time: float = 1.0) -> float:
+    return -GRAVITY * time**2 / 2.0
 
 
 def _stepwise_fall(timestep: float) -> float:
@@ -54,14 +54,14 @@ def _stepwise_fall(timestep: float) -> float:
 
 def _distance_from_parabola(run: Run) -> float:
     run.data.qvel[:3] = _THROW
-    run.advance(1.0)
-    parabola = _THROW + np.array([0.0, 0.0, -GRAVITY / 2.0])
+    time = run.advance(1.0)
+    parabola = _THROW * time + np.array([0.0, 0.0, -GRAVITY / 2.0]) * time**2
     return float(np.linalg.norm(run.data.qpos[:3] - parabola))
 
 
 def _stepwise_distance(timestep: float) -> float:
     """Return g h t / 2: how much deeper it is after 1 s."""
-    return GRAVITY * timestep / 2.0
+    return GRAVITY * timestep * simulated_time(1.0, timestep) / 2.0
 
 
 # A mass on a spring, 10 rad/s.
@@ -115,12 +115,12 @@ def _position_after_half_second(run: Run) -> float:
     return float(run.data.qpos[0])
 
 
-def _damped() -> float:
-    """Return e^(-d t) (cos w t + d / w sin w t) at 0.5 s [m], d = 0.5 and w² = 100 - d²."""
+def _damped(time: float = 0.5) -> float:
+    """Return e^(-d t) (cos w t + d / w sin w t) at a time [s], d = 0.5 and w² = 100 - d² [m]."""
     decay = 0.5
     rate = math.sqrt(_RATE**2 - decay**2)
-    phase = rate * 0.5
-    return math.exp(-decay * 0.5) * (math.cos(phase) + decay / rate * math.sin(phase))
+    phase = rate * time
+    return math.exp(-decay * time) * (math.cos(phase) + decay / rate * math.sin(phase))
 
 
 # A weight that sinks against damping: 1 kg, 4 N s/m.
@@ -136,8 +136,8 @@ def _sinking_speed(run: Run) -> float:
     return float(run.data.qvel[0])
 
 
-def _sinking() -> float:
-    return -GRAVITY / 4.0 * (1.0 - math.exp(-1.0))
+def _sinking(time: float = 0.25) -> float:
+    return -GRAVITY / 4.0 * (1.0 - math.exp(-4.0 * time))
 
 
 def _stepwise_sinking(timestep: float) -> float:
@@ -214,6 +214,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_FREE,
         measure=_fallen_height,
         truth=_fall,
+        truth_after=_fall,
         unit="m",
         source="Goldstein, section 1.1",
         discrete=_EACH_STEPWISE_FALL,
@@ -283,6 +284,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_DAMPED_SPRING,
         measure=_position_after_half_second,
         truth=_damped,
+        truth_after=_damped,
         unit="m",
         source="Landau and Lifshitz, section 25",
         expected={
@@ -300,6 +302,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_SINKING,
         measure=_sinking_speed,
         truth=_sinking,
+        truth_after=_sinking,
         unit="m/s",
         source="Goldstein, chapter 1, derivation 11 (Rayleigh's dissipation)",
         discrete=_EACH_STEPWISE_SINKING,

@@ -7,6 +7,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...installed import DEFAULT
 from ...measures.text import NO_NUMBER, command, figure, milliseconds, quantity, significant
 from ...program import NAME
 from ...show.blocks import Page, Table
@@ -16,6 +17,7 @@ from ...show.templates import PageContent, render
 from .battery import CaseResult, ValidateResult
 from .case import Verdict
 
+NO_PICTURE = "no run has an error to draw"
 _LINES = 9  # of a terminal's page that both tables share
 _LEAST_ROWS = 2
 _MOST_ENGINES = 8
@@ -51,6 +53,13 @@ class _CasePart:
         """Return the closed form, with its unit."""
         return quantity(self.result.truth, self.result.unit)
 
+    @property
+    def has_other_times(self) -> bool:
+        """Tell whether the truth depends on the time, and a timestep is none of the case's."""
+        case = self.result.case
+        steps = {measurement.timestep for measurement in self.result.measurements}
+        return case.truth_after is not None and not steps <= set(case.timesteps)
+
 
 @dataclass(frozen=True)
 class _Nearest:
@@ -73,7 +82,7 @@ class ValidatePage(PageContent):
 
     Attributes:
         result: What was measured.
-        nearest: Who is nearest to the truth.
+        nearest: Who is nearest to the truth; None where nothing was measured.
         engines: Table with a row for each engine and integrator.
         worst: Table of the largest errors.
         parts: One for each case; empty without details.
@@ -82,7 +91,7 @@ class ValidatePage(PageContent):
 
     template = "validate.md.j2"
     result: ValidateResult
-    nearest: _Nearest
+    nearest: _Nearest | None
     engines: Table
     worst: Table
     parts: Sequence[_CasePart]
@@ -107,7 +116,39 @@ class ValidatePage(PageContent):
     @property
     def worse(self) -> list[str]:
         """Return what is worse than its record, each as "case on engine"."""
-        return [_label(row) for row in self.result.results if not row.holds]
+        return [_label(row) for row in self._measured if row.status == "worse"]
+
+    @property
+    def wrong_without_record(self) -> list[str]:
+        """Return what is wrong with nothing on record, each as "case on engine"."""
+        rows = [row for row in self._measured if row.status == "not on record"]
+        return [_label(row) for row in rows if not row.holds]
+
+    @property
+    def failed(self) -> list[str]:
+        """Return what failed, each as "case on engine"."""
+        return [_label(row) for row in self.result.results if row.verdict == "failed"]
+
+    @property
+    def first_failure(self) -> str:
+        """Return what the first that failed tells of it; "" where none did."""
+        failures = [row.refusal for row in self.result.results if row.verdict == "failed"]
+        return next(iter(failures), "").rstrip(".")
+
+    @property
+    def at_other_timesteps(self) -> int:
+        """Return the number of results whose timesteps are none of their record's."""
+        return sum(row.status == "other timestep" for row in self.result.results)
+
+    @property
+    def is_as_recorded(self) -> bool:
+        """Tell whether all was compared with its record, and is as that says, or better."""
+        return self.result.holds and self.at_other_timesteps == 0
+
+    @property
+    def _measured(self) -> list[CaseResult]:
+        """Return what did not fail."""
+        return [row for row in self.result.results if row.verdict != "failed"]
 
     @property
     def better(self) -> list[str]:
@@ -145,7 +186,7 @@ def _count(results: Sequence[CaseResult], verdicts: Sequence[str]) -> int:
 
 def _engines(results: Sequence[CaseResult]) -> Table:
     """Return how many cases each engine and integrator does how."""
-    headers = ("engine", "exact", "converges", "bounded", "wrong", "refused")
+    headers = ("engine", "exact", "converges", "bounded", "wrong", "no result")
     rows: list[tuple[str, ...]] = []
     ways = dict.fromkeys(row.way for row in results)
     for way in list(ways)[:_MOST_ENGINES]:
@@ -155,22 +196,24 @@ def _engines(results: Sequence[CaseResult]) -> Table:
             _count(mine, ("converges",)),
             _count(mine, ("bounded",)),
             _count(mine, _WRONG),
-            _count(mine, ("refused",)),
+            _count(mine, ("refused", "failed")),
         )
         rows.append((way, *map(str, counts)))
     return Table(headers, rows)
 
 
-def _nearest(results: Sequence[CaseResult]) -> _Nearest:
-    """Return who is wrong or refuses least often, then is exact most often, then errs least.
+def _nearest(results: Sequence[CaseResult]) -> _Nearest | None:
+    """Return who is wrong, refuses or fails least often, then is exact most often, then errs least.
 
     The last is the median over its cases of the error, in parts of what a case tolerates.
     """
+    if all(row.worst is None for row in results):
+        return None
     marks: dict[_Nearest, tuple[int, int, float]] = {}
     for way in dict.fromkeys(row.way for row in results):
         mine = [row for row in results if row.way == way]
         exact = _count(mine, _EXACT)
-        not_right = _count(mine, (*_WRONG, "refused"))
+        not_right = _count(mine, (*_WRONG, "refused", "failed"))
         median = statistics.median(badness(row)[1] for row in mine)
         marks[_Nearest(way, len(mine), exact)] = (not_right, -exact, median)
     return min(marks, key=marks.__getitem__)
@@ -306,13 +349,22 @@ def _costs(row: CaseResult) -> list[str]:
 
 
 def _next_command(result: ValidateResult, details: bool) -> str:
-    """Return what to type next, of the worst case: its details, or with them its JSON."""
+    """Return what to type next, with what was asked for: its details, or with them its JSON.
+
+    Where no case is named it is of the worst.
+    """
+    request = result.request
     worst = max(result.results, key=badness)
     words = [NAME, "validate"]
-    for backend in result.request.backends:
+    for backend in request.backends if request.backends != (DEFAULT,) else ():
         words += ["--backend", backend]
-    words += ["--case", worst.name, "--json" if details else "--details"]
-    return command(words)
+    cases = request.cases if request.cases else (worst.name,)
+    for case in cases:
+        words += ["--case", case]
+    for timestep in request.timesteps:
+        words += ["--timestep", repr(timestep)]
+    words.append("--json" if details else "--details")
+    return command(words, ("--jobs", request.jobs, None))
 
 
 def junit_of(result: ValidateResult) -> str:
@@ -332,6 +384,8 @@ def junit_of(result: ValidateResult) -> str:
 
 def _failure(row: CaseResult) -> str:
     """Return what a failed test says: what came of it, and what is on record."""
+    if row.refusal:
+        return f"{row.verdict}: {row.refusal}"
     sizes = ", ".join(error_of_row(row, measurement.error) for measurement in row.measurements)
     record = "nothing"
     if row.expectation is not None:

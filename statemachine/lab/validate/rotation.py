@@ -31,9 +31,9 @@ def _drift_of_centre(run: Run) -> float:
     """Return how far the centre of mass is from its straight line, seen from above [m]."""
     data = run.data
     data.qvel[:3], data.qvel[3:] = _THROW, _SPIN
-    run.advance(1.0)
+    time = run.advance(1.0)
     centre = data.qpos[:3] + matrix_from_quat(data.qpos[3:]) @ _OFFSET
-    straight = _OFFSET + _THROW + np.cross(_SPIN, _OFFSET)
+    straight = _OFFSET + (_THROW + np.cross(_SPIN, _OFFSET)) * time
     return float(np.hypot(*(centre - straight)[:2]))
 
 
@@ -41,13 +41,13 @@ def _spun_angle(run: Run) -> float:
     """Return how far it turned in 1 s, of which a whole turn is known [rad]."""
     data = run.data
     data.qvel[:3], data.qvel[3:] = _THROW, _SPIN
-    run.advance(1.0)
+    expected = _turned(run.advance(1.0))
     angle = 2.0 * math.atan2(data.qpos[6], data.qpos[3])
-    return 10.0 + math.remainder(angle - 10.0, 2.0 * math.pi)
+    return expected + math.remainder(angle - expected, 2.0 * math.pi)
 
 
-def _ten() -> float:
-    return 10.0
+def _turned(time: float = 1.0) -> float:
+    return 10.0 * time
 
 
 # A body that tumbles about its middle axis, without forces.
@@ -131,8 +131,8 @@ def _turned_rate(run: Run) -> float:
     return math.atan2(second, first)
 
 
-def _symmetric_truth() -> float:
-    return (1.5 / 1.0 - 1.0) * 4.0
+def _symmetric_truth(time: float = 1.0) -> float:
+    return (1.5 / 1.0 - 1.0) * 4.0 * time
 
 
 # Two bodies on a hinge in the air, without gravity.
@@ -221,7 +221,8 @@ CASES: tuple[Case, ...] = (
         description="The same body spins about the vertical; its angle after 1 s is measured.",
         mjcf=_OFF_CENTRE,
         measure=_spun_angle,
-        truth=_ten,
+        truth=_turned,
+        truth_after=_turned,
         unit="rad",
         source="Goldstein, section 5.6",
         expected={"own": wrong(1.75, "engine's own"), "*": exact()},
@@ -284,6 +285,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_SYMMETRIC,
         measure=_turned_rate,
         truth=_symmetric_truth,
+        truth_after=_symmetric_truth,
         unit="rad",
         source="Landau and Lifshitz, section 36",
         gravity=(0.0, 0.0, 0.0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -12,6 +13,13 @@ from ...errors import BadInputError
 from ...interface import Data, Model, forward, step
 from ...interface.records import Array
 from ...release_names import is_release
+
+MAX_STEPS = 10_000_000  # of a run
+_SAME_TIME = 1e-14  # relative: what is closer is apart by rounding
+
+
+class TimestepError(BadInputError):
+    """A case cannot be run at a timestep."""
 
 
 class Samples(NamedTuple):
@@ -33,6 +41,8 @@ class Run:
         model: The case's, as an engine has it.
         data: A fresh one, which the case changes.
         steps: Number of steps made.
+        time: Simulated time of these steps [s]: that of the closed form which they are held
+            against.
         seconds: CPU time of these steps [s], so that what else is computed on the machine counts
             little; of a release, which has a process of its own, the time by the clock.
     """
@@ -41,6 +51,7 @@ class Run:
         self.model = model
         self.data = data
         self.steps = 0
+        self.time = 0.0
         self.seconds = 0.0
         self._clock = time.perf_counter if is_release(model.backend) else time.process_time
 
@@ -49,13 +60,17 @@ class Run:
         """Return the length of a step [s]."""
         return self.model.timestep
 
-    def advance(self, duration: float) -> None:
-        """Step as long as `duration` [s], rounded to whole steps; at least one."""
+    def advance(self, duration: float) -> float:
+        """Step as long as `duration` [s], rounded to whole steps; at least one.
+
+        Returns:
+            The simulated time [s], which is another where the timestep does not divide it.
+        """
         count = self._count(duration)
         began = self._clock()
         step(self.model, self.data, count)
         self.seconds += self._clock() - began
-        self.steps += count
+        return self._add(count, duration)
 
     def sample(self, duration: float, read: Callable[[Data], float | Array]) -> Samples:
         """Step as long as `duration` [s], and read before the first step and after each.
@@ -74,21 +89,49 @@ class Run:
             times.append(data.time)
             values.append(np.array(read(data)))
         self.seconds += self._clock() - began
-        self.steps += count
+        self._add(count, duration)
         return Samples(np.array(times), np.array(values))
 
     def forward(self) -> None:
         """Recompute what is derived; no time passes."""
         forward(self.model, self.data)
 
+    def _add(self, count: int, duration: float) -> float:
+        """Add steps that were made, and return their simulated time [s]."""
+        simulated = simulated_time(duration, self.timestep)
+        self.steps += count
+        self.time += simulated
+        return simulated
+
     def _count(self, duration: float) -> int:
-        """Return the whole number of steps that a duration [s] takes."""
-        count = round(duration / self.timestep)
+        """Return the whole number of steps that a duration [s] takes.
+
+        Raises:
+            TimestepError: That is none, or the run would have too many.
+        """
+        timestep = self.timestep
+        if duration > (MAX_STEPS - self.steps) * timestep * (1.0 + _SAME_TIME):
+            raise TimestepError(
+                f"a timestep of {timestep!r} s is too short: the run would take more than "
+                f"{MAX_STEPS:,} steps"
+            )
+        count = round(duration / timestep)
         if count < 1:
-            raise BadInputError(
-                f"a timestep of {self.timestep:g} s is too long for a run of {duration:g} s"
+            raise TimestepError(
+                f"a timestep of {timestep!r} s is too long for a run of {duration:g} s"
             )
         return count
+
+
+def simulated_time(duration: float, timestep: float) -> float:
+    """Return the time [s] of the whole number of steps that is nearest to a duration.
+
+    Args:
+        duration: What is asked for [s]; returned as it is where the timestep divides it.
+        timestep: Length of a step [s].
+    """
+    time = round(duration / timestep) * timestep
+    return duration if math.isclose(time, duration, rel_tol=_SAME_TIME) else time
 
 
 def zero_crossings(samples: Samples, rising: bool) -> Array:

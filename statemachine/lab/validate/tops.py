@@ -41,6 +41,11 @@ def precession() -> float:
     return (linear - root) / (2.0 * squared)
 
 
+def _precessed(time: float = 1.0) -> float:
+    """Return by how much it precesses in a time [s] [rad]."""
+    return precession() * time
+
+
 def _axis(data: Data) -> Array:
     """Return where the axis of the top points, seen from above."""
     w, x, y, z = data.qpos
@@ -48,7 +53,7 @@ def _axis(data: Data) -> Array:
 
 
 def _turn_of_ball(run: Run) -> float:
-    """Return the mean rate of precession over 1 s [rad/s]."""
+    """Return by how much the top precesses in 1 s [rad]."""
     half = _TILT / 2.0
     run.data.qpos[:] = [math.cos(half), 0.0, math.sin(half), 0.0]
     run.data.qvel[:] = [-precession() * math.sin(_TILT), 0.0, _TOP_SPIN]
@@ -80,15 +85,15 @@ _GYROSCOPE = (
 
 def _gimbal_turn(run: Run) -> float:
     """Return how far the outer gimbal turns in 1 s, from the steady motion [rad]."""
-    run.data.qvel[:] = [_gimbal_truth(), 0.0, 50.0]
+    run.data.qvel[:] = [_gimbal_truth(1.0), 0.0, 50.0]
     run.data.ctrl[0] = 0.25
     run.advance(1.0)
     return float(run.data.qpos[0])
 
 
-def _gimbal_truth() -> float:
-    """Return M / (C s): a torque of 0.25 N m across a wheel of 0.01 kg m² at 50 rad/s."""
-    return 0.25 / (0.01 * 50.0)
+def _gimbal_truth(time: float = 1.0) -> float:
+    """Return M t / (C s): a torque of 0.25 N m across a wheel of 0.01 kg m² at 50 rad/s."""
+    return 0.25 * time / (0.01 * 50.0)
 
 
 CASES: tuple[Case, ...] = (
@@ -99,7 +104,8 @@ CASES: tuple[Case, ...] = (
         "measured.",
         mjcf=_BALL_TOP,
         measure=_turn_of_ball,
-        truth=precession,
+        truth=_precessed,
+        truth_after=_precessed,
         unit="rad",
         source="Goldstein, section 5.7",
         relative=True,
@@ -119,7 +125,8 @@ CASES: tuple[Case, ...] = (
         "measured.",
         mjcf=_HINGED_TOP,
         measure=_turn_of_hinges,
-        truth=precession,
+        truth=_precessed,
+        truth_after=_precessed,
         unit="rad",
         source="Goldstein, section 5.7",
         relative=True,
@@ -134,6 +141,7 @@ CASES: tuple[Case, ...] = (
         mjcf=_GYROSCOPE,
         measure=_gimbal_turn,
         truth=_gimbal_truth,
+        truth_after=_gimbal_truth,
         unit="rad",
         source="Goldstein, section 5.7 (the gyroscope)",
         relative=True,

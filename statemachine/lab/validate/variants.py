@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from ...backends import BackendChoice, load
-from ...errors import EngineWarning, ModelError, UnsupportedError
+from ...errors import EngineWarning, MissingEngineError, ModelError, UnsupportedError
 from ...interface import Model
 from .case import GRAVITY, Integrator
 
@@ -91,4 +91,8 @@ def _steps_so(variant: Variant) -> bool:
                 pass
         except (ModelError, UnsupportedError):
             return False
+        except MissingEngineError:
+            raise
+        except Exception:  # of another package, which may raise anything: each case tells of it
+            return True
     return not any(issubclass(warning.category, EngineWarning) for warning in caught)

@@ -19,7 +19,8 @@ _RANKS: tuple[Verdict, ...] = get_args(Verdict)
 
 _MUCH_SMALLER = 4.0  # by how much an error below its record shows that the record is out of date
 
-Status = Literal["as expected", "better", "worse", "not on record"]
+# "other timestep": the record is of the case's own timesteps, and none of them was asked for.
+Status = Literal["as expected", "better", "worse", "not on record", "other timestep"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class CaseMeasurement:
     Attributes:
         timestep: [s].
         measured: The number [unit of the case]; None if the run diverged.
-        error: How far it is from the truth [unit of the case's error]; None likewise.
+        error: How far it is from the truth for the time that was simulated, steps times
+            timestep [unit of the case's error]; None likewise.
         discrete_error: How far it is from the exact discrete truth [unit of the case's error];
             None without one.
         steps: Number of steps of the run.
@@ -91,14 +93,22 @@ def judgement_of(
     """Return how an engine does, and whether that is as on record.
 
     Args:
-        case: Whose tolerances count; the record is of its longest timestep.
+        case: Whose tolerances count; the record is of its own timesteps.
         measurements: From the longest timestep to the shortest; empty if it was refused.
         expectation: The record; None if there is none.
     """
     order = observed_order(case, measurements)
     verdict = _verdict(case, measurements, order)
-    status = _status(case, measurements, expectation, verdict, order)
-    return CaseJudgement(verdict, order, status)
+    return CaseJudgement(verdict, order, _status_of_own(case, measurements, expectation))
+
+
+def failure_judgement(expectation: Expectation | None) -> CaseJudgement:
+    """Return the judgement of a run that failed: nothing was measured.
+
+    Args:
+        expectation: The record; None if there is none.
+    """
+    return CaseJudgement("failed", None, "not on record" if expectation is None else "worse")
 
 
 def _verdict(case: Case, measurements: Sequence[CaseMeasurement], order: float | None) -> Verdict:
@@ -122,6 +132,17 @@ def _verdict(case: Case, measurements: Sequence[CaseMeasurement], order: float |
     return "wrong"
 
 
+def _status_of_own(
+    case: Case, measurements: Sequence[CaseMeasurement], expectation: Expectation | None
+) -> Status:
+    """Tell whether an engine does as its record says, at the timesteps that this is of."""
+    own = [each for each in measurements if each.timestep in case.timesteps]
+    if expectation is not None and measurements and not own:
+        return "other timestep"
+    order = observed_order(case, own)
+    return _status(case, own, expectation, _verdict(case, own, order), order)
+
+
 def _status(
     case: Case,
     measurements: Sequence[CaseMeasurement],
@@ -141,14 +162,14 @@ def _status(
     if not measurements or measurements[0].error is None:
         return "as expected"
     size = abs(measurements[0].error)
-    bound = _bound(case, expectation, measurements[0].timestep)
-    if size > bound:
+    if size > expectation.within:
         return "worse"
     if _is_lower(order, expectation.order):
         return "worse"
     # A shorter timestep than the case's own has a smaller error anyway, and chaos has any.
-    is_comparable = measurements[0].timestep >= case.timesteps[0] and not case.is_chaotic
-    if is_comparable and expected != "exact" and _largest(measurements) < bound / _MUCH_SMALLER:
+    is_comparable = measurements[0].timestep == case.timesteps[0] and not case.is_chaotic
+    much_smaller = _largest(measurements) < expectation.within / _MUCH_SMALLER
+    if is_comparable and expected != "exact" and much_smaller:
         return "better"
     return "as expected"
 
@@ -166,10 +187,3 @@ def _largest(measurements: Sequence[CaseMeasurement]) -> float:
     for measurement in measurements:
         sizes.append(math.inf if measurement.error is None else abs(measurement.error))
     return max(sizes)
-
-
-def _bound(case: Case, expectation: Expectation, timestep: float) -> float:
-    """Return the largest error that is expected at a timestep, which may be a longer one."""
-    longer = max(timestep / case.timesteps[0], 1.0)
-    order = 1.0 if expectation.order is None else max(expectation.order, 1.0)
-    return expectation.within * longer**order
