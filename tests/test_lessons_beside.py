@@ -17,11 +17,13 @@ import statemachine as sm
 from statemachine.backends import parse_backend
 from statemachine.course.lessons import LESSONS, PATH
 from statemachine.course.lessons.energy import EnergyChange, EnergyResult
+from statemachine.course.lessons.program import program_of
 from statemachine.course.lessons.request import LessonRequest
 from statemachine.course.lessons.session import LessonRun, page_of_lesson, take
 from statemachine.course.lessons.step import LINES, StepLessonResult, StepLine, step_source
 from statemachine.course.lessons.step_page import ASKED
 from statemachine.errors import BadInputError, MissingEngineError, UnsupportedError
+from statemachine.lab.runs.scenarios import SCENARIOS
 from statemachine.lab.validate.case_runs import measure
 from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.stepper import StepTerms
@@ -29,7 +31,7 @@ from statemachine.lab.validate.variants import Variant
 from statemachine.models import models_dir
 from statemachine.show.blocks import Page, Question, Table, Verdict
 
-from .support.pages import blocks, lesson_result, with_figures
+from .support.pages import blocks, lesson_result, shown, with_figures
 from .support.processes import Cli
 
 
@@ -57,7 +59,7 @@ def test_they_come_after_the_end_of_the_course() -> None:
 @pytest.mark.slow
 def test_one_leads_to_the_other(here: Cli, pinocchio: None) -> None:
     shown = here("lesson", "step", "--no-questions", code=0).stdout
-    assert shown.endswith("statemachine lesson energy\n")
+    assert shown.rstrip().endswith("statemachine lesson energy")
 
 
 # What does one step do?
@@ -159,6 +161,83 @@ def test_a_run_that_diverges_says_when(pinocchio: None, monkeypatch: pytest.Monk
 def test_a_robot_that_the_program_does_not_step_is_refused(pinocchio: None) -> None:
     with pytest.raises(UnsupportedError):
         lesson_result("step", sm.load("so101/scene_box"))
+
+
+LINK = """
+<mujoco>
+  <option timestep="0.005" {integrator}/>
+  <worldbody>
+    <body>
+      <joint name="joint" type="{kind}" axis="{axis}" damping="1"/>
+      <inertial pos="0 0 -0.3" mass="1" diaginertia="0.01 0.02 0.03"/>
+    </body>
+  </worldbody>
+  {actuator}
+</mujoco>
+"""
+SERVO = '<actuator><position joint="joint" kp="20" kv="1"/></actuator>'
+
+
+def _link(
+    folder: Path, kind: str = "hinge", integrator: str = "", actuator: str = SERVO
+) -> sm.Model:
+    axis = "0 0 1" if kind == "slide" else "0 1 0"
+    text = LINK.format(kind=kind, axis=axis, integrator=integrator, actuator=actuator)
+    path = folder / "link.xml"
+    path.write_text(text, encoding="utf-8")
+    return sm.load(path)
+
+
+@pytest.mark.parametrize("integrator", ["", 'integrator="RK4"'])
+def test_a_file_with_another_integrator_is_run_with_that_of_the_program(
+    integrator: str, tmp_path: Path, pinocchio: None
+) -> None:
+    model = _link(tmp_path, integrator=integrator)
+    result = lesson_result("step", model)
+    assert result.whole.gap < 1e-12
+    raw = mujoco.MjModel.from_xml_path(str(model.path))
+    raw.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data = mujoco.MjData(raw)
+    taken = take(LESSONS["step"], model, "mujoco")
+    data.ctrl[:] = float(taken.code.partition("ctrl[:] = [")[2].partition("]")[0])
+    mujoco.mj_step(raw, data, result.steps)
+    assert np.array_equal(result.qpos[-1], data.qpos)
+
+
+def test_the_code_says_that_it_takes_another_integrator(tmp_path: Path, pinocchio: None) -> None:
+    other = take(LESSONS["step"], _link(tmp_path), "mujoco").code
+    own = take(LESSONS["step"], _link(tmp_path, integrator='integrator="implicitfast"'), "mujoco")
+    assert "Euler" in other
+    assert 'integrator="implicitfast"' in other
+    assert "integrator" not in own.code
+
+
+def test_what_a_slide_is_off_by_is_a_length(tmp_path: Path, pinocchio: None) -> None:
+    result = lesson_result("step", _link(tmp_path, "slide"))
+    row = next(row for row in result.without if row.name == "gravity")
+    assert row.slide
+    table = next(t for t in blocks(_page("step", result), Table) if len(t.rows) > len(LINES))
+    cell = next(cells for cells in table.rows if cells[0] == "gravity")[2]
+    assert cell == f"{1000.0 * row.gap:.3f} mm"
+    assert not any("°" in cell for cells in table.rows for cell in cells)
+
+
+@pytest.mark.parametrize("lesson", ["step", "hold", "gravity"])
+def test_a_robot_without_servos_is_told_an_experiment_that_there_is(
+    lesson: str, tmp_path: Path, pinocchio: None
+) -> None:
+    for actuator in ("", '<actuator><motor joint="joint"/></actuator>'):
+        model = _link(tmp_path, actuator=actuator)
+        with pytest.raises(BadInputError) as caught:
+            lesson_result(lesson, model)
+        name = str(caught.value).partition("statemachine compare ")[2].split()[0]
+        assert SCENARIOS[name].on(model).name == name
+
+
+def test_a_robot_of_ball_joints_is_not_called_one_without_names(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError) as caught:
+        lesson_result("forward", _link(tmp_path, "ball", actuator=""))
+    assert "ball" in str(caught.value).replace("link.xml", "")
 
 
 def test_without_pinocchio_the_lesson_says_what_to_install(
@@ -273,6 +352,39 @@ def test_a_longer_run_than_was_measured_makes_no_claim_about_it() -> None:
     assert len(blocks(longer, Verdict)) == len(blocks(_page("energy", result), Verdict)) - 1
 
 
+def test_the_simulated_time_acts_on_every_run() -> None:
+    result = lesson_result("energy", sm.load("tumbling"), seconds=3.0)
+    assert [row.seconds for row in result.rows[::5]] == [1.5, 1.5, 3.0]
+    assert result.window == 1.5
+    assert _row(result, "tumbling", "Euler").times[-1] == pytest.approx(3.0)
+    raw = mujoco.MjModel.from_xml_path(str(models_dir() / "tumbling" / "tumbling.xml"))
+    raw.opt.timestep = 0.001
+    data = mujoco.MjData(raw)
+    data.qvel[3:] = [0.01, 5.0, 0.01]
+    inertia = np.array([1.0, 2.0, 3.0])
+    start, worst = float(inertia @ data.qvel[3:] ** 2), 0.0
+    for step in range(3000):
+        mujoco.mj_step(raw, data)
+        if step + 1 >= 1500:
+            worst = max(worst, float(inertia @ data.qvel[3:] ** 2) / start - 1.0, key=abs)
+    assert _row(result, "tumbling", "Euler").by_timestep[2] == pytest.approx(worst, rel=1e-9)
+    headers = [table.headers for table in blocks(_page("energy", result), Table)]
+    assert headers[1][-1] == "3 s"
+
+
+def test_of_a_time_without_an_error_no_claim_fails() -> None:
+    assert _page("energy", lesson_result("energy", sm.load("tumbling"), seconds=0.013)).holds
+
+
+@pytest.mark.parametrize("backend", ["mujoco", "without RK4"])
+def test_what_rk4_costs_is_said_where_it_is_in_the_table(backend: str) -> None:
+    result = _result("energy")
+    if backend != "mujoco":
+        rows = [replace(row, is_supported=row.integrator != "RK4") for row in result.rows]
+        result = replace(result, rows=tuple(rows))
+    assert ("four times" in shown(_page("energy", result))) == (backend == "mujoco")
+
+
 def test_another_model_is_refused(scene: sm.Model) -> None:
     with pytest.raises(BadInputError, match="tumbling"):
         lesson_result("energy", scene)
@@ -298,6 +410,16 @@ def test_the_lesson_has_a_picture(tmp_path: Path, here: Cli, matplotlib: Any) ->
 def test_the_result_is_json(name: str, here: Cli, pinocchio: None) -> None:
     figures = json.loads(here("lesson", name, "--json", code=0).stdout)["mujoco"]
     assert figures["provenance"]["backend"] == "mujoco"
+
+
+def test_a_lesson_without_a_program_says_so() -> None:
+    with pytest.raises(BadInputError, match="no program"):
+        program_of(LessonRequest("questions"))
+
+
+@pytest.mark.parametrize("name", [name for name in LESSONS if name != "questions"])
+def test_every_other_lesson_has_a_program(name: str, pinocchio: None) -> None:
+    assert program_of(LessonRequest(name)).count("\n") > 2
 
 
 def test_a_request_takes_their_options() -> None:

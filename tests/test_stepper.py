@@ -245,6 +245,77 @@ def test_what_a_file_has_and_the_step_leaves_out_is_refused(feature: str, tmp_pa
     assert caught.value.feature == feature
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicit", "discrete"])
+def test_another_integrator_of_the_file_is_refused(integrator: str, tmp_path: Path) -> None:
+    model = _written(tmp_path, LINKS.replace("implicitfast", integrator))
+    with pytest.raises(UnsupportedError) as caught:
+        Stepper(model)
+    (feature,) = caught.value.features
+    assert f"integrator {integrator} " in feature
+    Stepper(model.replace(integrator="implicitfast"))
+
+
+def test_a_file_without_an_integrator_is_refused_as_one_with_euler(tmp_path: Path) -> None:
+    model = _written(tmp_path, LINKS.replace('integrator="implicitfast"', ""))
+    with pytest.raises(UnsupportedError) as caught:
+        Stepper(model)
+    assert "integrator Euler " in caught.value.feature
+
+
+def _flagged(flag: str, word: str) -> str:
+    """Return the links with a flag of their file."""
+    text = LINKS.replace(
+        'integrator="implicitfast"/>', 'integrator="implicitfast"><flag/></option>'
+    )
+    return text.replace("<flag/>", f'<flag {flag}="{word}"/>')
+
+
+FLAGS = (
+    ("constraint", "disable"),
+    ("frictionloss", "disable"),
+    ("damper", "disable"),
+    ("gravity", "disable"),
+    ("clampctrl", "disable"),
+    ("actuation", "disable"),
+    ("refsafe", "disable"),
+    ("diagexact", "enable"),
+    ("sleep", "enable"),
+)
+
+
+@pytest.mark.parametrize(("flag", "word"), FLAGS)
+def test_a_flag_of_the_file_that_changes_the_step_is_refused(
+    flag: str, word: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UnsupportedError) as caught:
+        Stepper(_written(tmp_path, _flagged(flag, word)))
+    assert caught.value.features == (f'the flag {flag}="{word}"',)
+
+
+@pytest.mark.parametrize("flag", ["warmstart", "eulerdamp", "spring", "equality", "island"])
+def test_a_flag_that_changes_nothing_of_the_step_is_taken(flag: str, tmp_path: Path) -> None:
+    model = _written(tmp_path, _flagged(flag, "disable"))
+    ctrl = np.array([0.8, 0.9, 0.2])
+    assert _worst(_stepped(model, ctrl), _raw(model, ctrl)) < 1e-9
+
+
+def test_a_flag_that_acts_on_nothing_of_the_robot_is_taken(tmp_path: Path) -> None:
+    option = '<option integrator="implicitfast"><flag damper="disable"/></option>'
+    body = f"{BODY.format(joint='')}</body>"
+    model = _written(tmp_path, f"<mujoco>{option}<worldbody>{body}</worldbody></mujoco>")
+    assert model.nv == 1
+    Stepper(model)
+
+
+def test_a_group_of_actuators_that_is_switched_off_is_refused(tmp_path: Path) -> None:
+    text = LINKS.replace(
+        'integrator="implicitfast"/>', 'integrator="implicitfast" actuatorgroupdisable="0"/>'
+    )
+    with pytest.raises(UnsupportedError) as caught:
+        Stepper(_written(tmp_path, text))
+    assert len(caught.value.features) == 1
+
+
 def test_a_motor_is_refused(tmp_path: Path) -> None:
     text = (
         f"<mujoco><worldbody>{BODY.format(joint='')}</body></worldbody>"

@@ -149,6 +149,11 @@ class CompiledModels:
 
     @mandatory
     @abstractmethod
+    def flags(self, raw: Any) -> dict[str, bool]:
+        """Return the flags of a compiled model that can change a motion: whether each is on."""
+
+    @mandatory
+    @abstractmethod
     def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
         """Return a copy of a compiled model with these edits, and all that follows from them."""
 

@@ -78,6 +78,11 @@ def usual_joint(model: Model, servos: bool = False) -> str:
     if not named:
         if not model.njnt:
             raise BadInputError(f"{model.path.name} has no joints, and this lesson is about one")
+        if (kinds == JointType.BALL).all():
+            raise BadInputError(
+                f"{model.path.name} has ball joints alone, and this lesson is about a joint of one "
+                "coordinate: a hinge or a slide"
+            )
         raise BadInputError(
             f"{model.path.name} names none of its joints, and this lesson is about one"
         )
@@ -127,8 +132,15 @@ def check_servos(model: Model, lesson: str, joint: str | None = None) -> None:
     has_servo = servos.size > 0 and (joint is None or model.joint_id(joint) in servos)
     if not has_servo:
         driven = model.path.name if joint is None else joint
-        words = command([lesson, str(model.path)])
+        words = command([_experiment_like(lesson, model), str(model.path)])
         raise BadInputError(
             f"no position servo drives {driven}, and this lesson is about servos; without one: "
             f"statemachine compare {words} (on one engine: trace record instead of compare)"
         )
+
+
+def _experiment_like(lesson: str, model: Model) -> str:
+    """Return the experiment to run instead of a lesson that is about servos."""
+    if not model.nu:
+        return "gravity"
+    return lesson if lesson in ("hold", "gravity") else "hold"

@@ -30,6 +30,7 @@ _LENGTH_SQUARED = 1.0 + 1e-6  # moment of inertia of the pendulum [kg m²]
 _AMPLITUDE = np.radians(120.0)
 _STIFFNESS = 100.0  # [N/m]
 _LAST = 2.0  # [s] over which the largest change counts: energy at one moment may be a phase
+_COMMON = 0.01  # [s] in which each of the timesteps comes by a whole number of times
 _SHARE_OF_CODE = 0.1  # of the time that the lesson takes
 
 
@@ -40,14 +41,14 @@ class EnergyBody:
     Attributes:
         name: A label of the lesson.
         case: The case of the battery that it is from.
-        seconds: How long it is run [s].
+        share: How long it is run, as a part of the time that is asked for.
         start: Writes the start into a Data.
         energy: Returns its energy [J].
     """
 
     name: str
     case: str
-    seconds: float
+    share: float
     start: Callable[[Data], None]
     energy: Callable[[Data], float]
 
@@ -79,9 +80,9 @@ def energy_of_tumbling(data: Data) -> float:
 
 
 BODIES: tuple[EnergyBody, ...] = (
-    EnergyBody("pendulum", "pendulum-rise", 10.0, _start_swing, _energy_of_swing),
-    EnergyBody("spring", "spring-energy", 10.0, _start_spring, _energy_of_spring),
-    EnergyBody("tumbling", "tumbling-energy", 20.0, _start_tumble, energy_of_tumbling),
+    EnergyBody("pendulum", "pendulum-rise", 0.5, _start_swing, _energy_of_swing),
+    EnergyBody("spring", "spring-energy", 0.5, _start_spring, _energy_of_spring),
+    EnergyBody("tumbling", "tumbling-energy", 1.0, _start_tumble, energy_of_tumbling),
 )
 
 
@@ -93,8 +94,9 @@ class EnergyChange:
         body: As in `BODIES`.
         integrator: By its name in MuJoCo's files.
         is_supported: Whether the backend has that integrator.
-        by_timestep: (k,) largest relative change in the last 2 s, at each of `TIMESTEPS`; NaN
-            without the integrator.
+        seconds: How long the body is run [s].
+        by_timestep: (k,) largest relative change in the window at the end, at each of `TIMESTEPS`;
+            NaN without the integrator.
         times: (n,) moments of the run with the longest timestep [s]; empty without the integrator.
         changes: (n,) the relative change of the energy at each of them.
     """
@@ -102,13 +104,14 @@ class EnergyChange:
     body: str
     integrator: Integrator
     is_supported: bool
+    seconds: float
     by_timestep: Array
     times: Array
     changes: Array
 
     @property
     def longest(self) -> float:
-        """Return the largest relative change in the last 2 s at the longest timestep."""
+        """Return the largest relative change in the window at the longest timestep."""
         return float(self.by_timestep[0])
 
     @property
@@ -135,6 +138,7 @@ class EnergyResult:
         change: Relative change of the energy in the code's run, at its end.
         rows: Of each body, and each integrator of MuJoCo.
         timesteps: At which each was run [s].
+        window: At the end of each run, over which the largest change counts [s].
         provenance: What it was computed with.
     """
 
@@ -142,6 +146,7 @@ class EnergyResult:
     change: float
     rows: tuple[EnergyChange, ...]
     timesteps: tuple[float, ...]
+    window: float
     provenance: Provenance
 
     def of_body(self, body: str) -> list[EnergyChange]:
@@ -180,12 +185,14 @@ def run(play: CodeRun, options: Options, progress: Progress) -> EnergyResult:
     model = play.model
     _, data = play.worlds[0]
     progress(_SHARE_OF_CODE)
-    rows = _rows(model, progress_of_stage(progress, _SHARE_OF_CODE, 1.0 - _SHARE_OF_CODE))
+    later = progress_of_stage(progress, _SHARE_OF_CODE, 1.0 - _SHARE_OF_CODE)
+    seconds = options["seconds"]
     return EnergyResult(
         seconds=data.time,
         change=energy_of_tumbling(data) / _energy_of_start(model) - 1.0,
-        rows=tuple(rows),
+        rows=tuple(_rows(model, seconds, later)),
         timesteps=TIMESTEPS,
+        window=_window(seconds),
         provenance=provenance(model),
     )
 
@@ -197,8 +204,33 @@ def _energy_of_start(model: Model) -> float:
         return energy_of_tumbling(data)
 
 
-def _rows(model: Model, progress: Progress) -> list[EnergyChange]:
-    """Return the change of the energy of each body with each integrator."""
+def times_until(seconds: float) -> list[float]:
+    """Return the moments at which the tumbling body is looked at, the last of them its end [s]."""
+    return [*(time for time in TIMES if time < seconds), seconds]
+
+
+def _window(seconds: float) -> float:
+    """Return how much of the end of a run is looked at [s]: at most the shortest run.
+
+    Args:
+        seconds: The time that is asked for [s].
+    """
+    return min(_LAST, *(_whole(body.share * seconds) for body in BODIES))
+
+
+def _whole(seconds: float) -> float:
+    """Return a time [s] that each of the timesteps comes by; the least is one of these."""
+    return max(1, round(seconds / _COMMON)) * _COMMON
+
+
+def _rows(model: Model, seconds: float, progress: Progress) -> list[EnergyChange]:
+    """Return the change of the energy of each body with each integrator.
+
+    Args:
+        model: On whose backend.
+        seconds: The time that is asked for [s].
+        progress: Told the fraction that is done.
+    """
     backend = BackendChoice(model.backend)
     available = {variant.integrator for variant in variants_of(backend)}
     names = [name for name in get_args(Integrator) if name != OWN]
@@ -206,51 +238,54 @@ def _rows(model: Model, progress: Progress) -> list[EnergyChange]:
     for body in BODIES:
         for name in names:
             variant = Variant(backend, name) if name in available else None
-            rows.append(_change(body, name, variant))
+            rows.append(_change(body, name, variant, seconds))
             progress(len(rows) / (len(BODIES) * len(names)))
     return rows
 
 
-def _change(body: EnergyBody, integrator: Integrator, variant: Variant | None) -> EnergyChange:
+def _change(
+    body: EnergyBody, integrator: Integrator, variant: Variant | None, seconds: float
+) -> EnergyChange:
     """Return the change of the energy of a body with an integrator.
 
     Args:
         body: What is run.
         integrator: Its name.
         variant: The backend with it; None where it has no such integrator.
+        seconds: The time that is asked for [s].
     """
+    total, window = _whole(body.share * seconds), _window(seconds)
     if variant is None:
-        none = np.array([])
-        return EnergyChange(
-            body.name, integrator, False, np.full(len(TIMESTEPS), np.nan), none, none
-        )
-    times, energies = _energies(body, variant, TIMESTEPS[0], body.seconds)
-    last = energies[times >= body.seconds - _LAST - TIMESTEPS[0] / 2.0]
+        none, unknown = np.array([]), np.full(len(TIMESTEPS), np.nan)
+        return EnergyChange(body.name, integrator, False, total, unknown, none, none)
+    times, energies = _energies(body, variant, TIMESTEPS[0], (0.0, total))
+    last = energies[times >= total - window - TIMESTEPS[0] / 2.0]
     sizes = [largest_deviation(last, float(energies[0]))]
     for timestep in TIMESTEPS[1:]:
-        _, of_shorter = _energies(body, variant, timestep, _LAST)
+        _, of_shorter = _energies(body, variant, timestep, (total - window, total))
         sizes.append(largest_deviation(of_shorter, float(energies[0])))
     changes = energies / energies[0] - 1.0
-    return EnergyChange(body.name, integrator, True, np.array(sizes), times, changes)
+    return EnergyChange(body.name, integrator, True, total, np.array(sizes), times, changes)
 
 
 def _energies(
-    body: EnergyBody, variant: Variant, timestep: float, duration: float
+    body: EnergyBody, variant: Variant, timestep: float, span: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Return the times (n,) [s] at the end of a run, and the energy (n,) [J] at each of them.
+    """Return the times (n,) [s] in a span of a run, and the energy (n,) [J] at each of them.
 
     Args:
         body: What is run.
         variant: On what, and with which integrator.
         timestep: [s].
-        duration: How much of the end of the run is looked at [s].
+        span: From when to when, the end of the run, it is looked at [s].
     """
+    start, end = span
     case = CASES[body.case]
     text = case.model_text(timestep, variant.integrator)
     with variant.loaded(text, timestep, case.gravity) as model, make_data(model) as data:
         body.start(data)
         run = Run(model, data)
-        if duration < body.seconds:
-            run.advance(body.seconds - duration)
-        samples = run.sample(duration, body.energy)
+        if start > timestep / 2.0:
+            run.advance(start)
+        samples = run.sample(end - start, body.energy)
     return samples.times, samples.values

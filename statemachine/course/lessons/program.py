@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...backends.chosen import one_backend
+from ...errors import BadInputError
 from ...lab.runs.each_backend import load_on
 from .request import LessonRequest
 from .session import code_as_typed, fitted
@@ -17,7 +18,8 @@ def program_of(request: LessonRequest) -> str:
         request: The lesson, on one backend.
 
     Raises:
-        BadInputError: Several backends are named, or an option has no meaning for the model.
+        BadInputError: Several backends are named, an option has no meaning for the model, or the
+            lesson has no program.
         MissingEngineError: The engine is not installed here.
         StateMachineError: The model cannot be loaded.
     """
@@ -26,4 +28,10 @@ def program_of(request: LessonRequest) -> str:
     model = load_on(backend, name, request.menagerie)
     values = fitted(request.lesson, model, request.values)
     menagerie = None if request.menagerie is None else str(request.menagerie)
-    return code_as_typed(request.lesson, model, str(backend), values, name, menagerie)
+    code = code_as_typed(request.lesson, model, str(backend), values, name, menagerie)
+    if not code.strip():
+        raise BadInputError(
+            f"the lesson {request.name} has no program: it asks about those of the other lessons, "
+            "such as statemachine lesson forward --code"
+        )
+    return code

@@ -5,17 +5,18 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import DivergedError
-from ...interface import Array, Data, Model
+from ...interface import Array, Data, JointType, Model
 from ...lab.runs.drive import Progress, number_of_steps, progress_of_stage
 from ...lab.runs.provenance import Provenance, provenance
 from ...lab.runs.usual_commands import hold_ctrl
-from ...lab.validate.stepper import Stepper, StepTerms, check_is_stepped
+from ...lab.validate.stepped_features import INTEGRATOR, check_is_stepped, other_integrator
+from ...lab.validate.stepper import Stepper, StepTerms
 from ._robot import check_servos, start_line
 from .session import CodeRun, Course, Options
 
@@ -64,6 +65,7 @@ class WithoutLine:
         gap: Largest distance of a joint from the engine's run, until it diverged if it did [rad; of
             a slide, m].
         joint: The joint that is farthest off.
+        slide: Whether that joint is a slide.
         at: When [s].
         diverged_at: When a coordinate stopped being finite [s]; None if none did.
     """
@@ -72,6 +74,7 @@ class WithoutLine:
     formula: str
     gap: float
     joint: str
+    slide: bool
     at: float
     diverged_at: float | None
 
@@ -108,16 +111,18 @@ class StepLessonResult:
 def code(model: Model, options: Options, load: str) -> str:
     """Write the same run twice: by the engine, and by a program of ours that is read below."""
     check_servos(model, "step")
-    check_is_stepped(model.replace(**WITHOUT))
+    changes, integrator = dict[str, bool | str](WITHOUT), other_integrator(model)
+    if integrator:
+        changes["integrator"] = INTEGRATOR
+    check_is_stepped(model.replace(**changes))
     steps = number_of_steps(model, options["seconds"])
-    without = ", ".join(f"{name}={value}" for name, value in WITHOUT.items())
     return f"""\
 import numpy as np
 import statemachine as sm
 from statemachine.lab.validate.stepper import Stepper
 
 model = {load}
-model = model.replace({without})
+{_replace_lines(changes, integrator)}\
 data = sm.make_data(model)
 {start_line(model, "model")}other = Stepper(model)  # the same robot, by Pinocchio and NumPy
 other.qpos[:] = data.qpos
@@ -129,6 +134,27 @@ for _ in range({steps}):
     worst = max(worst, np.abs(data.qpos - other.qpos).max())
 print(worst)
 """
+
+
+def _replace_lines(changes: Mapping[str, bool | str], integrator: str) -> str:
+    """Return what is typed for the options with which the lesson runs a Model.
+
+    A file that names no integrator has Euler: the lesson then chooses the one that it is about.
+
+    Args:
+        changes: The options.
+        integrator: That of the file, where the lesson has another one; else "".
+    """
+    words: list[str] = []
+    for name, value in changes.items():
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+        words.append(f"{name}={text}")
+    line = f"model = model.replace({', '.join(words)})\n"
+    if not integrator:
+        return line
+    return (
+        f"# The file's integrator is {integrator}; Stepper makes the step of {INTEGRATOR}.\n{line}"
+    )
 
 
 def run(play: CodeRun, options: Options, progress: Progress) -> StepLessonResult:
@@ -188,14 +214,16 @@ def _row(
     """Return what the gaps of a run (n,) of (nq,) come to."""
     table = np.array(gaps).reshape(len(gaps), model.nq)
     if not table.size:
-        return WithoutLine(line.name, line.formula, np.inf, "", 0.0, diverged_at)
+        return WithoutLine(line.name, line.formula, np.inf, "", False, 0.0, diverged_at)
     moment, place = np.unravel_index(int(table.argmax()), table.shape)
     joint = int(np.flatnonzero(model.jnt_qposadr == place)[0])
+    is_slide = bool(model.jnt_type[joint] == JointType.SLIDE)
     return WithoutLine(
         name=line.name,
         formula=line.formula,
         gap=float(table.max()),
         joint=model.joint_names[joint],
+        slide=is_slide,
         at=float(time[int(moment) + 1]),
         diverged_at=diverged_at,
     )

@@ -16,6 +16,7 @@ from .step import LINES, StepLessonResult, WithoutLine
 
 _SAY = TableLabels(__name__, "step_labels.md.j2")
 _EXACT = 1e-9  # rad; a second program that is nearer makes the same step
+_SMALLEST = 1e-5  # [rad or m] that is read with decimals
 # The choices of the question, in their order.
 ASKED = ("gravity", "armature", "force_limits")
 
@@ -50,6 +51,11 @@ class StepPage(PageContent):
         return next(row for row in self.result.without if row.name == name)
 
     @property
+    def worst_gap(self) -> str:
+        """Return how far off that run is, with its unit."""
+        return _gap_text(self.worst, 2)
+
+    @property
     def worst_name(self) -> str:
         """Return what that choice leaves out."""
         return line_label(self.worst.name)
@@ -68,6 +74,21 @@ class StepPage(PageContent):
     def least(self) -> WithoutLine:
         """Return the run that is nearest to the engine's though it lacks a line."""
         return min(self.result.without, key=lambda row: row.gap)
+
+    @property
+    def least_gap(self) -> str:
+        """Return how far off that run is, with its unit."""
+        return _gap_text(self.least, 3)
+
+    @property
+    def whole_gap(self) -> str:
+        """Return how far off the run with all lines is, with its unit."""
+        return _gap_text(self.result.whole, 3)
+
+    @property
+    def unit(self) -> str:
+        """Return the unit in which the largest difference of that run is computed."""
+        return "m" if self.result.whole.slide else "rad"
 
     @property
     def least_name(self) -> str:
@@ -139,9 +160,12 @@ def _gap(run: WithoutLine) -> str:
     """Return how far a run is off; the moment at which it diverged, if it did."""
     if run.diverged_at is not None:
         return _SAY("diverged", time=short_time(run.diverged_at))
-    return _exponential(run.gap) if run.gap < 1e-5 else position(run.gap, False, 3)
+    return _gap_text(run, 3)
 
 
-def _exponential(gap: float) -> str:
-    """Return a gap that is too small to be read in degrees."""
-    return f"{np.degrees(gap):.0e}°"
+def _gap_text(run: WithoutLine, decimals: int) -> str:
+    """Return how far a run is off: of a hinge in degrees, of a slide in millimetres."""
+    if run.gap >= _SMALLEST:
+        return position(run.gap, run.slide, decimals)
+    # What is too small to be read with so many decimals.
+    return f"{1e3 * run.gap:.0e} mm" if run.slide else f"{np.degrees(run.gap):.0e}°"

@@ -43,6 +43,7 @@ class MujocoEngine(RawEngine):
     shown_elements = function_of(".mujoco._readable:shown_elements")
     entries = function_of(".mujoco.differences:entries")
     integrator = function_of(".mujoco.differences:integrator")
+    flags = function_of(".mujoco.differences:flags")
     edited = function_of(".mujoco.differences:edited")
     can_be_respecified = function_of(".mujoco.respecified:can_be_respecified")
     file_form = function_of(".mujoco.file_form:file_form")

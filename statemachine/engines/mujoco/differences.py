@@ -168,10 +168,18 @@ def settings_of(raw: Any) -> dict[str, Any]:
     settings = {name: plain(getattr(raw.opt, name)) for name in names}
     for name, enumeration in fields.OPTION_CHOICES.items():
         settings[name] = word_in(enumeration, settings[name])
+    for word, is_on in flags(raw).items():
+        settings[f"flag {word}"] = "on" if is_on else "off"
+    return settings
+
+
+def flags(raw: Any) -> dict[str, bool]:
+    """Return the flags of a compiled model that can change a motion: whether each is on."""
+    states: dict[str, bool] = {}
     for field, word, bit in _flag_bits():
         raised = bool(getattr(raw.opt, field) & bit)
-        settings[f"flag {word}"] = "on" if raised == (field == "enableflags") else "off"
-    return settings
+        states[word] = raised == (field == "enableflags")
+    return states
 
 
 def integrator(raw: Any) -> str:

@@ -16,31 +16,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...errors import DivergedError, UnsupportedError
+from ...errors import DivergedError
 from ...installed import WITNESS, require
-from ...interface import Array, JointType, Model
+from ...interface import Array, Model
 from ...rotations import matrix_from_quat
 from ...witness import labels, read_numbers
-from ..runs.robot import is_servo
+from .stepped_features import check_is_stepped
 
 Treatment = Literal["implicit", "explicit", "none"]
 PositionUpdate = Literal["new velocity", "old velocity"]
 
 _SWEEPS = 10_000  # of the dry friction, at most; five to ten are usual
 _ROUNDING = 1e-14  # of a friction force, relative to the largest
-_REASON = "the step of Pinocchio computes servos, damping, armature and dry friction alone"
-# What else acts on joints, and the fields of a compiled model that are not zero then.
-_PASSIVE = {
-    "joint springs": ("jnt_stiffness", "jnt_stiffnesspoly"),
-    "damping that is not linear": ("dof_dampingpoly", "actuator_dampingpoly"),
-    "damping and armature of actuators": ("actuator_damping", "actuator_armature"),
-    "force limits of joints": ("jnt_actfrclimited",),
-    "delays of actuators": ("actuator_delay",),
-    "gravity compensation": ("body_gravcomp",),
-    "tendons": ("ntendon",),
-    "equality constraints": ("neq",),
-    "flexes": ("nflex",),
-}
 
 
 @dataclass(frozen=True)
@@ -346,54 +333,3 @@ def dynamic_model(pin: Any, model: Model, terms: StepTerms = ALL_TERMS) -> Any:
         robot.armature = np.zeros(model.nv)
     robot.gravity.linear = np.array(model.gravity) if terms.gravity else np.zeros(3)
     return robot
-
-
-def check_is_stepped(model: Model) -> None:
-    """Check that a robot has nothing that the step of Pinocchio leaves out.
-
-    Raises:
-        UnsupportedError: It has; with everything that it leaves out.
-    """
-    features = left_out_features(model)
-    if features:
-        raise UnsupportedError(
-            f"the step of Pinocchio leaves out what {model.path.name} has: {'; '.join(features)}",
-            backend=model.backend,
-            feature=features[0],
-            features=tuple(features),
-            reason=_REASON,
-        )
-
-
-def left_out_features(model: Model) -> list[str]:
-    """Return what a robot has that the step of Pinocchio leaves out, in words."""
-    compiled = model.compiled
-    if compiled is None:
-        return ["a model that was compiled elsewhere"]
-    features: list[str] = []
-    if not np.isin(model.jnt_type, (int(JointType.HINGE), int(JointType.SLIDE))).all():
-        features.append("free and ball joints")
-    if model.ngeom and model.options.get("contacts") is not False:
-        features.append("contacts (type model.replace(contacts=False))")
-    if model.jnt_limited.any() and model.options.get("limits") is not False:
-        features.append("joint limits (type model.replace(limits=False))")
-    if not is_servo(model).all():
-        features.append("actuators that are no position servos of a joint")
-    if model.options.get("actuation") is False:
-        features.append("servos that are switched off")
-    if model.substeps != 1:
-        features.append("substeps")
-    features += _passive_features(compiled)
-    return features
-
-
-def _passive_features(compiled: Any) -> list[str]:
-    """Return what acts on the joints of a compiled model beside servos and linear damping."""
-    features: list[str] = []
-    for name, fields in _PASSIVE.items():
-        values = [np.asarray(getattr(compiled, field, 0.0)) for field in fields]
-        if any(value.any() for value in values):
-            features.append(name)
-    if compiled.opt.density or compiled.opt.viscosity:
-        features.append("a fluid around the robot")
-    return features

@@ -1,11 +1,14 @@
 """Which side is nearer to the truth: the case of the battery that decides a cause is run.
 
 The case is run as each side runs: on its engine and release, with its integrator, friction cone
-and timestep. Nothing of it is stored.
+and timestep. Nothing of it is stored. A side that is nearer in a case may be the farther one in
+another run. So both sides are run once more, with finer steps: only where that says the same is
+the case cited.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from ...backends import BackendChoice
@@ -18,12 +21,18 @@ from ...program import NAME
 from ..validate.case_runs import measure
 from ..validate.cases import CASES
 from ..validate.variants import OWN, Variant, variants_of
-from .cited_case import CitedCase, SideInCase, nearer_side
+from .cited_case import CitedCase, DecidedCause, ErrorsInRun, SideInCase, nearer_side
 from .deciding_cases import DecidingCase, cones_of, deciding_cases
 from .explanation import Explanation
+from .finer_runs import errors_in_run
 from .request import WhyRequest
 
 _SHORTEST = 0.0005  # [s] of a timestep of a case: a shorter one of a side would take too long
+# What the cases here run for is a whole number of these, but for those that wait for an event.
+_PERIOD = 0.1  # [s]
+# Causes that vanish with the timestep: each side then has its own truth in reach. Two releases may
+# compute two laws, as two cones always do.
+_VANISHING: tuple[DecidedCause, ...] = ("integrator", "offset centre of mass")
 
 
 def with_cited_case(result: Explanation, question: WhyRequest) -> Explanation:
@@ -36,8 +45,26 @@ def with_cited_case(result: Explanation, question: WhyRequest) -> Explanation:
     for row in deciding_cases(result, question):
         cited = _cited(row, question, cones_of(result))
         if cited is not None:
-            return replace(result, cited_case=cited)
+            return _checked(result, cited, question)
     return result
+
+
+def _checked(result: Explanation, cited: CitedCase, question: WhyRequest) -> Explanation:
+    """Return an explanation that cites a case, as far as the run that was asked says the same."""
+    if cited.cause == "cone":
+        return replace(result, cited_case=cited)
+    in_run = errors_in_run(result, question)
+    if _are_two_laws(cited, in_run):
+        return replace(result, cited_case=cited)
+    checked = replace(cited, in_run=in_run)
+    if in_run is not None and in_run.converges and in_run.nearer == cited.nearer:
+        return replace(result, cited_case=checked)
+    return replace(result, contradicted_case=checked)
+
+
+def _are_two_laws(cited: CitedCase, in_run: ErrorsInRun | None) -> bool:
+    """Tell whether two sides compute two laws, so that finer steps do not bring them together."""
+    return cited.cause not in _VANISHING and in_run is not None and not in_run.converges
 
 
 def _cited(row: DecidingCase, question: WhyRequest, cones: tuple[str, str]) -> CitedCase | None:
@@ -88,7 +115,8 @@ def side_in_case(row: DecidingCase, model: Model, cone: str = "") -> SideInCase 
     if name is None or variant is None:
         return None
     case = CASES[name]
-    timestep = max(model.timestep / model.substeps, _SHORTEST)
+    own_timestep = model.timestep / model.substeps
+    timestep = timestep_of_case(own_timestep)
     measurement = measure(case, variant, timestep)
     return SideInCase(
         case=name,
@@ -96,10 +124,27 @@ def side_in_case(row: DecidingCase, model: Model, cone: str = "") -> SideInCase 
         backend=str(variant.backend),
         integrator=variant.integrator,
         timestep=timestep,
+        own_timestep=own_timestep,
         truth=case.true_value,
         error=measurement.error,
         error_unit=case.error_unit,
     )
+
+
+def timestep_of_case(own_timestep: float) -> float:
+    """Return the timestep at which a case is run that is nearest to that of a side [s].
+
+    A case ends at a moment: of a timestep that does not come by there, the time that is missing
+    would count as an error.
+
+    Args:
+        own_timestep: Of the side [s].
+    """
+    timestep = max(own_timestep, _SHORTEST)
+    steps = max(1, round(_PERIOD / timestep))
+    if math.isclose(steps * timestep, _PERIOD, rel_tol=1e-9):
+        return timestep
+    return _PERIOD / steps
 
 
 def _setting(row: DecidingCase, model: Model, variant: Variant, cone: str) -> str:

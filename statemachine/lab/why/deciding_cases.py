@@ -25,9 +25,14 @@ RobotPart = Literal[
     "free or ball joint",
     "linked free bodies",
     "position servo",
+    "damped position servo",
+    "joint that swings on a spring or servo",
     "hinge or slide",
 ]
 
+# Of the critical damping: a spring or a servo with less swings, so that a critically damped servo
+# says nothing of it.
+_SWINGS = 0.5
 _LOCATED = ("integrator", "timestep")  # what is left out where two engines step differently
 
 
@@ -53,6 +58,7 @@ class DecidingCase:
 
 
 # Of a cause the first case counts whose part the robot has, and in which the sides' errors differ.
+# A robot that swings is judged by a spring before it is by a servo, and by that before a pendulum.
 DECIDING_CASES: tuple[DecidingCase, ...] = (
     DecidingCase(
         "cone",
@@ -80,7 +86,13 @@ DECIDING_CASES: tuple[DecidingCase, ...] = (
     ),
     DecidingCase(
         "integrator",
-        "position servo",
+        "joint that swings on a spring or servo",
+        {"": "spring-energy"},
+        "a mass that swings on a spring keeps its energy",
+    ),
+    DecidingCase(
+        "integrator",
+        "damped position servo",
         {"": "servo-step"},
         "a critically damped servo follows a closed form",
     ),
@@ -169,6 +181,10 @@ def has_part(model: Model, part: RobotPart) -> bool:
             return bool(np.isin(model.body_parentid, free).any())
         case "position servo":
             return bool(np.isfinite(model.actuator_kp).any())
+        case "damped position servo":
+            return has_part(model, "position servo") and not _swings(model)
+        case "joint that swings on a spring or servo":
+            return _swings(model)
         case "hinge or slide":
             return bool(np.isin(kinds, (JointType.HINGE, JointType.SLIDE)).any())
 
@@ -180,3 +196,28 @@ def _has_offset_centre(model: Model) -> bool:
         return False
     free = model.jnt_bodyid[model.jnt_type == JointType.FREE]
     return bool(np.asarray(compiled.body_ipos)[free].any())
+
+
+def _swings(model: Model) -> bool:
+    """Tell whether a hinge or slide swings: its springs and servos are damped by too little.
+
+    A joint with the inertia M, the stiffness K and the damping D is critically damped by
+    D = 2 sqrt(K M).
+    """
+    compiled = model.compiled
+    if compiled is None:
+        return False
+    inertias, stiffnesses = np.asarray(compiled.dof_M0), np.asarray(compiled.jnt_stiffness)
+    servos = np.isfinite(model.actuator_kp)
+    for joint, kind in enumerate(model.jnt_type):
+        if kind not in (JointType.HINGE, JointType.SLIDE):
+            continue
+        dof = model.jnt_dofadr[joint]
+        driving = servos & (model.actuator_jntid == joint)
+        squares = model.actuator_gear[driving] ** 2
+        stiffness = float(stiffnesses[joint]) + float(model.actuator_kp[driving] @ squares)
+        damping = float(model.dof_damping[dof]) + float(model.actuator_kv[driving] @ squares)
+        critical = 2.0 * np.sqrt(stiffness * float(inertias[dof]))
+        if stiffness > 0.0 and damping < _SWINGS * critical:
+            return True
+    return False

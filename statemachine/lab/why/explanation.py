@@ -192,7 +192,10 @@ class Explanation:
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
         cited_case: The case of the battery that decides the cause, and which side is nearer to the
-            truth in it; None where the cause has none.
+            truth in it; None where the cause has none, or where the run that was asked does not
+            say the same.
+        contradicted_case: The case that would decide the cause, but for the run that was asked,
+            in which the same side is not nearer to the truth; None where there is none.
     """
 
     experiment: str
@@ -241,6 +244,7 @@ class Explanation:
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
     cited_case: CitedCase | None = None
+    contradicted_case: CitedCase | None = None
 
     @property
     def is_complete(self) -> bool:

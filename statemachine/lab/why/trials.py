@@ -250,6 +250,30 @@ class Trials:
         base = first if first.backend == DEFAULT else on_default(model)
         return base if model.compiled is None else base.with_compiled(model.compiled)
 
+    def curves_as_they_come(self, side: int) -> Curves | None:
+        """Return the run of a side, 0 or 1, as it comes; None if it did not reach the end."""
+        return self._trials[_AS_THEY_COME[side]].curves
+
+    def curves_with_finer_steps(self, side: int, times: int) -> Curves | None:
+        """Run a side as it comes, but with more engine steps to a command.
+
+        Args:
+            side: 0 or 1.
+            times: How many times as many steps.
+
+        Returns:
+            The run at the moments of the ruler; None if it did not reach the end.
+
+        Raises:
+            TimeIsUp: No time is left.
+            StateMachineError: The engine does not take the steps.
+        """
+        model = self.setup.models[side]
+        finer = model.replace(substeps=times * model.substeps)
+        rerun = self.setup.rerun(_AS_THEY_COME[side], finer)
+        trace = rerun.record(derive=False, progress=self._deadline.check)
+        return self._measured(side, finer, trace).curves
+
     def repeats(self) -> bool:
         """Tell whether the left moves the same when it is run again.
 

@@ -147,7 +147,10 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
         raise InterruptedExplanation(_result(explanation, request, bases)) from None
     explanation = _with_changes(explanation, question, request)
     with reporter.stage("why: the case that decides it"):
-        explanation = with_cited_case(explanation, question)
+        try:
+            explanation = with_cited_case(explanation, question)
+        except KeyboardInterrupt:
+            raise InterruptedExplanation(_result(explanation, request, bases)) from None
     if request.write is not None:
         explanation = _with_file(explanation, question, sides, Path(request.write))
     return _result(explanation, request, bases)
