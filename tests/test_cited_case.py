@@ -325,9 +325,9 @@ def test_every_case_that_is_cited_ends_after_whole_periods(
     durations: list[float] = []
     advance = Run.advance
 
-    def seen(run: Run, duration: float) -> None:
+    def seen(run: Run, duration: float) -> float:
         durations.append(duration)
-        advance(run, duration)
+        return advance(run, duration)
 
     monkeypatch.setattr(Run, "advance", seen)
     names = {name for row in DECIDING_CASES for name in row.cases.values()}
