@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 import tempfile
 from functools import partial
@@ -16,7 +17,8 @@ from rich.cells import cell_len
 from statemachine import engines
 from statemachine.cli import main
 from statemachine.engines import raw_engine_of, samples
-from statemachine.engines.mujoco import conventions as mujoco_conventions
+from statemachine.engines.measured import AfterNan
+from statemachine.engines.mujoco import pile as mujoco_pile
 from statemachine.engines.samples import TREE
 from statemachine.errors import MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, available, require
@@ -100,6 +102,11 @@ FACTS = {
         },
         "pinocchio": {"": NO_ANSWER},
     },
+    "fresh": {
+        "mujoco": {"the tip": "not computed", "the contact": "not computed"},
+        "pybullet": {"the tip": "computed", "the contact": "not computed"},
+        "pinocchio": {"the tip": "not computed"},
+    },
     "write": {
         "mujoco": {"the tip": "stale", "the contact": "stale"},
         "pybullet": {"the tip": "fresh", "the contact": "stale"},
@@ -173,6 +180,11 @@ FACTS = {
             "saveBullet, restoreState": "differs",
         },
         "pinocchio": {"a used Data, a new one": "exact"},
+    },
+    "invalid": {
+        "mujoco": {"autoreset": "starts again", 'autoreset="disable"': "NaN stays"},
+        "pybullet": {"": "NaN stays"},
+        "pinocchio": {"integrate": "NaN stays"},
     },
 }
 
@@ -283,6 +295,31 @@ def test_what_nothing_or_all_explains_is_undecided(a: float, b: float) -> None:
     assert closest({"a": a, "b": b}).hypothesis == UNDECIDED
 
 
+@pytest.mark.parametrize(
+    ("read", "recomputed", "expected"),
+    [(1.0, 1.0, "computed"), (0.0, 1.0, "not computed"), (0.0, 0.0, UNDECIDED)],
+)
+def test_what_is_fresh_follows_from_what_is_read(
+    read: float, recomputed: float, expected: str
+) -> None:
+    (answer,) = QUESTIONS["fresh"].answer([("the tip", read, recomputed, 1.0)])
+    assert answer.answer == expected
+
+
+@pytest.mark.parametrize(
+    ("angle", "expected"),
+    [(math.nan, "NaN stays"), (0.004, "starts again"), (0.4, "NaN is not written")],
+)
+def test_what_a_nan_does_follows_from_the_angle(angle: float, expected: str) -> None:
+    (answer,) = QUESTIONS["invalid"].answer([AfterNan("", angle, "")])
+    assert answer.answer == expected
+
+
+@pytest.mark.parametrize("part", ["autoreset", 'autoreset="disable"'])
+def test_mujoco_warns_of_a_nan(part: str) -> None:
+    assert figures("invalid", "mujoco", part)["it says"] == "warning"
+
+
 # An engine that behaved otherwise would get another answer.
 
 
@@ -380,8 +417,8 @@ cold_restore = followed_by(
 
 def no_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     flag = '<option><flag warmstart="disable"/></option><worldbody>'
-    text = mujoco_conventions.PILE_MJCF.replace("<worldbody>", flag)
-    monkeypatch.setattr(mujoco_conventions, "PILE_MJCF", text)
+    text = mujoco_pile.PILE_MJCF.replace("<worldbody>", flag)
+    monkeypatch.setattr(mujoco_pile, "PILE_MJCF", text)
 
 
 @around(pybullet, "restoreState")

@@ -268,7 +268,10 @@ def test_the_output_that_is_shown(cli: Cli, words: list[str], shown: str) -> Non
 
 
 def test_counts_in_the_guides_are_those_of_the_package() -> None:
-    names = "one two three four five six seven eight nine ten eleven twelve thirteen fourteen"
+    names = (
+        "one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen "
+        "sixteen"
+    )
     word = dict(enumerate(names.split(), start=1))
     counted = {
         "README.md": (

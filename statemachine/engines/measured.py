@@ -64,6 +64,21 @@ Futures = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
+class AfterNan:
+    """What a step made of a joint whose position was written as NaN.
+
+    Attributes:
+        part: How the engine was used; empty where there is one way.
+        angle: Position of the joint after the step [rad].
+        said: What the engine let its user know: "warning", the name of an exception, or "".
+    """
+
+    part: str
+    angle: float
+    said: str
+
+
+@dataclass(frozen=True)
 class Cell:
     """What is typed for a concept, and whether it happened.
 

@@ -1,15 +1,11 @@
-"""What MuJoCo does with tiny models, as its own users load and step them.
-
-Last comes a world in which something can be kept and forgotten: a pile of boxes, a driven joint.
-"""
+"""What MuJoCo does with tiny models, as its own users load and step them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
 from operator import setitem
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +15,7 @@ from .. import samples
 from ..measured import (
     ANGLE,
     TORQUE,
+    AfterNan,
     Cell,
     LetGo,
     Measurement,
@@ -29,8 +26,8 @@ from ..measured import (
     accelerated,
     near,
 )
-from ..pile import HALF, PLACES, TILT, Pile, Save
 from ..samples import PENDULUM_MJCF, acceleration, tip_at
+from .pile import MujocoPile
 
 mj: Any = require("mujoco")
 
@@ -126,6 +123,11 @@ def _tip_read(act: Callable[[Any, Any], object]) -> ReadTwice:
     model, data = _loaded(samples.PENDULUM_MJCF % "")
     mj.mj_forward(model, data)
     act(model, data)
+    return _tip_of(model, data)
+
+
+def _tip_of(model: Any, data: Any) -> ReadTwice:
+    """Return where the pendulum's tip is, as it is read and recomputed."""
     tip = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
     return "the tip", tip, np.array(data.site("tip").xpos), samples.tip_at(data.qpos[0])
@@ -137,11 +139,23 @@ def _contact_read(height: float, act: Callable[[Any, Any], object]) -> ReadTwice
     data.qpos[2] = height
     mj.mj_forward(model, data)
     act(model, data)
+    return _contact_of(model, data)
+
+
+def _contact_of(model: Any, data: Any) -> ReadTwice:
+    """Return how deep the ball is in the floor, as it is read and recomputed."""
     depths = []
     for _ in range(2):
         depths.append(max((-float(contact.dist) for contact in data.contact), default=0.0))
         mj.mj_forward(model, data)
     return "the contact", *depths, max(samples.RADIUS - float(data.qpos[2]), 0.0)
+
+
+def fresh(deep: float) -> list[ReadTwice]:
+    """Read of a Data on which no function was called: a pendulum, a ball in the floor."""
+    pendulum, ball = _loaded(samples.PENDULUM_MJCF % ""), _loaded(samples.BALL)
+    ball[0].qpos0[2] = samples.RADIUS - deep
+    return [_tip_of(*pendulum), _contact_of(ball[0], mj.MjData(ball[0]))]
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
@@ -178,6 +192,32 @@ def joints() -> dict[str, list[str]]:
     return names
 
 
+def invalid(angle: float) -> list[AfterNan]:
+    """Write NaN into qpos of a pendulum, with and without the engine's automatic reset."""
+    flags = {"autoreset": "", 'autoreset="disable"': '<option><flag autoreset="disable"/></option>'}
+    results: list[AfterNan] = []
+    for part, option in flags.items():
+        model, data = _loaded(samples.PENDULUM_MJCF % option)
+        data.qpos[0] = angle
+        mj.mj_step(model, data)
+        data.qpos[0] = np.nan
+        said = _warnings_of(partial(mj.mj_step, model, data))
+        results.append(AfterNan(part, float(data.qpos[0]), "warning" if said else ""))
+    return results
+
+
+def _warnings_of(act: Callable[[], object]) -> list[str]:
+    """Return what MuJoCo warns of meanwhile, which would go to the terminal and a log file."""
+    texts: list[str] = []
+    before = mj.get_mju_user_warning()
+    mj.set_mju_user_warning(texts.append)
+    try:
+        act()
+    finally:
+        mj.set_mju_user_warning(before)
+    return texts
+
+
 def friction() -> dict[str, Sliding]:
     """Measure friction: a block on a floor, with elliptic cones, which are the same in every
     direction.
@@ -197,101 +237,6 @@ def friction() -> dict[str, Sliding]:
         return float(data.qvel[0])
 
     return {"equal priority": speed, "the block has priority": partial(speed, priority=1)}
-
-
-def _pile_body(k: int) -> str:
-    """Return a box of the pile in MJCF; the first of them is turned."""
-    place, turn = PLACES[k], TILT if k == 0 else (1, 0, 0, 0)
-    return (
-        f'<body pos="{" ".join(map(str, place))}" quat="{" ".join(map(str, turn))}">'
-        f'<freejoint/><geom type="box" size="{HALF} {HALF} {HALF}"/></body>'
-    )
-
-
-PILE_MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
-{"".join(map(_pile_body, range(len(PLACES))))}
-<body pos="2 0 2"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body></worldbody>
-<actuator><position joint="j" kp="20"/></actuator></mujoco>"""
-
-
-def _owner(scene: MujocoPile, field: str) -> Any:
-    """Return the owner of a field: the Data, or the options of the Model."""
-    return scene.data if hasattr(scene.data, field) else scene.model.opt
-
-
-def _write(scene: MujocoPile, value: float, field: str) -> None:
-    """Write one value into every number of a field."""
-    owner = _owner(scene, field)
-    setattr(owner, field, 0 * getattr(owner, field) + value)
-
-
-def _read(scene: MujocoPile, field: str) -> float:
-    """Return the value of all numbers of a field; NaN if they differ."""
-    values = np.ravel(getattr(_owner(scene, field), field))
-    return float(values[0]) if (values == values[0]).all() else np.nan
-
-
-# What decides the future, by where the engine has it; the last two belong to the Model.
-_FIELDS = {
-    "time": "time",
-    "qpos": "qpos",
-    "qvel": "qvel",
-    "ctrl": "ctrl",
-    "applied forces": "xfrc_applied",
-    "warm start": "qacc_warmstart",
-    "gravity": "gravity",
-    "timestep": "timestep",
-}
-
-
-def _components(*parts: str) -> Save:
-    """Return a way to save by components of mjtState."""
-    spec = sum(int(getattr(mj.mjtState, f"mjSTATE_{part}")) for part in parts)
-
-    @contextmanager
-    def save(scene: Any) -> Iterator[Callable[[Any], object]]:
-        state = np.empty(mj.mj_stateSize(scene.model, spec))
-        mj.mj_getState(scene.model, scene.data, state, spec)
-        yield lambda other: mj.mj_setState(other.model, other.data, state, spec)
-
-    return save
-
-
-class MujocoPile(Pile):
-    """A Model and a Data."""
-
-    quantities: ClassVar = {
-        name: (partial(_write, field=field), partial(_read, field=field))
-        for name, field in _FIELDS.items()
-    }
-    resets: ClassVar = {"mj_resetData": lambda scene: mj.mj_resetData(scene.model, scene.data)}
-    ways_to_save: ClassVar = {
-        "qpos and qvel copied": _components("QPOS", "QVEL"),
-        "mjSTATE_FULLPHYSICS": _components("FULLPHYSICS"),
-        "mjSTATE_INTEGRATION": _components("INTEGRATION"),
-    }
-
-    def __init__(self) -> None:
-        self.model, self.data = _loaded(PILE_MJCF)
-
-    @classmethod
-    @contextmanager
-    def fresh(cls) -> Iterator[MujocoPile]:
-        yield cls()
-
-    @property
-    def timestep(self) -> float:
-        return self.model.opt.timestep
-
-    def bodies(self) -> int:
-        return self.model.nbody
-
-    def run(self, steps: int) -> Array:
-        trace = []
-        for _ in range(steps):
-            mj.mj_step(self.model, self.data)
-            trace.append(np.array(self.data.qpos))
-        return np.array(trace)
 
 
 reset, save, future = MujocoPile.reset, MujocoPile.save, MujocoPile.future

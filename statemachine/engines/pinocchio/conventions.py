@@ -17,6 +17,7 @@ from ..measured import (
     ANGLE,
     TORQUE,
     Absent,
+    AfterNan,
     Cell,
     LetGo,
     Measurement,
@@ -109,6 +110,22 @@ def _no_step(*_given: float) -> Absent:
 
 
 command = damping = step = friction = _no_step
+
+
+def fresh(_deep: float) -> list[ReadTwice]:
+    """Read of a Data that was handed to no function; it has no contacts."""
+    model = pin.buildModelFromXML(samples.PENDULUM_URDF)
+    data, tip = model.createData(), model.getFrameId("tip")
+    read = np.array(data.oMf[tip].translation)
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    return [("the tip", read, np.array(data.oMf[tip].translation), samples.tip_at(0.0))]
+
+
+def invalid(_angle: float) -> list[AfterNan]:
+    """Give NaN to integrate: there is no step."""
+    model = pin.buildModelFromXML(samples.PENDULUM_URDF)
+    moved = pin.integrate(model, np.array([np.nan]), np.zeros(1))
+    return [AfterNan("integrate", float(moved[0]), "")]
 
 
 def write(angle: float, _deep: float) -> list[ReadTwice]:

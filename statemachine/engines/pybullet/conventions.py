@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from ...backends.bullet.client import joint_infos, pb
+from ...installed import silence
 from ...interface import Array
 from .. import samples
 from ..measured import (
     ANGLE,
+    AfterNan,
     Cell,
     LetGo,
     Measurement,
@@ -167,11 +169,16 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
 def _tip_read(act: Callable[[int, int], object]) -> ReadTwice:
     """Return where the pendulum's tip is, after something was done to its joint."""
     with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
-        tip = partial(pb.getLinkState, body, 1, physicsClientId=client)
-        tip(computeForwardKinematics=1)
+        pb.getLinkState(body, 1, computeForwardKinematics=1, physicsClientId=client)
         act(client, body)
-        true = samples.tip_at(pb.getJointState(body, 0, client)[0])
-        return "the tip", np.array(tip()[4]), np.array(tip(computeForwardKinematics=1)[4]), true
+        return _tip_of(client, body)
+
+
+def _tip_of(client: int, body: int) -> ReadTwice:
+    """Return where the pendulum's tip is, as it is read and recomputed."""
+    tip = partial(pb.getLinkState, body, 1, physicsClientId=client)
+    true = samples.tip_at(pb.getJointState(body, 0, client)[0])
+    return "the tip", np.array(tip()[4]), np.array(tip(computeForwardKinematics=1)[4]), true
 
 
 def _contact_read(height: float, act: Callable[[int, int], object]) -> ReadTwice:
@@ -181,25 +188,40 @@ def _contact_read(height: float, act: Callable[[int, int], object]) -> ReadTwice
         ball = put(client, pb.GEOM_SPHERE, (0, 0, height), radius=samples.RADIUS)
         pb.performCollisionDetection(client)
         act(client, ball)
-        depths = []
-        for _ in range(2):
-            points = pb.getContactPoints(physicsClientId=client)
-            depths.append(max((-point[8] for point in points), default=0.0))
-            pb.performCollisionDetection(client)
-        height = pb.getBasePositionAndOrientation(ball, client)[0][2]
-        return "the contact", *depths, max(samples.RADIUS - height, 0.0)
+        return _contact_of(client, ball)
+
+
+def _contact_of(client: int, ball: int) -> ReadTwice:
+    """Return how deep the ball is in the floor, as it is read and recomputed."""
+    depths = []
+    for _ in range(2):
+        points = pb.getContactPoints(physicsClientId=client)
+        depths.append(max((-point[8] for point in points), default=0.0))
+        pb.performCollisionDetection(client)
+    height = pb.getBasePositionAndOrientation(ball, client)[0][2]
+    return "the contact", *depths, max(samples.RADIUS - height, 0.0)
+
+
+def fresh(deep: float) -> list[ReadTwice]:
+    """Read of bodies that were loaded and nothing else: a pendulum, a ball in the floor."""
+    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
+        tip = _tip_of(client, body)
+    with fresh_world() as client:
+        put_floor(client)
+        place = (0, 0, samples.RADIUS - deep)
+        ball = put(client, pb.GEOM_SPHERE, place, radius=samples.RADIUS)
+        return [tip, _contact_of(client, ball)]
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
     turn, down = (0, 0, 0, 1), (0, 0, samples.RADIUS - deep)
-    return [
-        _tip_read(lambda client, body: pb.resetJointState(body, 0, angle, 0, client)),
-        _contact_read(
-            1,
-            lambda client, ball: pb.resetBasePositionAndOrientation(ball, down, turn, client),
-        ),
-    ]
+
+    def put_down(client: int, ball: int) -> None:
+        pb.resetBasePositionAndOrientation(ball, down, turn, client)
+
+    tip = _tip_read(lambda client, body: pb.resetJointState(body, 0, angle, 0, client))
+    return [tip, _contact_read(1, put_down)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
@@ -223,6 +245,19 @@ def joints() -> dict[str, list[str]]:
     """Measure the order of joints: their indices, from a URDF."""
     with _loaded(samples.TREE_URDF, fixed=True) as (client, body):
         return {"URDF": [info[1].decode() for info in joint_infos(client, body)]}
+
+
+def invalid(angle: float) -> list[AfterNan]:
+    """Write NaN by resetJointState to a limp pendulum."""
+    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
+        limp(body, client)
+        pb.resetJointState(body, 0, angle, 0, client)
+        pb.stepSimulation(client)
+        pb.resetJointState(body, 0, np.nan, 0, client)
+        with silence() as lines:
+            pb.stepSimulation(client)
+        after = float(pb.getJointState(body, 0, client)[0])
+        return [AfterNan("", after, "warning" if lines else "")]
 
 
 def friction() -> dict[str, Sliding]:

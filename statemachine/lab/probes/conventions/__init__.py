@@ -32,6 +32,7 @@ QUESTIONS: dict[str, EngineQuestion[Any]] = {
     "actuation": motion.actuation,
     "command": motion.command,
     "damping": motion.damping,
+    "fresh": answers.fresh,
     "write": answers.write,
     "step": answers.step,
     "joints": frames.joints,
@@ -39,6 +40,7 @@ QUESTIONS: dict[str, EngineQuestion[Any]] = {
     "friction": motion.friction,
     "save": answers.save,
     "future": answers.future,
+    "invalid": answers.invalid,
 }
 
 

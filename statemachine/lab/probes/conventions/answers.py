@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
 
-from ....engines.measured import Futures, Measurement, ReadTwice
+from ....engines.measured import AfterNan, Futures, Measurement, ReadTwice
 from ....interface import Array
 
 NO_ANSWER = "–"  # the question does not arise on this engine
@@ -115,6 +116,7 @@ def closest(errors: Mapping[str, float]) -> BestHypothesis:
 
 # What an engine keeps: derived values after a write and a step, a past after a reset, a save.
 
+_NEAR_START = 0.1  # rad, of the pendulum; it is let go at 0
 _POSITION_TOLERANCE = 1e-6  # m; PyBullet tells a link's frame in single precision
 
 
@@ -139,6 +141,18 @@ def _age(error: float, error_recomputed: float) -> str:
     return UNDECIDED
 
 
+@question(
+    "You have made a state, and called nothing yet: is what depends on it there?",
+    "A hand at [0 0 0] is no place of the arm. Nothing has been computed yet.",
+    0.01,  # how deep the ball starts in the floor [m]
+)
+def fresh(readings: Sequence[ReadTwice]) -> Iterator[EngineAnswer]:
+    """Tell for each reading whether it was computed when the state was made."""
+    for answer in _stale_or_fresh(readings):
+        words = {"fresh": "computed", "stale": "not computed"}.get(answer.answer, answer.answer)
+        yield replace(answer, answer=words)
+
+
 write = question(
     "You write a position: is what depends on it stale?",
     "A stale pose looks like a pose. A controller that reads one aims at where the arm was.",
@@ -153,6 +167,28 @@ step = question(
     3.0,  # the speed of the pendulum [rad/s]
     0.02,  # how deep the ball is, which comes out more slowly than by this a step [m]
 )(_stale_or_fresh)
+
+
+@question(
+    "You write a position that is not a number, and step: what happens?",
+    "A NaN that nobody mentions spreads through every later step. A state that starts again by "
+    "itself looks like a robot that jumps.",
+    0.4,  # where the pendulum is before [rad]
+)
+def invalid(results: Sequence[AfterNan]) -> Iterator[EngineAnswer]:
+    """Tell what each way to use an engine makes of a NaN."""
+    for result in results:
+        figures = (
+            Measurement("angle after a step", result.angle, "rad"),
+            Measurement("it says", result.said or "nothing"),
+        )
+        if math.isnan(result.angle):
+            words = "NaN stays"
+        elif abs(result.angle) < _NEAR_START:
+            words = "starts again"
+        else:
+            words = "NaN is not written"
+        yield EngineAnswer(words, figures, result.part)
 
 
 @question(
