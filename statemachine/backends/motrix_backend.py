@@ -22,7 +22,8 @@ from . import edits as _edits
 from .binary import is_binary
 from .compiled.model import check_numbers, compile_file, compiler_warnings, facts, fastest
 from .hidden_data import HiddenModel
-from .motrix.engine_model import TITLE, EngineModel
+from .motrix.engine_model import EngineModel
+from .motrix.links import TITLE
 from .motrix.reading import Reading, read_file
 from .motrix.settings import settings_between
 from .motrix.world import MotrixWorld
@@ -135,17 +136,14 @@ class MotrixModel(HiddenModel):
         if settings and not reading.layout.same_links:
             _refuse_settings_of_links(settings)
         engine = EngineModel(reading.engine.path, settings) if settings else reading.engine
-        timestep = float(compiled.opt.timestep)
-        known = facts(compiled)
-        known["timestep"], known["substeps"] = timestep * substeps, substeps
+        timestep, known = float(compiled.opt.timestep), facts(compiled)
+        known |= {"timestep": timestep * substeps, "substeps": substeps, "raw": engine.scene}
+        qpos0, nu = compiled.qpos0.copy(), known["nu"]
         super().__init__(
-            partial(
-                MotrixWorld, engine, reading.layout, compiled.qpos0.copy(), timestep, known["nu"]
-            ),
+            partial(MotrixWorld, engine, reading.layout, qpos0, timestep, nu),
             backend="motrix",
             engine_version=engine_version("motrix"),
             path=reading.engine.path,
-            raw=engine.scene,
             capabilities=CAPABILITIES,
             max_qvel=fastest(compiled) if max_qvel is None else max_qvel,
             **known,

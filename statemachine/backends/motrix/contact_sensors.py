@@ -30,28 +30,35 @@ def contacts_at(
         stepped: The SceneData, after the step.
         start: Puts that state into a new SceneData of a given scene.
     """
-    pairs = _touching(engine, stepped)
-    rows, numbers = list[tuple[int, int]](), list[Array]()
+    pairs = sorted(_touching(engine, stepped))
+    told = list[Array]()
     if pairs:
-        scene, known = engine.sensed_scene(pairs)
+        scene = engine.sensed_scene(frozenset(pairs))
         data = start(scene)
         scene.step(data)
-        for a, b in known:
-            if (a, b) not in pairs:
-                continue
-            told = np.asarray(scene.get_sensor_value(f"{a} {b}", data), dtype=np.float64).ravel()
-            count = min(round(told[0]), MOST_POINTS)
-            numbers += list(told[1 : 1 + count * _NUMBERS].reshape(count, _NUMBERS))
-            rows += [(int(geoms[a]), int(geoms[b]))] * count
-    told = np.array(numbers).reshape(-1, _NUMBERS)
-    normal, tangent = _unit(told[:, 10:13]), _unit(told[:, 13:16])
+        told = [_points(scene.get_sensor_value(f"{a} {b}", data)) for a, b in pairs]
+    counts = [len(points) for points in told]
+    owners = geoms[np.array(pairs, dtype=np.int64).reshape(-1, 2)]
+    return _contacts(np.repeat(owners, counts, axis=0), np.vstack([np.empty((0, _NUMBERS)), *told]))
+
+
+def _points(told: Any) -> Array:
+    """Return what a sensor tells of each contact, (n, 16)."""
+    numbers = np.asarray(told, dtype=np.float64).ravel()
+    count = min(round(numbers[0]), MOST_POINTS)
+    return numbers[1 : 1 + count * _NUMBERS].reshape(count, _NUMBERS)
+
+
+def _contacts(pairs: Ints, points: Array) -> Contacts:
+    """Return contacts of pairs of geoms (n, 2), of what sensors tell of each (n, 16)."""
+    normal, tangent = _unit(points[:, 10:13]), _unit(points[:, 13:16])
     return Contacts(
-        geom=np.array(rows, dtype=np.int64).reshape(-1, 2),
-        dist=told[:, 6].copy(),
-        pos=told[:, 7:10].copy(),
+        geom=pairs,
+        dist=points[:, 6].copy(),
+        pos=points[:, 7:10].copy(),
         frame=np.stack((normal, tangent, np.cross(normal, tangent)), axis=1),
-        force=told[:, :3].copy(),
-        torque=told[:, 3:6].copy(),
+        force=points[:, :3].copy(),
+        torque=points[:, 3:6].copy(),
     )
 
 

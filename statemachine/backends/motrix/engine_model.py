@@ -6,59 +6,21 @@ A file becomes a *world* (`motrixsim.msd.World`: a description that can be edite
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from ...errors import ModelError
-from ...installed import require
 from ...interface import Array
 from ...processes.stderr_capture import stderr_capture
+from .links import TITLE, geoms_of, mx
 from .messages import is_panic, reason_of
 from .settings import apply_settings
 
-mx: Any = require("motrix")
-
-TITLE = "MotrixSim"
 MOST_POINTS = 16  # contacts of one pair of geoms that a sensor reports
 GeomPair = tuple[int, int]
-
-
-@dataclass(frozen=True)
-class LinkOfWorld:
-    """A link of a world, where a walk through its tree finds it.
-
-    Attributes:
-        link: The link (`motrixsim.msd.Link`).
-        free: Its free joint, where it is the root of a tree that floats; else None.
-        mocap: Whether it is a body that is led.
-    """
-
-    link: Any
-    free: Any
-    mocap: bool
-
-
-def links_of(world: Any) -> Iterator[LinkOfWorld]:
-    """Yield all links of a world, parents before children, in the order of the file."""
-    for body in world.hierarchy.bodies:
-        waiting = [LinkOfWorld(body.link, body.free, body.mocap)]
-        while waiting:
-            found = waiting.pop()
-            yield found
-            children = [LinkOfWorld(child, None, False) for child in found.link.children]
-            waiting += reversed(children)
-
-
-def geoms_of(world: Any) -> list[Any]:
-    """Return all geoms of a world: its own, then those of the links, in their order."""
-    geoms = list(world.hierarchy.geoms)
-    for found in links_of(world):
-        geoms += found.link.geoms
-    return geoms
 
 
 class EngineModel:
@@ -105,11 +67,11 @@ class EngineModel:
         """Return the world of the file, edited."""
         world, _ = self.world()
         if self.settings:
-            apply_settings(mx.msd, world, list(links_of(world)), geoms_of(world), self.settings)
+            apply_settings(world, self.settings)
         return world
 
-    def sensed_scene(self, pairs: frozenset[GeomPair]) -> tuple[Any, list[GeomPair]]:
-        """Return a scene with a sensor for each of some pairs of geoms, and the pairs in order.
+    def sensed_scene(self, pairs: frozenset[GeomPair]) -> Any:
+        """Return a scene with a sensor for each of some pairs of geoms at least.
 
         The sensor of the pair (a, b) is called "a b". Pairs of before stay: none is built twice.
 
@@ -120,13 +82,12 @@ class EngineModel:
         if scene is None or not pairs <= known:
             known |= pairs
             world = self.edited_world()
-            geoms = geoms_of(world)
-            for number, geom in enumerate(geoms):
+            for number, geom in enumerate(geoms_of(world)):
                 geom.name = f"geom {number}"
             world.sensors.contact = [_sensor(a, b) for a, b in sorted(known)]
             scene = self._built(world)
             self._sensed = known, scene
-        return scene, sorted(known)
+        return scene
 
     def _built(self, world: Any) -> Any:
         scene, _ = self._read(world.build)

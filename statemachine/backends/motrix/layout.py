@@ -14,13 +14,13 @@ import numpy as np
 
 from ...interface import Array, Ints, JointType
 from ...interface.checks import unsupported_by
-from .engine_model import geoms_of, links_of
+from .links import geoms_of, links_of
 
 if TYPE_CHECKING:
     from ..compiled.types import MjModel
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(init=False, eq=False)
 class Layout:
     """Where MotrixSim has the elements of a compiled model.
 
@@ -69,31 +69,24 @@ def layout_of(world: Any, scene: Any, raw: MjModel) -> Layout:
     names = [each.link.name or "" for each in found]
     links = _links(names, raw)
     same_links = links.tolist() == list(range(-1, raw.nbody - 1)) and len(names) == raw.nbody - 1
-    qpos, qvel, quaternions = _coordinates(scene, raw)
     if scene.num_actuators != raw.nactuator:
         counts = f"{raw.nactuator} in MuJoCo, {scene.num_actuators} in its reading"
         raise _other("actuators", counts)
-    sites, site_links = _sites(scene, names, raw)
     led = [
         raw.body(body).name for body in np.argsort(raw.body_mocapid) if raw.body_mocapid[body] >= 0
     ]
     bodies = {name: number for number, name in enumerate(scene.body_names)}
     if any(name not in bodies for name in led):
         raise _other("mocap", "a body that is led has no name that it knows")
-    return Layout(
-        qpos=qpos,
-        qvel=qvel,
-        quaternions=quaternions,
-        links=links,
-        sites=sites,
-        site_links=site_links,
-        geoms=_geoms(world, scene, raw) if same_links else np.empty(0, np.int64),
-        mocaps=np.array([bodies[name] for name in led], dtype=np.int64),
-        parents=raw.body_parentid.astype(np.int64),
-        turns=np.array(raw.body_quat),
-        floating=_floating(raw),
-        same_links=same_links,
-    )
+    layout = Layout()
+    layout.links, layout.same_links = links, same_links
+    layout.qpos, layout.qvel, layout.quaternions = _coordinates(scene, raw)
+    layout.sites, layout.site_links = _sites(scene, names, raw)
+    layout.geoms = _geoms(world, scene, raw) if same_links else np.empty(0, np.int64)
+    layout.mocaps = np.array([bodies[name] for name in led], dtype=np.int64)
+    layout.parents, layout.turns = raw.body_parentid.astype(np.int64), np.array(raw.body_quat)
+    layout.floating = _floating(raw)
+    return layout
 
 
 def _floating(raw: MjModel) -> dict[int, int]:

@@ -6,19 +6,21 @@ MotrixSim's description of the file, before it is built.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...interface import Array, JointType
+from ...interface import Array
 from ...interface.checks import unsupported_by
 from ..actuators import servos
 from ..compiled.flags import DisableFlag
 from ..served.shared_fields import FLAGS, field_names, field_of
+from .links import free_joints_of, geoms_of, joints_of, links_of, mx
 
 if TYPE_CHECKING:
+    from motrixsim import msd
+
     from ..compiled.types import MjModel
 
 # Constants that follow from others, and what is no part of a motion: `mj_setConst`, and delays,
@@ -102,38 +104,7 @@ def _together(base: MjModel, edited: MjModel, settings: dict[str, Array]) -> Non
         settings.pop(name, None)
 
 
-@dataclass(frozen=True)
-class WorldElements:
-    """Elements of a world, as settings are written into it.
-
-    Attributes:
-        msd: The module `motrixsim.msd`.
-        world: The world.
-        links: All links, as `engine_model.links_of` yields them; body k + 1 is link k.
-        geoms: All geoms, as `engine_model.geoms_of` gives them.
-    """
-
-    msd: Any
-    world: Any
-    links: Sequence[Any]
-    geoms: Sequence[Any]
-
-    def joints(self) -> list[tuple[Any, int]]:
-        """Return all joints with their numbers of degrees of freedom, in the order of the file."""
-        found: list[tuple[Any, int]] = []
-        for each in self.links:
-            if each.free is not None:
-                found.append((each.free, JointType.FREE.nv))
-            else:
-                found += [(joint, _nv(joint)) for joint in each.link.joints]
-        return found
-
-
-def _nv(joint: Any) -> int:
-    return JointType.BALL.nv if "Ball" in str(joint.type_) else 1
-
-
-def flags_of(world: Any, flags: int) -> int:
+def flags_of(world: msd.World, flags: int) -> int:
     """Return the flags of a compiled model as MotrixSim has them: those that it knows, as it read.
 
     Args:
@@ -147,123 +118,126 @@ def flags_of(world: Any, flags: int) -> int:
     return flags
 
 
-def apply_settings(
-    msd: Any, world: Any, links: Sequence[Any], geoms: Sequence[Any], settings: Mapping[str, Array]
-) -> None:
-    """Write settings into a world.
+def apply_settings(world: msd.World, settings: Mapping[str, Array]) -> None:
+    """Write settings into a world, which is edited.
 
     Args:
-        msd: The module `motrixsim.msd`.
-        world: Is edited.
-        links: All its links, in the order of the bodies.
-        geoms: All its geoms, in their order.
+        world: As it was read; its link k is body k + 1.
         settings: As `settings_between` gives them.
     """
-    elements = WorldElements(msd, world, links, geoms)
-    for name, value in settings.items():
-        _FIELDS[name](elements, value)
+    for name, write in _FIELDS.items():
+        if name in settings:
+            write(world, settings[name])
 
 
-def _set_timestep(elements: WorldElements, value: Array) -> None:
-    elements.world.simulate_option.timestep = float(value)
+def _set_timestep(world: msd.World, value: Array) -> None:
+    world.simulate_option.timestep = float(value)
 
 
-def _set_gravity(elements: WorldElements, value: Array) -> None:
-    elements.world.simulate_option.gravity = value.tolist()
+def _set_gravity(world: msd.World, value: Array) -> None:
+    world.simulate_option.gravity = value.tolist()
 
 
-def _set_switches(elements: WorldElements, value: Array) -> None:
-    option, flags = elements.world.simulate_option, int(value)
+def _set_switches(world: msd.World, value: Array) -> None:
+    option, flags = world.simulate_option, int(value)
     for flag, switch in _SWITCHES.items():
         setattr(option, switch, bool(flags & int(flag)))
     if flags & DisableFlag.ACTUATION:
         # Its own switch, disable_actuators, is without effect. Keyframes have a command of each.
-        elements.world.keyframes, elements.world.actuators = [], []
+        world.keyframes, world.actuators = [], []
 
 
-def _per_joint(attribute: str) -> Callable[[WorldElements, Array], None]:
+def _per_joint(attribute: str) -> Callable[[msd.World, Array], None]:
     """Return what sets an attribute of each joint to the first number of its degrees of freedom."""
 
-    def write(elements: WorldElements, value: Array) -> None:
-        start = 0
-        for joint, count in elements.joints():
+    def write(world: msd.World, value: Array) -> None:
+        for joint, start in (*joints_of(world), *free_joints_of(world)):
             setattr(joint, attribute, float(value[start]))
-            start += count
 
     return write
 
 
-def _set_damping(elements: WorldElements, value: Array) -> None:
-    start = 0
-    for joint, count in elements.joints():
-        damping = float(value[start])
-        start += count
-        if count == JointType.FREE.nv:
-            if damping:
-                raise unsupported_by("motrix", "damping", "a free joint of its has none")
-            continue
-        spring = joint.spring_damper
-        stiffness = spring.coeff.value.k if spring is not None else 0.0
-        spring = elements.msd.SpringDamper() if spring is None else spring
-        coefficients = elements.msd.StiffnessDamping()
-        coefficients.k, coefficients.d = stiffness, damping
-        spring.coeff = elements.msd.SpringDampCoeff.stiffness_damping(coefficients)
+def _set_damping(world: msd.World, value: Array) -> None:
+    for _, start in free_joints_of(world):
+        if value[start]:
+            raise unsupported_by("motrix", "damping", "a free joint of its has none")
+    for joint, start in joints_of(world):
+        spring, coefficients = joint.spring_damper, mx.msd.StiffnessDamping()
+        if spring is None:
+            spring = mx.msd.SpringDamper()
+        else:
+            coefficients.k = spring.coeff.value.k
+        coefficients.d = float(value[start])
+        spring.coeff = mx.msd.SpringDampCoeff.stiffness_damping(coefficients)
         joint.spring_damper = spring
 
 
-def _set_friction(elements: WorldElements, value: Array) -> None:
-    for geom, row in zip(elements.geoms, value, strict=True):
+def _set_friction(world: msd.World, value: Array) -> None:
+    for geom, row in zip(geoms_of(world), value, strict=True):
         geom.physics_material.friction = row.tolist()
 
 
-def _scale_masses(elements: WorldElements, value: Array) -> None:
-    for each, factor in zip(elements.links, value[1:], strict=True):
+def _scale_masses(world: msd.World, value: Array) -> None:
+    for each, factor in zip(links_of(world), value[1:].tolist(), strict=True):
         if factor == 1.0:
             continue
         for inertial in (each.link.inertial, *(geom.inertial for geom in each.link.geoms)):
             if inertial.mass is not None:
-                inertial.mass = float(factor * inertial.mass)
+                inertial.mass = factor * inertial.mass
             if inertial.diag_inertia is not None:
                 inertial.diag_inertia = factor * inertial.diag_inertia
         for geom in each.link.geoms:
-            geom.physics_material.density = float(factor * geom.physics_material.density)
+            geom.physics_material.density = factor * geom.physics_material.density
 
 
-def _gain(index: int) -> Callable[[WorldElements, Array], None]:
-    """Return what sets a gain of the position servos: kp (1) or kv (2), as in biasprm."""
-
-    def write(elements: WorldElements, value: Array) -> None:
-        kinds = elements.msd.ActuatorType
-        for actuator, gain in zip(elements.world.actuators, value.tolist(), strict=True):
-            if np.isnan(gain):
-                continue
-            values = actuator.actuator_type.value
-            if actuator.actuator_type.variant == "position":
-                if index == 1:
-                    values.kp = gain
-                else:
-                    values.damping_value, values.damping_type = gain, elements.msd.DampingType.Kv
-                actuator.actuator_type = kinds.position(values)
-                continue
-            bias, gains = np.array(values.biasprm), np.array(values.gainprm)
-            bias[index] = -gain
-            if index == 1:
-                gains[0] = gain
-            values.biasprm, values.gainprm = bias, gains
-            actuator.actuator_type = kinds.general(values)
-
-    return write
+def _set_kp(world: msd.World, value: Array) -> None:
+    for actuator, gain in _servos_of(world, value):
+        values = actuator.actuator_type.value
+        if actuator.actuator_type.variant == "position":
+            values.kp = gain
+            actuator.actuator_type = mx.msd.ActuatorType.position(values)
+        else:
+            _set_general(actuator, 1, gain)
 
 
-_FIELDS: dict[str, Callable[[WorldElements, Array], None]] = {
+def _set_kv(world: msd.World, value: Array) -> None:
+    for actuator, gain in _servos_of(world, value):
+        values = actuator.actuator_type.value
+        if actuator.actuator_type.variant == "position":
+            values.damping_value, values.damping_type = gain, mx.msd.DampingType.Kv
+            actuator.actuator_type = mx.msd.ActuatorType.position(values)
+        else:
+            _set_general(actuator, 2, gain)
+
+
+def _servos_of(world: msd.World, gains: Array) -> Iterator[tuple[msd.Actuator, float]]:
+    """Yield each actuator of which a gain is given, with the gain; NaN is of others."""
+    for actuator, gain in zip(world.actuators, gains.tolist(), strict=True):
+        if not np.isnan(gain):
+            yield actuator, gain
+
+
+def _set_general(actuator: msd.Actuator, place: int, gain: float) -> None:
+    """Set a gain of a servo that is written as a general actuator: 1 for kp, 2 for kv."""
+    values = actuator.actuator_type.value
+    bias, gains = np.array(values.biasprm), np.array(values.gainprm)
+    bias[place] = -gain
+    if place == 1:
+        gains[0] = gain
+    values.biasprm, values.gainprm = bias, gains
+    actuator.actuator_type = mx.msd.ActuatorType.general(values)
+
+
+# By their names here, in the order in which they are written: what takes actuators out is last.
+_FIELDS: dict[str, Callable[[msd.World, Array], None]] = {
     "opt.timestep": _set_timestep,
     "opt.gravity": _set_gravity,
-    "opt.disableflags": _set_switches,
     "dof_armature": _per_joint("armature"),
     "dof_frictionloss": _per_joint("friction_loss"),
     "dof_damping": _set_damping,
     "geom_friction": _set_friction,
     "mass factor": _scale_masses,
-    "kp": _gain(1),
-    "kv": _gain(2),
+    "kp": _set_kp,
+    "kv": _set_kv,
+    "opt.disableflags": _set_switches,
 }

@@ -20,8 +20,9 @@ from ...processes.stderr_capture import stderr_capture
 from ...rotations import matrix_from_quat, times, wxyz_from_xyzw, xyzw_from_wxyz
 from ..hidden_world import HiddenWorld, Memory, Moment, Read
 from .contact_sensors import contacts_at
-from .engine_model import TITLE, EngineModel, mx
+from .engine_model import EngineModel
 from .layout import Layout
+from .links import TITLE, mx
 from .messages import is_panic
 
 Single = NDArray[np.float32]
