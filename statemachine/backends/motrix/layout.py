@@ -29,8 +29,10 @@ class Layout:
         qvel: (nv,) where each number of qvel stands in its velocities.
         quaternions: Where a quaternion begins in qpos.
         links: (nbody,) its link of each body, -1 of the world.
-        sites: (nsite,) its site of each site, -1 where that is the frame of a link.
-        site_links: (nsite,) that link, -1 where it is a site.
+        sites: (nsite,) its site of each site, -1 of one that it does not read: that is where the
+            file puts it in its body.
+        site_bodies: (nsite,) the body that carries each site.
+        site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
         geoms: (number of its geoms,) the geom of each, -1 of one that is not known; empty where
             its geoms cannot be told apart.
         mocaps: (nmocap,) its body of each body that is led.
@@ -45,7 +47,9 @@ class Layout:
     quaternions: tuple[int, ...]
     links: Ints
     sites: Ints
-    site_links: Ints
+    site_bodies: Ints
+    site_pos: Array
+    site_quat: Array
     geoms: Ints
     mocaps: Ints
     parents: Ints
@@ -81,7 +85,8 @@ def layout_of(world: Any, scene: Any, raw: MjModel) -> Layout:
     layout = Layout()
     layout.links, layout.same_links = links, same_links
     layout.qpos, layout.qvel, layout.quaternions = _coordinates(scene, raw)
-    layout.sites, layout.site_links = _sites(scene, names, raw)
+    layout.sites, layout.site_bodies = _sites(scene, raw), raw.site_bodyid.astype(np.int64)
+    layout.site_pos, layout.site_quat = np.array(raw.site_pos), np.array(raw.site_quat)
     layout.geoms = _geoms(world, scene, raw) if same_links else np.empty(0, np.int64)
     layout.mocaps = np.array([bodies[name] for name in led], dtype=np.int64)
     layout.parents, layout.turns = raw.body_parentid.astype(np.int64), np.array(raw.body_quat)
@@ -153,27 +158,18 @@ def _coordinates(scene: Any, raw: MjModel) -> tuple[Ints, Ints, tuple[int, ...]]
     return qpos, qvel, tuple(quaternions)
 
 
-def _sites(scene: Any, links: Sequence[str], raw: MjModel) -> tuple[Ints, Ints]:
-    """Return the site of each site, and the link of each that is the frame of one; -1 else.
-
-    Raises:
-        UnsupportedError: A site is neither.
-    """
-    names = [raw.site(site).name for site in range(raw.nsite)]
+def _sites(scene: Any, raw: MjModel) -> Ints:
+    """Return its site of each site (nsite,), -1 of one that it does not read."""
     theirs = list(scene.site_names)
     known = {name: number for number, name in enumerate(theirs) if name}
-    frames = {name: number for number, name in enumerate(links) if name}
-    sites, site_links = np.full((2, raw.nsite), -1, dtype=np.int64)
-    for number, name in enumerate(names):
-        if len(theirs) == len(names) and (theirs[number] or name) == name:
-            sites[number] = number
-        elif name in known:
-            sites[number] = known[name]
-        elif name in frames:
-            site_links[number] = frames[name]
+    sites = list[int]()
+    for number in range(raw.nsite):
+        name = raw.site(number).name
+        if len(theirs) == raw.nsite and (theirs[number] or name) == name:
+            sites.append(number)
         else:
-            raise _other("sites", f"no {name or number}")
-    return sites, site_links
+            sites.append(known.get(name, -1))
+    return np.array(sites, dtype=np.int64)
 
 
 def _geoms(world: Any, scene: Any, raw: MjModel) -> Ints:

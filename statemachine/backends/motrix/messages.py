@@ -19,6 +19,7 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _FIELD = re.compile(r"^\s+(?P<element>[\w/]+)@(?P<attribute>\w+) at line: \d+")
 _OTHER = re.compile(r"^\S+Z\s+(WARN|ERROR) \S+: (?P<text>.*)")
 _LIST_FOLLOWS = "will be ignored"
+_PICTURE_WORDS = ("texture", "camera", "trackcom", "light", "skybox")
 # Elements that no motion depends on.
 _OF_PICTURES = {
     *("material", "texture", "visual", "light", "camera", "headlight", "map", "quality", "global"),
@@ -41,14 +42,16 @@ def ignored_fields(lines: Sequence[str]) -> tuple[str, ...]:
 
 
 def other_warnings(lines: Sequence[str]) -> tuple[str, ...]:
-    """Return what else it warned of while it read a file, each once."""
+    """Return what else it warned of while it read a file, but of pictures, each once."""
     return tuple(dict.fromkeys(_other_warnings(lines)))
 
 
 def _other_warnings(lines: Sequence[str]) -> Iterator[str]:
     for line in lines:
         match = _OTHER.match(_COLOURS.sub("", line))
-        if match and _LIST_FOLLOWS not in match["text"]:
+        if match is None or _LIST_FOLLOWS in match["text"]:
+            continue
+        if not any(word in match["text"].lower() for word in _PICTURE_WORDS):
             yield match["text"].strip()
 
 

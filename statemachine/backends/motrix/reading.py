@@ -15,11 +15,14 @@ import numpy as np
 
 from ...interface import Array, JointType
 from ...interface.checks import unsupported_by
+from ...rotations import matrix_from_quat
 from ..compiled.actuators import ActivationKind
+from ..compiled.algebra import principal_axes
 from ..compiled.flags import DisableFlag
 from ..compiled.stages import set_constants
 from .engine_model import EngineModel
 from .layout import Layout, layout_of
+from .links import mx
 from .messages import ignored_fields, other_warnings
 from .settings import flags_of
 
@@ -27,7 +30,8 @@ if TYPE_CHECKING:
     from ..compiled.types import MjModel
 
 _ROUNDED = 1e-6  # two numbers are one where they differ by less, relatively
-_SMALL = 1e-12  # or absolutely: what is written as 0
+_SMALL = 1e-8  # or absolutely: a centre of mass [m] that is summed from parts
+_ROUNDED_INERTIA = 1e-4  # of the largest entry
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +116,12 @@ class _Numbers:
         """Return the number that is run: ours, where theirs is that one rounded."""
         if abs(theirs - ours) <= _ROUNDED * abs(ours) + _SMALL or theirs == ours:
             return ours
-        self._otherwise.append(f"{name} {theirs:.6g}, not {ours:.6g}")
+        self.differs(name, theirs, ours)
         return float(theirs)
+
+    def differs(self, name: str, theirs: float, ours: float) -> None:
+        """Note that a number is another one."""
+        self._otherwise.append(f"{name} {theirs:.6g}, not {ours:.6g}")
 
     def array(self, name: str, ours: Array, theirs: Any) -> None:
         """Let an array of the compiled model, of any length, take over other numbers."""
@@ -121,20 +129,38 @@ class _Numbers:
         differs = ~np.isclose(told, ours, rtol=_ROUNDED, atol=_SMALL)
         if differs.any():
             first = int(np.flatnonzero(differs)[0])
-            self._otherwise.append(f"{name} {told[first]:.6g}, not {ours[first]:.6g}")
+            self.differs(name, told[first], ours[first])
             ours[differs] = told[differs]
 
 
 def _take_over_bodies(scene: Any, layout: Layout, read: _Numbers) -> None:
-    """Take over masses, and friction of the geoms."""
-    raw = read.raw
-    for body, link in enumerate(layout.links.tolist()):
-        mass = scene.links[link].mass if link >= 0 and layout.same_links else 0.0
-        if mass > 0:  # that of a link that stands is told as 0
-            read.array(f"mass of {raw.body(body).name}", raw.body_mass[body : body + 1], mass)
+    """Take over masses and inertias, and friction of the geoms."""
+    raw, data = read.raw, mx.SceneData(scene)
+    for body, number in enumerate(layout.links.tolist()):
+        if number < 0 or not layout.same_links:
+            continue
+        link, name = scene.links[number], raw.body(body).name or f"body {body}"
+        if link.mass <= 0:  # of a link that stands it is told as 0
+            continue
+        read.array(f"mass of {name}", raw.body_mass[body : body + 1], link.mass)
+        read.array(f"centre of mass of {name}", raw.body_ipos[body], link.center_of_mass)
+        xx, yy, zz, xy, xz, yz = link.get_inertia_override(data).astype(np.float64).ravel()
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        _take_over_inertia(read, body, name, tensor)
     for number, geom in enumerate(layout.geoms.tolist()):
         name = raw.geom(geom).name or f"geom {geom}"
         read.array(f"friction of {name}", raw.geom_friction[geom], scene.geoms[number].friction)
+
+
+def _take_over_inertia(read: _Numbers, body: int, name: str, theirs: Array) -> None:
+    """Take over an inertia (3, 3) about the centre of mass, along the axes of the body."""
+    raw = read.raw
+    axes = matrix_from_quat(raw.body_iquat[body])
+    ours = axes @ np.diag(raw.body_inertia[body]) @ axes.T
+    if np.abs(theirs - ours).max() <= _ROUNDED_INERTIA * np.abs(ours).max():
+        return
+    read.differs(f"inertia of {name}", float(np.trace(theirs)), float(np.trace(ours)))
+    raw.body_inertia[body], raw.body_iquat[body] = principal_axes(theirs)
 
 
 def _take_over_joints(scene: Any, layout: Layout, read: _Numbers) -> None:
@@ -144,6 +170,7 @@ def _take_over_joints(scene: Any, layout: Layout, read: _Numbers) -> None:
     losses = np.zeros(raw.nv)
     for loss in low.friction_losses:
         losses[loss.dof_vel_index] = loss.friction_loss
+    ranges = {limit.dof_vel_index: (limit.lower, limit.upper) for limit in low.dof_limits}
     joints = iter(scene.joints)
     for joint in range(raw.njnt):
         kind, start = JointType(int(raw.jnt_type[joint])), int(raw.jnt_dofadr[joint])
@@ -153,17 +180,13 @@ def _take_over_joints(scene: Any, layout: Layout, read: _Numbers) -> None:
         read.array(f"frictionloss of {name}", raw.dof_frictionloss[dofs], losses[places])
         if kind == JointType.FREE:
             continue
-        own = next(joints)
-        read.array(f"armature of {name}", raw.dof_armature[dofs], own.armature)
+        read.array(f"armature of {name}", raw.dof_armature[dofs], next(joints).armature)
         if kind == JointType.BALL:
             continue
-        limits = np.asarray(own.range, dtype=np.float64).ravel()
-        limited = bool(np.isfinite(limits).any())
-        if limited and raw.jnt_limited[joint]:
+        limits = ranges.get(int(places[0]))
+        raw.jnt_limited[joint] = limits is not None
+        if limits is not None:
             read.array(f"range of {name}", raw.jnt_range[joint], limits)
-        elif limited != bool(raw.jnt_limited[joint]):
-            read.raw.jnt_limited[joint] = limited
-            read.array(f"range of {name}", raw.jnt_range[joint], limits if limited else 0.0)
 
 
 def _take_over_actuators(scene: Any, read: _Numbers) -> None:

@@ -173,18 +173,26 @@ class MotrixWorld(HiddenWorld):
         xquat[0, 0] = 1.0
         xpos[1:], xquat[1:] = poses[layout.links[1:], :3], _wxyz(poses[layout.links[1:], 3:])
         xquat *= self._signs(xquat, moment.qpos)[:, None]
-        sites = [
-            scene.sites[site].get_pose(data) if site >= 0 else poses[link]
-            for site, link in zip(layout.sites.tolist(), layout.site_links.tolist(), strict=True)
-        ]
-        of_sites = np.asarray(sites, dtype=np.float64).reshape(-1, 7)
-        site_xmat = matrix_from_quat(_wxyz(of_sites[:, 3:])).reshape(-1, 9)
+        site_xpos, site_quat = self._sites(xpos, xquat)
         return {
             "xpos": xpos,
             "xquat": xquat,
-            "site_xpos": of_sites[:, :3].copy(),
-            "site_xmat": site_xmat,
+            "site_xpos": site_xpos,
+            "site_xmat": matrix_from_quat(site_quat).reshape(-1, 9),
         }
+
+    def _sites(self, xpos: Array, xquat: Array) -> tuple[Array, Array]:
+        """Return where the sites are (nsite, 3), and how they are turned (nsite, 4)."""
+        layout, scene = self._layout, self._scene
+        turns = xquat[layout.site_bodies]
+        site_xpos = xpos[layout.site_bodies]
+        site_xpos += (matrix_from_quat(turns) @ layout.site_pos[:, :, None])[:, :, 0]
+        site_quat = times(turns, layout.site_quat)
+        for number, site in enumerate(layout.sites.tolist()):
+            if site >= 0:
+                pose = np.asarray(scene.sites[site].get_pose(self.raw), dtype=np.float64)
+                site_xpos[number], site_quat[number] = pose[:3], _wxyz(pose[3:])
+        return site_xpos, site_quat
 
     def _signs(self, xquat: Array, qpos: Array) -> Array:
         """Return the sign (nbody,) of each body's quaternion that MuJoCo has.
