@@ -59,9 +59,9 @@ _BEHAVIOURS = {
     ),
     "exact restore": Behaviour(
         "unsupported",
-        "two restores of one State have the same future, bit by bit; with contacts that is within "
-        "2e-6 of the run it was taken from: what the solver starts from cannot be read. Written "
-        "into the same SceneData, which keeps that, it would be within 5e-9",
+        "two restores of one State have the same future, bit by bit; that of the run it was taken "
+        "from is within 2e-6 of it without contacts and at rest, and in a grasp or an impact up to "
+        "1e-2 rad away: what the solver starts from cannot be read",
     ),
     "no automatic reset": Behaviour(
         "emulated",
@@ -135,7 +135,9 @@ class MotrixModel(HiddenModel):
         settings = settings_between(reading.raw, compiled)
         if settings and not reading.layout.same_links:
             _refuse_settings_of_links(settings)
-        engine = EngineModel(reading.engine.path, settings) if settings else reading.engine
+        engine = reading.engine
+        if settings:
+            engine = EngineModel(engine.path, {**engine.settings, **settings})
         timestep, known = float(compiled.opt.timestep), facts(compiled)
         known |= {"timestep": timestep * substeps, "substeps": substeps, "raw": engine.scene}
         qpos0, nu = compiled.qpos0.copy(), known["nu"]

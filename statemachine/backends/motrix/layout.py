@@ -87,7 +87,7 @@ def layout_of(world: Any, scene: Any, raw: MjModel) -> Layout:
     layout.qpos, layout.qvel, layout.quaternions = _coordinates(scene, raw)
     layout.sites, layout.site_bodies = _sites(scene, raw), raw.site_bodyid.astype(np.int64)
     layout.site_pos, layout.site_quat = np.array(raw.site_pos), np.array(raw.site_quat)
-    layout.geoms = _geoms(world, scene, raw) if same_links else np.empty(0, np.int64)
+    layout.geoms = _geoms(world, scene, raw)
     layout.mocaps = np.array([bodies[name] for name in led], dtype=np.int64)
     layout.parents, layout.turns = raw.body_parentid.astype(np.int64), np.array(raw.body_quat)
     layout.floating = _floating(raw)
@@ -173,10 +173,21 @@ def _sites(scene: Any, raw: MjModel) -> Ints:
 
 
 def _geoms(world: Any, scene: Any, raw: MjModel) -> Ints:
-    """Return the geom of each of its geoms; empty where they cannot be told apart."""
-    if scene.num_geoms != raw.ngeom or len(geoms_of(world)) != raw.ngeom:
-        return np.empty(0, np.int64)
-    for number, name in enumerate(scene.geom_names):
-        if name and name != raw.geom(number).name:
-            return np.empty(0, np.int64)
-    return np.arange(raw.ngeom)
+    """Return the geom of each of its geoms; empty where they cannot be told apart.
+
+    Shapes that are drawn only may be missing in one of the readings, as MuJoCo's of a URDF.
+    """
+    unknown = np.empty(0, np.int64)
+    if len(geoms_of(world)) != scene.num_geoms:
+        return unknown
+    every = list(range(scene.num_geoms))
+    solid = [number for number in every if not scene.geoms[number].visual_only]
+    for chosen in (every, solid):
+        if len(chosen) != raw.ngeom:
+            continue
+        pairs = [(scene.geom_names[own], raw.geom(k).name) for k, own in enumerate(chosen)]
+        if all(theirs in (None, "", ours) for theirs, ours in pairs):
+            geoms = np.full(scene.num_geoms, -1, dtype=np.int64)
+            geoms[chosen] = np.arange(raw.ngeom)
+            return geoms
+    return unknown

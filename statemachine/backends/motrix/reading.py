@@ -24,9 +24,11 @@ from .engine_model import EngineModel
 from .layout import Layout, layout_of
 from .links import mx
 from .messages import ignored_fields, other_warnings
-from .settings import flags_of
+from .settings import FIXED_BASE, NO_ACTUATORS, flags_of
 
 if TYPE_CHECKING:
+    from motrixsim import msd
+
     from ..compiled.types import MjModel
 
 _ROUNDED = 1e-6  # two numbers are one where they differ by less, relatively
@@ -70,16 +72,31 @@ def read_file(path: Path, raw: MjModel) -> Reading:
     if (raw.actuator_dyntype != ActivationKind.NONE).any():
         reason = "the activation of an actuator can be neither read nor set in it"
         raise unsupported_by("motrix", "activation", reason)
-    engine = EngineModel(path)
-    world, lines = engine.world()
-    scene = engine.scene
+    if not raw.nv:
+        raise unsupported_by("motrix", "joints", "it cannot step a model without any")
+    world, lines = EngineModel(path).world()
+    engine = EngineModel(path, _of_urdf(world, raw) if path.suffix.lower() == ".urdf" else {})
+    world, scene = engine.edited_world(), engine.scene
     layout = layout_of(world, scene, raw)
     own, otherwise = with_numbers_of(scene, layout, raw)
     if (flags := flags_of(world, raw.opt.disableflags)) != raw.opt.disableflags:
         differing = DisableFlag(flags ^ raw.opt.disableflags)
         otherwise = (*otherwise, f"flag {differing.name} as if it were not there")
         own.opt.disableflags = flags
+    if FIXED_BASE in engine.settings:
+        otherwise = (*otherwise, "a base that floats, which is fixed here as in MuJoCo")
     return Reading(engine, layout, own, ignored_fields(lines), other_warnings(lines), otherwise)
+
+
+def _of_urdf(world: msd.World, raw: MjModel) -> dict[str, Array]:
+    """Return the settings that make MotrixSim's reading of a URDF the robot that MuJoCo reads."""
+    settings: dict[str, Array] = {}
+    floats = bool((raw.jnt_type == JointType.FREE).any())
+    if not floats and any(body.free is not None for body in world.hierarchy.bodies):
+        settings[FIXED_BASE] = np.ones(())
+    if world.actuators and not raw.nactuator:
+        settings[NO_ACTUATORS] = np.ones(())
+    return settings
 
 
 def with_numbers_of(scene: Any, layout: Layout, raw: MjModel) -> tuple[MjModel, tuple[str, ...]]:
@@ -148,6 +165,8 @@ def _take_over_bodies(scene: Any, layout: Layout, read: _Numbers) -> None:
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         _take_over_inertia(read, body, name, tensor)
     for number, geom in enumerate(layout.geoms.tolist()):
+        if geom < 0:
+            continue
         name = raw.geom(geom).name or f"geom {geom}"
         read.array(f"friction of {name}", raw.geom_friction[geom], scene.geoms[number].friction)
 

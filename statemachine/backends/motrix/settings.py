@@ -143,8 +143,8 @@ def _set_switches(world: msd.World, value: Array) -> None:
     for flag, switch in _SWITCHES.items():
         setattr(option, switch, bool(flags & int(flag)))
     if flags & DisableFlag.ACTUATION:
-        # Its own switch, disable_actuators, is without effect. Keyframes have a command of each.
-        world.keyframes, world.actuators = [], []
+        # Its own switch, disable_actuators, is without effect.
+        _without_actuators(world, value)
 
 
 def _per_joint(attribute: str) -> Callable[[msd.World, Array], None]:
@@ -228,8 +228,24 @@ def _set_general(actuator: msd.Actuator, place: int, gain: float) -> None:
     actuator.actuator_type = mx.msd.ActuatorType.general(values)
 
 
+def _fix_base(world: msd.World, _value: Array) -> None:
+    for body in world.hierarchy.bodies:
+        body.free = None
+
+
+def _without_actuators(world: msd.World, _value: Array) -> None:
+    """Take actuators out. Keyframes, which have a command of each, go with them."""
+    world.keyframes, world.actuators = [], []
+
+
+# What makes a world the robot that MuJoCo reads of a URDF: MotrixSim lets the base of each float,
+# and gives each joint a motor.
+FIXED_BASE, NO_ACTUATORS = "fixed base", "no actuators"
+
 # By their names here, in the order in which they are written: what takes actuators out is last.
 _FIELDS: dict[str, Callable[[msd.World, Array], None]] = {
+    FIXED_BASE: _fix_base,
+    NO_ACTUATORS: _without_actuators,
     "opt.timestep": _set_timestep,
     "opt.gravity": _set_gravity,
     "dof_armature": _per_joint("armature"),

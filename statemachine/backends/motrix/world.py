@@ -77,21 +77,10 @@ class MotrixWorld(HiddenWorld):
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         """Put a state into a new SceneData, which remembers nothing; the command stays."""
         self.raw, self._gave_up = mx.SceneData(self._scene), False
-        self._write(self.raw, qpos, qvel)
+        put_state(self.raw, self._layout, qpos, qvel)
         self._velocities = None
         self._wild = _is_wild(qpos, qvel)
         self.command(self._commands)
-
-    def _write(self, data: Any, qpos: Array, qvel: Array) -> None:
-        """Write a state into a SceneData."""
-        positions, velocities = np.empty(len(qpos), np.float32), np.empty(len(qvel), np.float32)
-        unit = np.array(qpos)
-        for start in self._layout.quaternions:
-            unit[start : start + 4] /= np.linalg.norm(unit[start : start + 4])
-        positions[self._layout.qpos] = unit
-        velocities[self._layout.qvel] = qvel
-        data.low.set_dof_positions_unchecked(positions)
-        data.set_dof_vel(velocities)
 
     def command(self, ctrl: Array) -> None:
         """Take ctrl, which MotrixSim copies, and put the bodies that are led in their places."""
@@ -99,17 +88,13 @@ class MotrixWorld(HiddenWorld):
         self._command(self._scene, self.raw)
 
     def _command(self, scene: Any, data: Any) -> None:
-        if scene.num_actuators:  # none where actuation is off
-            data.actuator_ctrls = self._commands[: self._nu].astype(np.float32)
+        put_command(scene, data, self._commands[: self._nu])
         count = len(self._layout.mocaps)
         places, turns = np.split(self._commands[self._nu :], [3 * count])
         for number, body in enumerate(self._layout.mocaps.tolist()):
-            turn = turns[4 * number : 4 * number + 4]
-            pose = (
-                *places[3 * number : 3 * number + 3],
-                *xyzw_from_wxyz(turn / np.linalg.norm(turn)),
-            )
-            scene.bodies[body].mocap.set_pose(data, np.array(pose, np.float32))
+            place, turn = places[3 * number :][:3], turns[4 * number :][:4]
+            pose = np.concatenate((place, xyzw_from_wxyz(_unit(turn))))
+            scene.bodies[body].mocap.set_pose(data, pose.astype(np.float32))
 
     def step(self) -> None:
         """Take one engine step.
@@ -215,7 +200,7 @@ class MotrixWorld(HiddenWorld):
 
         def start(scene: Any) -> Any:
             data = mx.SceneData(scene)
-            self._write(data, moment.qpos, moment.qvel)
+            put_state(data, self._layout, moment.qpos, moment.qvel)
             commands, self._commands = self._commands, moment.ctrl
             try:
                 self._command(scene, data)
@@ -236,6 +221,37 @@ class MotrixWorld(HiddenWorld):
     def close(self) -> None:
         """Let the SceneData go."""
         self.raw = None
+
+
+def put_state(data: Any, layout: Layout, qpos: Array, qvel: Array) -> None:
+    """Write a state into a SceneData.
+
+    Args:
+        data: The SceneData.
+        layout: Where its model has what the Model counts.
+        qpos: (nq,) as in a Data; quaternions are normalised.
+        qvel: (nv,) as in a Data.
+    """
+    positions, velocities = np.empty(len(qpos), np.float32), np.empty(len(qvel), np.float32)
+    unit = np.array(qpos)
+    for start in layout.quaternions:
+        unit[start : start + 4] = _unit(unit[start : start + 4])
+    positions[layout.qpos] = unit
+    velocities[layout.qvel] = qvel
+    data.low.set_dof_positions_unchecked(positions)
+    data.set_dof_vel(velocities)
+
+
+def put_command(scene: Any, data: Any, ctrl: Array) -> None:
+    """Write ctrl (nu,) into a SceneData, which copies it; nothing where actuation is off."""
+    if scene.num_actuators:
+        data.actuator_ctrls = ctrl.astype(np.float32)
+
+
+def _unit(quat: Array) -> Array:
+    """Return a quaternion (4,), wxyz, of length one: the identity for one of zeros, as MuJoCo."""
+    length = float(np.linalg.norm(quat))
+    return quat / length if length else np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def _is_wild(qpos: Array, qvel: Array) -> bool:
