@@ -14,7 +14,7 @@ import platform
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
@@ -144,6 +144,8 @@ class Engine:
     probe: str  # an attribute that only the right package of that name has
     role: str  # what it is here for
     runs: bool = True  # whether there is a backend for it
+    extra: str = ""  # the extra of this library that brings it; "" where all installations have it
+    writes_to_stderr: bool = False  # whether it writes to descriptor 2 while it is imported
 
 
 DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJCF for all others
@@ -184,6 +186,21 @@ _ENGINES = (
         probe="buildModelFromMJCF",
         role="the witness of `statemachine fingertip`",
         runs=False,
+    ),
+    Engine(
+        name="motrix",
+        module="motrixsim",
+        distributions=("motrixsim",),
+        wheels=(
+            Wheel("motrixsim", "linux", ("x86_64", "aarch64"), (11, 13)),
+            Wheel("motrixsim", "win32", ("amd64", "x86_64"), (11, 13)),
+            Wheel("motrixsim", "darwin", ("arm64",), (11, 13)),
+        ),
+        places="Linux, Windows x64 and macOS on Apple silicon, with CPython 3.11 to 3.13",
+        probe="SceneModel",
+        role="a third engine of every lesson, which reads MJCF itself",
+        extra="motrix",
+        writes_to_stderr=True,
     ),
 )
 ENGINES = {engine.name: engine for engine in _ENGINES}
@@ -235,7 +252,7 @@ def require(name: str) -> ModuleType:
     try:
         # PyBullet prints when it is imported. And glfw, which MuJoCo imports, asks a Python of its
         # own for its library, in which a Ctrl-C would show a traceback.
-        with silence(), sigint_blocked():
+        with silence(), sigint_blocked(), _quiet(engine):
             module = importlib.import_module(engine.module)
     except ModuleNotFoundError as error:
         if error.name != engine.module:
@@ -251,6 +268,15 @@ def require(name: str) -> ModuleType:
             engine=name,
         )
     return module
+
+
+def _quiet(engine: Engine) -> AbstractContextManager[object]:
+    """Return a context in which an engine can be imported that writes to descriptor 2."""
+    if not engine.writes_to_stderr or engine.module in sys.modules:
+        return nullcontext()
+    from .processes.stderr_capture import stderr_capture
+
+    return stderr_capture()
 
 
 def require_extra(module: str, what: str, package: str, extra: str, instead: str = "") -> Any:
@@ -322,10 +348,13 @@ def _installed(engine: Engine) -> dict[str, str]:
 
 def _remedy(engine: Engine) -> str:
     """Return what to type on this machine, or that nothing can be installed."""
-    from .installing import pip  # here, for most runs lack nothing
+    from .installing import install_command, pip  # here, for most runs lack nothing
 
     if wheel := wheel_here(engine):
-        return f"{pip()} install {wheel.requirement} (wheels for {engine.places})"
+        command = f"{pip()} install {wheel.requirement}"
+        if engine.extra:
+            command = install_command(engine.extra)
+        return f"{command} (wheels for {engine.places})"
     where = f"{platform.system()} {platform.machine()} and Python 3.{sys.version_info.minor}"
     return f"no wheel for {where}, only for {engine.places}"
 

@@ -84,6 +84,11 @@ class Lab(ExitStack):
             return behaviour.support == "unsupported"
         return feature in OPTIONS and feature not in record.options
 
+    @property
+    def rounding(self) -> float:
+        """Return how far a pose may be from where it belongs [m, and of rotations 1]."""
+        return self.arm.capabilities.rounding
+
     def held(self) -> Data:
         """Return a Data in which the jaws hold the box and squeeze it: mid-contact."""
         data = self.data(self.box, keyframe=0)

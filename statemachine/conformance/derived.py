@@ -96,7 +96,7 @@ def check_a_step_leaves_values_of_the_state_before(lab: Lab, model: Model, data:
             # Elsewhere a restored Data may find the same contact at other points.
             names += ["contacts.dist", "contacts.pos"]
         for name in names:
-            require_close(left[name], expected[name], 1e-12, f"{name} after a step")
+            require_close(left[name], expected[name], lab.rounding, f"{name} after a step")
     forward(model, data)
     gap = np.abs(data.site_xpos - left["site_xpos"]).max()
     require(bool(gap > 1e-6), "the arm did not move, so the check says nothing")
@@ -167,8 +167,8 @@ def check_xquat_is_wxyz(lab: Lab, model: Model, data: Data) -> None:
     data.qpos[start : start + 3] = (0.3, -0.2, 0.5)
     data.qpos[start + 3 : start + 7] = quat
     forward(model, data)
-    require_close(data.xpos[body], (0.3, -0.2, 0.5), 1e-12, "xpos of the box")
-    require_close(data.xquat[body], quat, 1e-12, "xquat of the box, wxyz")
+    require_close(data.xpos[body], (0.3, -0.2, 0.5), lab.rounding, "xpos of the box")
+    require_close(data.xquat[body], quat, lab.rounding, "xquat of the box, wxyz")
 
 
 @check(on="arm")
@@ -180,9 +180,9 @@ def check_site_and_body_agree(lab: Lab, model: Model, data: Data) -> None:
         body = int(model.site_bodyid[site])
         turn = matrix_from_quat(data.xquat[body])
         where = data.xpos[body] + turn @ model.site_pos[site]
-        require_close(data.site_xpos[site], where, 1e-12, "site_xpos")
+        require_close(data.site_xpos[site], where, lab.rounding, "site_xpos")
         mat = turn @ matrix_from_quat(model.site_quat[site])
-        require_close(data.site_xmat[site], mat.ravel(), 1e-12, "site_xmat")
+        require_close(data.site_xmat[site], mat.ravel(), lab.rounding, "site_xmat")
 
 
 @check(on="arm")
@@ -196,9 +196,9 @@ def check_the_witness_agrees(lab: Lab, model: Model, data: Data) -> None:
         forward(model, data)
         for name in model.body_names[1:]:
             body, pose = model.body_id(name), witness.pose(qpos, name, kind="body")
-            require_close(data.xpos[body], pose.pos, 1e-12, f"xpos of {name}")
+            require_close(data.xpos[body], pose.pos, lab.rounding, f"xpos of {name}")
             mat = matrix_from_quat(data.xquat[body])
-            require_close(mat, pose.mat, 1e-12, f"xquat of {name}")
+            require_close(mat, pose.mat, lab.rounding, f"xquat of {name}")
 
 
 def check_addresses_cover_qpos_and_qvel(lab: Lab) -> None:

@@ -24,6 +24,7 @@ ROOMS: dict[str, str] = {
     "mujoco": f"{__name__}.mujoco:MujocoEngine",
     "pybullet": f"{__name__}.pybullet:PybulletEngine",
     "pinocchio": f"{__name__}.pinocchio:PinocchioEngine",
+    "motrix": f"{__name__}.motrix:MotrixEngine",
 }
 
 

@@ -15,6 +15,22 @@ HALF = 0.1  # an edge [m]
 # Where the boxes begin, one over the other [m], and how the lowest is turned (w, x, y, z).
 PLACES = ((0.0, 0.0, 0.25), (0.0, 0.02, 0.55), (0.0, 0.0, 0.85))
 TILT = (0.92, 0.31, 0.21, 0.1)
+
+
+def _pile_body(k: int) -> str:
+    """Return a box of the pile in MJCF; the first of them is turned."""
+    place, turn = PLACES[k], TILT if k == 0 else (1, 0, 0, 0)
+    return (
+        f'<body pos="{" ".join(map(str, place))}" quat="{" ".join(map(str, turn))}">'
+        f'<freejoint/><geom type="box" size="{HALF} {HALF} {HALF}"/></body>'
+    )
+
+
+PILE_MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
+{"".join(map(_pile_body, range(len(PLACES))))}
+<body pos="2 0 2"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body></worldbody>
+<actuator><position joint="j" kp="20"/></actuator></mujoco>"""
+
 Write = Callable[[Any, float], object]
 Read = Callable[[Any], float]
 # Entered, it saves a world and gives what restores one.

@@ -14,8 +14,6 @@ from ..measures.quantities import Readings, derived_arrays
 from ..rotations import times
 from .gaps import same
 
-_ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, and 1]
-
 
 @dataclass(frozen=True)
 class Age:
@@ -95,7 +93,8 @@ def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
     # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
     # what else is not there was written since.
     moved = lag > 0
-    there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
+    rounding = model.capabilities.rounding
+    there = moved & (off <= rounding * (1 + np.abs(poses).max())) & (off <= lag / 100)
     if not there.any():
         return Age()
 

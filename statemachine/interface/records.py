@@ -107,6 +107,11 @@ class ReadOptions:
 AS_WRITTEN = ReadOptions()
 READ_OPTIONS = ("base", "balance_inertia", "meshes")
 
+Precision = Literal["float64", "float32"]
+# Of each, how far poses of a robot of about a metre may be off [m, and of quaternions 1]: some
+# eight roundings along a chain of links.
+_ROUNDINGS: Mapping[Precision, float] = {"float64": 1e-12, "float32": 1e-6}
+
 # The promises of the contract that a capability record speaks of, all of them.
 BEHAVIOURS = (
     "stale after a write",
@@ -149,6 +154,8 @@ class Capabilities:
             for as many as there is memory for.
         refused: Why `Model.replace` does not take some others, by their names; of the rest
             the engine has no such setting.
+        precision: Of the numbers that the engine stores. What follows from qpos is as exact as
+            `rounding` says, and what was written into qpos is rounded by the next step.
     """
 
     options: tuple[str, ...]
@@ -158,6 +165,12 @@ class Capabilities:
     exact_restore: bool
     data_per_process: int | None = None
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
+    precision: Precision = "float64"
+
+    @property
+    def rounding(self) -> float:
+        """Return how far two poses may differ that are equal but for rounding [m, and 1]."""
+        return _ROUNDINGS[self.precision]
 
     def __str__(self) -> str:
         names_by_reason: dict[str, list[str]] = {}
@@ -169,6 +182,8 @@ class Capabilities:
         lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
         shared = "share the compiled model" if self.shared_model else "share its description only"
         lines.append(f"several Data of a Model {shared}")
+        if self.precision != "float64":
+            lines.append(f"numbers: {self.precision}; poses are exact to {self.rounding:g}")
         if self.data_per_process is not None:
             lines.append(f"Data that one process can hold: {self.data_per_process}")
         for name, behaviour in self.behaviours.items():

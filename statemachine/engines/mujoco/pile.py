@@ -11,24 +11,9 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..pile import HALF, PLACES, TILT, Pile, Save
+from ..pile import PILE_MJCF, Pile, Save
 
 mj: Any = require("mujoco")
-
-
-def _pile_body(k: int) -> str:
-    """Return a box of the pile in MJCF; the first of them is turned."""
-    place, turn = PLACES[k], TILT if k == 0 else (1, 0, 0, 0)
-    return (
-        f'<body pos="{" ".join(map(str, place))}" quat="{" ".join(map(str, turn))}">'
-        f'<freejoint/><geom type="box" size="{HALF} {HALF} {HALF}"/></body>'
-    )
-
-
-PILE_MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
-{"".join(map(_pile_body, range(len(PLACES))))}
-<body pos="2 0 2"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body></worldbody>
-<actuator><position joint="j" kp="20"/></actuator></mujoco>"""
 
 
 def _owner(scene: MujocoPile, field: str) -> Any:

@@ -1,0 +1,1 @@
+"""What the backend of MotrixSim is made from."""
