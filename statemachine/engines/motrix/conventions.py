@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from ...backends.motrix.messages import is_panic
 from ...interface import Array
+from ...processes.stderr_capture import stderr_capture
 from .. import samples
 from ..measured import (
     ANGLE,
+    AfterNan,
     Cell,
     LetGo,
     OneStep,
@@ -118,14 +121,41 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
 def _tip_read(act: Callable[[Any, Any], object]) -> ReadTwice:
     """Return where the pendulum's tip is, after something was done to its joint."""
     scene, data = loaded(samples.PENDULUM_MJCF % "")
-    tip = scene.get_site("tip")
     scene.forward_kinematic(data)
     act(scene, data)
+    return _tip_of(scene, data)
+
+
+def _tip_of(scene: Any, data: Any) -> ReadTwice:
+    """Return where the pendulum's tip is, as it is read and recomputed."""
+    tip = scene.get_site("tip")
     reads: list[Array] = []
     for _ in range(2):
         reads.append(np.array(tip.get_position(data), dtype=np.float64))
         scene.forward_kinematic(data)
     return "the tip", reads[0], reads[1], samples.tip_at(float(data.dof_pos[0]))
+
+
+def fresh(_deep: float) -> list[ReadTwice]:
+    """Read of a SceneData that was made and nothing else; contacts are found in a step alone."""
+    return [_tip_of(*loaded(samples.PENDULUM_MJCF % ""))]
+
+
+def invalid(angle: float) -> list[AfterNan]:
+    """Write NaN into the position of a pendulum; a panic of Rust is no Exception of Python."""
+    scene, data = loaded(samples.PENDULUM_MJCF % "")
+    data.set_dof_pos(floats([angle]), scene)
+    scene.step(data)
+    said = ""
+    with stderr_capture():
+        try:
+            data.set_dof_pos(floats([np.nan]), scene)
+            scene.step(data)
+        except BaseException as error:
+            if not is_panic(error):
+                raise
+            said = type(error).__name__
+    return [AfterNan("", float(data.dof_pos[0]), said)]
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
