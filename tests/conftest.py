@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from statemachine import load, releases
-from statemachine.backends import backend_engine, backend_names
+from statemachine.backends import backend_engine, backend_names, chosen
 from statemachine.cli import main
 from statemachine.cli.common import FAULT
 from statemachine.errors import EngineWarning
@@ -28,7 +28,7 @@ from statemachine.lab.compare import perturbed
 
 pytest.register_assert_rewrite("tests.support")
 
-from .support.backends import RELEASES
+from .support.backends import BOTH, RELEASES
 from .support.files import written_all
 from .support.processes import Cli, of_python, without_estimates
 from .support.requirements import REQUIRED, ROOT, SHARED, need_engine, shared
@@ -173,6 +173,12 @@ def pillow() -> Any:
 def bullet() -> None:
     """Only where PyBullet is."""
     need_engine("pybullet")
+
+
+@pytest.fixture
+def both_are_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`--backend all` in this process: MuJoCo and PyBullet, whatever else is registered."""
+    monkeypatch.setattr(chosen, "backend_names", lambda: list(BOTH))
 
 
 @pytest.fixture

@@ -17,11 +17,10 @@ from statemachine.interface import JointType
 from statemachine.lab.compare.typed_sides import parse_sides
 from statemachine.releases import is_here
 
-from .support.backends import RELEASES
+from .support.backends import BOTH, RELEASES
 from .support.legged import FLOATING, STANDING, mjcf, urdf, written
 from .support.requirements import need_engine
 
-BACKENDS = ("mujoco", "pybullet")
 WAYS = (("mujoco", "model"), ("pybullet", "model"), ("pybullet", "engine"))
 ARM = (
     '<mujoco><worldbody><body name="l"><joint name="{joint}" axis="0 1 0"/><geom size="0.1"/>'
@@ -44,7 +43,7 @@ def test_a_urdf_that_does_not_say_it_floats_where_that_is_asked(tmp_path, backen
     assert model.read_options.base == base
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_a_floating_joint_of_a_urdf_is_left_out_where_the_base_is_fixed(tmp_path, backend):
     need_engine(backend)
     free, fixed = (
@@ -100,7 +99,7 @@ def test_pybullet_as_it_comes_floats_as_its_own_loader_does(tmp_path):
     assert mine == pytest.approx(theirs, abs=1e-9)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_the_free_joint_of_an_mjcf_goes_and_its_keyframes_keep_the_rest(tmp_path, backend):
     need_engine(backend)
     model = _model(tmp_path, mjcf(), backend, base="fixed")

@@ -17,7 +17,7 @@ from rich.cells import cell_len
 from statemachine.course.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .support.backends import slow_on
+from .support.backends import BOTH, slow_on
 from .support.claims import assert_has, assert_in, assert_not_in
 from .support.explained import with_changes
 from .support.files import written
@@ -34,7 +34,7 @@ def _json(cli: Cli, *arguments: str) -> Any:
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
-@pytest.mark.parametrize("backend", slow_on("pybullet"), indirect=True)
+@pytest.mark.parametrize("backend", slow_on("pybullet", BOTH), indirect=True)
 def test_every_lesson_runs_and_reads_well_piped(here: Cli, lesson: str, backend: str) -> None:
     need_engines_of(lesson)
     done = here("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()), code=0)
@@ -301,7 +301,7 @@ def test_what_a_page_says_of_a_special_case(
         (None, ["mujoco", "pybullet"], ""),  # the arm's own URDF
     ],
 )
-@pytest.mark.usefixtures("bullet")
+@pytest.mark.usefixtures("bullet", "both_are_all")
 def test_each_refusal_of_a_model_is_one_line(
     here: Cli, tmp_path: Path, body: str | None, loads: list[str], says: str
 ) -> None:

@@ -22,6 +22,7 @@ from statemachine.course.grading.faults.run import examine
 from statemachine.course.grading.page import faults_page
 from statemachine.errors import BadInputError, EngineError
 
+from .support.backends import each_of_both
 from .support.claims import assert_has, refused
 from .support.files import written_all
 from .support.motions import opened
@@ -77,6 +78,7 @@ def test_the_solution_passes_and_catches_every_fault(backend: str) -> None:
         assert test in caught[name], name
 
 
+@each_of_both  # for which the faults are made
 def test_the_model_does_not_give_its_faults_away(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,6 +94,7 @@ def test_the_model_does_not_give_its_faults_away(
     assert facts() == healthy
 
 
+@each_of_both  # for which the faults are made
 def test_a_fault_in_the_model_is_in_its_variants_too(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

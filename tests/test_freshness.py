@@ -22,10 +22,11 @@ from statemachine.errors import (
 from statemachine.freshness.age import Scratch
 from statemachine.freshness.gaps import gaps, significant_gaps
 from statemachine.freshness.rows import table
-from statemachine.interface import DERIVED, POSES, Contacts, Data, Model
+from statemachine.interface import POSES, Contacts, Data, Model
 from statemachine.measures import Gap
 from statemachine.show.as_json import plain
 
+from .support.backends import each_of_both, readable_arrays
 from .support.claims import assert_has, assert_in, overlapping, refused
 from .support.motions import bits, opened, started
 from .support.processes import runs_in_silence
@@ -139,6 +140,7 @@ def test_a_step_is_found_behind_a_later_write(arm: Model) -> None:
     assert_in(notes, "shoulder, upper_arm", "lower_arm, wrist, gripper")
 
 
+@each_of_both
 def test_a_write_is_no_step(box: Model, held: Data) -> None:
     """Written to where a step did not come from: no moment is claimed."""
     # Nor where all is so near that rounding could have it lead here.
@@ -160,6 +162,7 @@ def test_a_body_in_the_air(box: Model) -> None:
     assert turn.where != "box"
 
 
+@each_of_both
 @pytest.mark.filterwarnings("ignore:PyBullet. the integrator RK4")
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])
 @pytest.mark.parametrize("centre", ["0 0 0", ".1 0 0"])
@@ -350,9 +353,10 @@ def test_what_is_stale_is_in_the_json(box: Model, held: Data) -> None:
 
 
 def test_a_note_says_where_a_restore_is_not_exact(box: Model, held: Data) -> None:
-    """Of two that touch PyBullet remembers what no State has."""
+    """Of two that touch such an engine remembers what no State has."""
     notes = sm.freshness(box, held).notes
-    assert any("need be age" in note for note in notes) == (box.backend == "pybullet")
+    is_said = any("need be age" in note for note in notes)
+    assert is_said is not box.capabilities.exact_restore
 
 
 def test_no_note_is_about_contacts_where_nothing_touches(box: Model) -> None:
@@ -365,7 +369,8 @@ def test_the_table_has_a_row_of_each_array_and_fits(box: Model, held: Data) -> N
     lines = str(sm.freshness(box, held)).splitlines()
     assert max(map(len, lines)) <= 80
     assert f"scene_box on {box.backend} {box.engine_version} at 6.15 s" in lines[0]
-    assert all(any(line.startswith(name) for line in lines) for name in (*DERIVED, "contacts"))
+    names = readable_arrays(box)
+    assert all(any(line.startswith(name) for line in lines) for name in names)
 
 
 def test_the_last_line_of_the_table_says_what_to_do(box: Model, held: Data) -> None:

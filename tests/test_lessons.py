@@ -46,6 +46,7 @@ from statemachine.show.blocks import Code, Heading, Page, Printed, Question, Tab
 from statemachine.show.pictures import Traces
 from statemachine.show.progress import progress
 
+from .support.backends import each_of_both
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
 from .support.pages import blocks, lesson_result, need_engines_of, shown, with_figures
@@ -486,6 +487,7 @@ def test_what_catches_the_falling_arm() -> None:
     assert_in(said, "the contact", "23.92°", "53.89°")
 
 
+@each_of_both
 @pytest.mark.parametrize("further", [False, True])
 def test_forward_computes_what_it_shows(further: bool, backend: str) -> None:
     page, taken = _take("forward", backend, further=further, seconds=0.5)
@@ -501,6 +503,7 @@ def test_forward_computes_what_it_shows(further: bool, backend: str) -> None:
     assert page.holds
 
 
+@each_of_both
 def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
     """Against the course's figure: of the state before, 9.95 mm behind at worst."""
     page, taken = _take("forward", backend, seconds=2.0)

@@ -24,7 +24,7 @@ from statemachine.lab.robots import find
 from statemachine.models import models_dir, resolve
 from statemachine.show.as_json import dumps
 
-from .support.backends import registered
+from .support.backends import each_of_both, registered
 from .support.claims import assert_has, refused
 from .support.files import written, written_all
 from .support.motions import opened
@@ -239,6 +239,7 @@ def test_a_state_reads_as_what_it_holds(backend: str) -> None:
     )
 
 
+@each_of_both  # which start from a compiled model
 def test_a_model_tells_what_it_was_compiled_to(box: sm.Model) -> None:
     assert box.compiled.nq == box.nq
     assert np.array_equal(box.compiled.key_qpos[0], box.keyframes[0].qpos)

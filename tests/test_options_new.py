@@ -19,6 +19,7 @@ import statemachine as sm
 from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 
+from .support.backends import each_of_both
 from .support.claims import refused
 from .support.motions import opened, path
 from .support.small_models import CART, model_of, on_both
@@ -151,6 +152,7 @@ LATE = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body>
 <keyframe><key name="home" qpos="0.5" ctrl="0.5"/></keyframe></mujoco>"""
 
 
+@each_of_both  # bit by bit
 def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, backend: str) -> None:
     """Reset to a keyframe, MuJoCo finds 0 in the buffer; the option finds the keyframe's ctrl."""
     raw = mujoco.MjModel.from_xml_string(LATE)

@@ -14,12 +14,12 @@ from statemachine.lab.compare.agreement import Comparison, compare
 from statemachine.lab.compare.outcomes import DISTANCE, FELL, TRACKING, outcomes_of_run
 from statemachine.lab.recordings import Rerun, Trace
 
+from .support.backends import BOTH
 from .support.legged import mjcf, written
 from .support.requirements import need_engine
 
 SECONDS, STEP = 1.0, 0.002
 PUSH = (0.4, 0.0, 1.5, 9.0, 0.0, 0.0)  # m/s and rad/s: it jumps forward, and turns over
-BACKENDS = ("mujoco", "pybullet")
 
 
 def _swing(_model: Model, data: Data) -> Array:
@@ -71,7 +71,7 @@ def test_the_outcomes_of_a_run_are_those_of_plain_mujoco(tmp_path):
     assert outcomes[TRACKING] == pytest.approx(np.sqrt((apart**2).mean()), rel=1e-9)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_a_robot_that_stands_has_not_fallen(tmp_path, backend):
     need_engine(backend)
     assert outcomes_of_run(_run(_model(tmp_path, backend), qvel=(0,) * 6), SECONDS)[FELL] is None

@@ -18,11 +18,11 @@ from statemachine.lab.recordings.request import PlayRequest, answer_play
 from statemachine.lab.validate.fingertip import certify
 from statemachine.releases import is_here
 
+from .support.backends import BOTH
 from .support.requirements import SHARED, shared
 
 mujoco = pytest.importorskip("mujoco")
 
-BACKENDS = ("mujoco", "pybullet")
 ROUND = '<inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/>'
 UNBALANCED = '<inertia ixx="1e-3" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -85,7 +85,7 @@ def needs(backend):
 
 
 @pytest.mark.parametrize("defaults", ["model", "engine"])
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 @pytest.mark.parametrize("frame", ["tool", "hand", "stand"])
 def test_the_frame_of_a_fused_link_is_a_site(tmp_path, backend, defaults, frame):
     needs(backend)
@@ -102,7 +102,7 @@ def test_the_frame_of_a_fused_link_is_a_site(tmp_path, backend, defaults, frame)
     assert mat == pytest.approx(turned, abs=tolerance)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_a_link_that_moves_stays_a_body_and_no_site(tmp_path, backend):
     needs(backend)
     model = sm.load(arm(tmp_path), backend=backend)
@@ -150,7 +150,7 @@ def test_an_mjcf_that_fuses_keeps_its_frames_and_its_sites(tmp_path):
     assert model.site_pos[model.site_id("own2")].tolist() == [0.3, 0.2, 0]
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_the_tool_of_a_urdf_can_be_certified(tmp_path, backend):
     needs(backend)
     pytest.importorskip("pinocchio")
@@ -170,7 +170,7 @@ def with_mesh(folder, name, **more):
     return arm(folder, mesh=name, **more)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 @pytest.mark.parametrize(
     "name", ["meshes/part.obj", "package://arm_description/meshes/part.obj", "part.obj"]
 )
@@ -204,7 +204,7 @@ def test_a_stripped_name_that_the_file_asks_for_is_read_by_the_engine_itself(tmp
 # Options that act while a file is read.
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_balance_inertia_reads_what_the_engine_refuses(tmp_path, backend):
     needs(backend)
     path = arm(tmp_path, lower=UNBALANCED)
@@ -224,7 +224,7 @@ def test_balance_inertia_says_nothing_of_a_file_that_needs_it_not(tmp_path):
 
 
 @pytest.mark.parametrize("defaults", ["model", "engine"])
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_meshes_off_reads_a_file_whose_meshes_are_missing(tmp_path, backend, defaults):
     needs(backend)
     path = arm(tmp_path, mesh="absent.stl")
@@ -380,7 +380,7 @@ def test_a_model_of_another_engine_is_read_again_as_it_was(tmp_path):
     assert on_default(model).ngeom == 0
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", BOTH)
 def test_balance_inertia_reads_a_rod_without_inertia_about_its_axis(tmp_path, backend):
     needs(backend)
     rod = '<inertia ixx="1.2e-4" iyy="1.2e-4" izz="0" ixy="0" ixz="0" iyz="0"/>'

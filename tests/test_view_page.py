@@ -194,8 +194,9 @@ def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
     """End to end: the process, the page, time that passes by itself, and Ctrl-C while watched."""
+    both = ("--backend", "mujoco", "--backend", "pybullet")
     with (
-        Viewer(tmp_path, "--backend", "all", "--port", str(free_pair())) as viewer,
+        Viewer(tmp_path, *both, "--port", str(free_pair())) as viewer,
         browser() as tab,
     ):
         address = viewer.line().strip()

@@ -11,13 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from statemachine.atomic_files import replace_bytes
-from statemachine.backends import backend_names, load
+from statemachine.backends import load
 from statemachine.course.lessons import LESSONS, Lesson
 from statemachine.course.lessons.pictures import with_picture
 from statemachine.course.lessons.session import page_of_lesson, take
 from statemachine.course.notebook import markdown
 from statemachine.errors import MissingEngineError
-from statemachine.installed import available
+from statemachine.installed import PAIR, available
 from statemachine.lab.compare import Request
 from statemachine.lab.probes.conventions import page as conventions
 from statemachine.lab.probes.conventions import probe, run_phrases
@@ -40,14 +40,14 @@ def make_path(
 
     Args:
         folder: Where the pages go.
-        backends: Which to run on; by default all that are installed.
+        backends: Which to run on; by default MuJoCo and PyBullet, as far as they are installed.
         say: Told what is being run.
 
     Raises:
         MissingEngineError: A backend that was asked for, or matplotlib, is not installed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    names = backends or [name for name in available()[0] if name in backend_names()]
+    names = backends or [name for name in PAIR if name in available()[0]]
     written = []
     for number, lesson in enumerate(LESSONS.values(), start=1):
         say(f"running the lesson {lesson.name} ...")

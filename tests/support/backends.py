@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from statemachine import backends, releases
 from statemachine.backends.served.engine_process import ServedEngine, Server
 from statemachine.backends.served.release_backend import served
 from statemachine.installed import engine_version, require
-from statemachine.interface import Behaviour
+from statemachine.interface import DERIVED, PARTS, Behaviour
 
 
 @contextmanager
@@ -29,12 +29,34 @@ def registered(name: str, loader: str) -> Iterator[str]:
         backends.BACKENDS.pop(name)
 
 
-def slow_on(name: str) -> list[Any]:
-    """Return parameters of the fixture `backend` of which one is for the slow part."""
+# What a claim names where it is of these two engines, and not of every backend.
+BOTH = ("mujoco", "pybullet")
+# A test of what these two do, with the fixtures of `conftest` that hang on `backend`.
+each_of_both = pytest.mark.parametrize("backend", BOTH, indirect=True)
+
+
+def slow_on(name: str, among: Sequence[str] = ()) -> list[Any]:
+    """Return parameters of the fixture `backend` of which one is for the slow part.
+
+    Args:
+        name: The backend that is slow.
+        among: Those of which the claim is; every backend where it is the contract's.
+    """
     return [
         pytest.param(each, marks=pytest.mark.slow) if each == name else each
-        for each in backends.backend_names()
+        for each in among or backends.backend_names()
     ]
+
+
+def readable_arrays(model: sm.Model) -> list[str]:
+    """Return what can be read of a Data: what is derived, but for forces that no engine tells."""
+    behaviours = model.capabilities.behaviours
+    unavailable: list[str] = []
+    if behaviours["forces by part"].support == "unsupported":
+        unavailable += PARTS
+    if behaviours["contacts"].support == "unsupported":
+        unavailable.append("contacts")
+    return [name for name in (*DERIVED, "contacts") if name not in unavailable]
 
 
 def bullet_clients() -> set[int]:

@@ -10,6 +10,7 @@ import numpy as np
 
 import statemachine as sm
 
+from .backends import BOTH
 from .files import written
 
 IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
@@ -40,7 +41,7 @@ def loaded(
 
 def on_both(source: str | Path, **options: Any) -> list[sm.Model]:
     """Load a model on MuJoCo, and on PyBullet."""
-    return [sm.load(source, backend=backend, **options) for backend in ("mujoco", "pybullet")]
+    return [sm.load(source, backend=backend, **options) for backend in BOTH]
 
 
 def both(

@@ -63,7 +63,7 @@ class Case:
 def of_model(model: str) -> Iterator[Case]:
     """Yield every question about a model, on both engines."""
     path = str(MODELS[model])
-    both = ("--backend", "all")
+    both = ("--backend", "mujoco", "--backend", "pybullet")
     short = _SHORT.get(model, ())
     for name in _LESSONS_OF.get(model, _LESSONS):
         case = f"lesson {name}"
@@ -90,8 +90,7 @@ def of_model(model: str) -> Iterator[Case]:
     yield Case("one step of hold", "onestep", (*compare, "--one-step"))
     if model not in _NOT_CONVERGED:
         yield Case("convergence of hold", "converge", (*compare, "--converge"))
-    pair = ("--backend", "mujoco", "--backend", "pybullet")
-    models = ("compare", "--models", path, *pair, "--json")
+    models = ("compare", "--models", path, *both, "--json")
     yield Case("what the engines make of it", "models", models)
     yield Case("fingertip", "fingertip", ("fingertip", path, *both, "--poses", "20", "--json"))
     shipped = ROOT / "models" / (f"{path}.xml" if "/" in path else f"{path}/{path}.xml")
