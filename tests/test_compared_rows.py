@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -122,8 +123,7 @@ def test_a_value_that_is_no_number_never_agrees(still: Trace) -> None:
 )
 def test_a_gap_in_tolerances(still: Trace, most: float, tolerance: float, share: float) -> None:
     found = agreement_of(still, still, "turn")
-    facts = vars(found) | {"max": most, "tolerance": tolerance}
-    assert Agreement(**facts).tolerances() == share
+    assert replace(found, max=most, tolerance=tolerance).tolerances() == share
 
 
 # What is compared, and how far it is
@@ -177,7 +177,7 @@ def test_a_site_is_compared_by_place_and_rotation(still: Trace) -> None:
 
 def test_a_column_without_a_number_is_not_compared(still: Trace) -> None:
     for name, kind in (("energy", "energy"), ("site_xpos", "tip"), ("site_xmat", "tip")):
-        empty = changed(still, **{name: np.full_like(still[name], np.nan)})
+        empty = changed(still, None, **{name: np.full_like(still[name], np.nan)})
         for pair in ((still, empty), (empty, still)):
             kinds = {curve.kind for curve in series(*pair)}
             assert kind not in kinds
@@ -356,12 +356,12 @@ def test_a_base_has_fallen_that_is_turned_over(still: Trace, angle: float, falls
 
 
 def test_two_falls_are_as_far_apart_as_their_times(still: Trace) -> None:
-    sides = [moved(still, 2, -0.8, rows=slice(row, None)) for row in (4, 9)]
-    found = outcome_of(*sides, "fell")
+    left, right = (moved(still, 2, -0.8, rows=slice(row, None)) for row in (4, 9))
+    found = outcome_of(left, right, "fell")
     assert (found.left, found.right) == pytest.approx((0.04, 0.09))
     assert found.difference == pytest.approx(0.05)
     assert found.first == pytest.approx(0.04)
-    of_sides = named(compare(*sides))["fell"]
+    of_sides = named(compare(left, right))["fell"]
     assert of_sides.at == pytest.approx(0.04)
 
 
