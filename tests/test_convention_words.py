@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine.engines.measured import Measurement
+from statemachine.engines.measured import Measurement, ReadTwice
 from statemachine.engines.samples import CENTRE, FIXED, MARKS, RATE, limp
 from statemachine.lab.probes.conventions import answers, frames, motion
 from statemachine.lab.probes.conventions.answers import (
@@ -188,7 +188,7 @@ def test_a_reading_is_fresh_that_is_right_before_it_is_recomputed(
     true = (1.0, 2.0, 3.0)
     first, second = ((1.0 + 0.6 * size, 2.0, 3.0 - 0.8 * size) for size in (read, recomputed))
     for question in (answers.write, answers.step):
-        (found,) = question.answer([("the tip", first, second, true)])
+        (found,) = question.answer([ReadTwice("the tip", first, second, true)])
         assert (found.answer, found.of) == (word, "the tip")
         assert figures(found) == {
             "off by": pytest.approx(read),
