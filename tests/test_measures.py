@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
+from statemachine.interface import Array
 from statemachine.measures import (
     ContactNames,
     Deviation,
@@ -474,6 +475,11 @@ def test_the_angle_between_quaternions_is_that_of_the_rotation() -> None:
 # Moments.
 
 
+def moments(count: int, step: float, start: float = 0.0) -> Array:
+    """Return so many moments, a step apart [s]."""
+    return np.array([start + k * step for k in range(count)])
+
+
 def test_the_nearest_moment_is_before_or_after() -> None:
     time = np.array([0.0, 1.0, 2.0, 4.0])
     wanted = np.array([-1.0, 0.4, 0.6, 1.0, 2.9, 3.1, 9.0])
@@ -481,9 +487,9 @@ def test_the_nearest_moment_is_before_or_after() -> None:
 
 
 def test_two_runs_share_the_moments_since_their_starts() -> None:
-    left, right = 5 + np.arange(13) * 0.005, 1 + np.arange(31) * 0.002
+    left, right = moments(13, 0.005, 5.0), moments(31, 0.002, 1.0)
     common = common_moments(left, right, (0.005, 0.002))
-    assert common.time == pytest.approx(np.arange(7) * 0.01)
+    assert common.time == pytest.approx(moments(7, 0.01))
     assert common.left.tolist() == [0, 2, 4, 6, 8, 10, 12]
     assert common.right.tolist() == [0, 5, 10, 15, 20, 25, 30]
 
@@ -492,7 +498,7 @@ def test_two_runs_share_the_moments_since_their_starts() -> None:
 def test_moments_are_the_same_within_a_millionth_of_the_shorter_step(
     off: float, shared: int
 ) -> None:
-    left = np.arange(5) * 0.5
+    left = moments(5, 0.5)
     right = left.copy()
     right[1:] += off * 0.5
     if shared:
@@ -503,14 +509,14 @@ def test_moments_are_the_same_within_a_millionth_of_the_shorter_step(
 
 
 def test_five_moments_in_common_are_enough() -> None:
-    left, right = np.arange(41) * 1.0, np.arange(5) * 10.0
+    left, right = moments(41, 1.0), moments(5, 10.0)
     assert len(common_moments(left, right, (1.0, 10.0)).time) == 5
     with pytest.raises(TraceError):
-        common_moments(left + 0.0, np.arange(5) * 10.5, (1.0, 10.5))
+        common_moments(left, moments(5, 10.5), (1.0, 10.5))
 
 
 def test_short_runs_share_as_many_moments_as_they_have() -> None:
-    assert len(common_moments(np.arange(2.0), np.arange(9.0), (1.0, 1.0)).time) == 2
+    assert len(common_moments(moments(2, 1.0), moments(9, 1.0), (1.0, 1.0)).time) == 2
 
 
 def test_values_at_other_moments_are_on_the_line_between() -> None:
