@@ -516,8 +516,9 @@ def test_a_reading_that_is_no_number_is_said(model: sm.Model) -> None:
 
 
 def test_a_rounded_reading_is_said(model: sm.Model) -> None:
-    verdict = judged_forward(model, with_reading(3, np.round(MOVED, 3)))
-    away = f"{1000 * float(np.linalg.norm(np.round(MOVED, 3) - MOVED)):.3g} mm away"
+    reading = np.array([round(value, 3) for value in MOVED.tolist()])
+    verdict = judged_forward(model, with_reading(3, reading))
+    away = f"{1000 * float(np.linalg.norm(reading - MOVED)):.3g} mm away"
     assert verdict == of_reading(3, OfForward.ROUNDED.filled(away=away))
 
 
