@@ -17,6 +17,7 @@ from .shapes import Drawing
 
 FOVY = 30.0  # [°] a long lens: near and far parts of an arm are drawn alike in size
 _MARGIN = 0.90  # of half the picture that what is framed may take
+_NEAREST = 1e-3  # [m] of a camera to what it frames
 _MOMENTS = 60  # of a motion that a camera is chosen by, at most
 # From the front, to the right or to the left of the arm, which reaches along x; and below them.
 _AZIMUTHS, _ELEVATION = (140.0, 220.0, 110.0, 250.0), -20.0
@@ -85,9 +86,10 @@ def framed(points: ArrayLike, aspect: float, azimuth: float, elevation: float) -
         offset = cloud - target
         x, y, depth = offset @ right, offset @ up, offset @ forward
         needed = np.maximum(np.abs(x) / (tangent * aspect), np.abs(y) / tangent)
-        distance = max(float((needed - depth).max()), 1e-3)
+        distance = max(float((needed - depth).max()), _NEAREST)
+        ahead = np.maximum(distance + depth, _NEAREST)  # a point may be where the camera stands
         if k < 8:  # the middle of a box is not the middle of its picture: centre that
-            for axis, along in ((right, x / (distance + depth)), (up, y / (distance + depth))):
+            for axis, along in ((right, x / ahead), (up, y / ahead)):
                 target = target + distance * ((along.min() + along.max()) / 2 * axis)
     x, y, z = target.tolist()
     return Camera((x, y, z), distance, azimuth, elevation)
