@@ -219,6 +219,10 @@ class RawEngine(CompiledModels):
     def drawing_diagnosis(self) -> tuple[bool, str, str]:
         """Tell whether it draws here, what was found, and the next step if there is one."""
 
+    def import_environment(self) -> dict[str, str]:
+        """Return environment variables with which the engine is imported sooner."""
+        return {}
+
     # What a student can do with it past the interface, and where a fault is seeded.
 
     def watched_data(self) -> type[Data] | None:

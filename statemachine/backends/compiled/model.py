@@ -243,6 +243,8 @@ def _first(
         says: What is to be said.
         called: What the number is called, if not by the array's name.
     """
+    if not where.any():  # of nearly all arrays, and this is asked for each
+        return
     for index, *_ in np.argwhere(where)[:1].tolist():
         kind = name.partition("_")[0]
         if kind == "dof":

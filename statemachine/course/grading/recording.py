@@ -15,7 +15,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ...engines import raw_engine_of
 from ...errors import BadInputError
+from ...installed import DEFAULT
 from ...processes import ALONE, sandbox
 from ...processes.places import python_path
 from .inside.answers import Answer, decode
@@ -151,6 +153,7 @@ def environment(backend: str) -> dict[str, str]:
     if sandbox.shut_in():
         variables["PATH"] = os.defpath
         variables["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
+        variables |= raw_engine_of(DEFAULT).import_environment()  # no backend is without it
     return {**variables, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
 

@@ -55,6 +55,7 @@ class MujocoEngine(RawEngine):
     known_changes = function_of(".mujoco.known_changes:known_changes")
     drawer = function_of(".mujoco.rendering:MujocoDrawer")
     drawing_environment = function_of(".mujoco.rendering:environment")
+    import_environment = function_of(".mujoco.rendering:import_environment")
     drawing_diagnosis = function_of(".mujoco.rendering:diagnosis")
 
     def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:

@@ -134,6 +134,19 @@ def environment(opengl: str, known: dict[str, str]) -> dict[str, str]:
     return {**others, "MUJOCO_GL": opengl} if opengl else others
 
 
+@functools.cache
+def import_environment() -> dict[str, str]:
+    """Return the variables that name the GLFW of the package of that name, if it has one.
+
+    Without, `import mujoco` begins a Python of its own to choose a library of GLFW.
+    """
+    package = importlib.util.find_spec("glfw")
+    if package is None or package.origin is None:
+        return {}
+    library = Path(package.origin).parent / "x11" / "libglfw.so"
+    return {"PYGLFW_LIBRARY": str(library)} if library.is_file() else {}
+
+
 def opengl_remedy() -> str:
     """Return what to do where there is no OpenGL."""
     if platform.system() == "Linux":

@@ -13,7 +13,7 @@ import numpy as np
 from ....engines import raw_engine_of
 from ....errors import UnsupportedError
 from ....interface import Model
-from ....lab.runs.controllers import error_text, last_user_line, load_module, signature_mismatch
+from ....lab.runs.user_files import error_text, last_user_line, load_module, signature_mismatch
 from ....measures.text import count
 from .answers import answer_of, encode
 from .error_hints import hint_of

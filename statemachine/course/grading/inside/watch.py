@@ -9,10 +9,9 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
-from unittest import mock
 
 import numpy as np
 
@@ -204,8 +203,15 @@ def engine_watched(backend: str) -> Iterator[None]:
         yield
 
 
-def _replaced(owner: Any, name: str, wrapper: Callable[[Any], Any]) -> AbstractContextManager[Any]:
-    return mock.patch.object(owner, name, wrapper(vars(owner)[name]))
+@contextmanager
+def _replaced(owner: Any, name: str, wrapper: Callable[[Any], Any]) -> Iterator[None]:
+    """Let a function of a module or class be what `wrapper` makes of it."""
+    original = vars(owner)[name]
+    setattr(owner, name, wrapper(original))
+    try:
+        yield
+    finally:
+        setattr(owner, name, original)
 
 
 def _seen_data(reporting_backend: str | None, original: Callable[..., None]) -> Callable[..., None]:
