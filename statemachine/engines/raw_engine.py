@@ -61,6 +61,23 @@ class RawEngine(CompiledModels):
         """Say what only one of two releases of the engine reads in the file of both Models."""
         return []
 
+    def reader(self, model: Model) -> str:
+        """Return what reads the file of a Model, with its version: "mujoco 4.0.0".
+
+        By default it is the engine itself.
+        """
+        return f"{self.name} {model.engine_version}"
+
+    def figures_as_read(self, model: Model) -> Any:
+        """Return the figures that the reader of a Model's file made of it: masses, gains, options …
+
+        By default they are those of the Model.
+
+        Returns:
+            A compiled model of the installed MuJoCo; None where the reader does not tell them.
+        """
+        return model.compiled
+
     def known_changes(
         self, left: Model, right: Model, runs: tuple[RunArrays, RunArrays]
     ) -> list[KnownChange]:

@@ -36,6 +36,8 @@ class PybulletEngine(RawEngine):
     stepper = function_of(".pybullet.driven:stepper")
     call_watch = function_of(".pybullet.calls:PybulletWatch")
     read = function_of(".pybullet.reading:read")
+    reader = function_of(".pybullet.figures:reader")
+    figures_as_read = function_of(".pybullet.figures:figures_as_read")
     drawer = function_of(".pybullet.rendering:PybulletDrawer")
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:

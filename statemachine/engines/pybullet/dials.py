@@ -120,35 +120,11 @@ class PybulletDials(Dials):
         model = cast("PybulletModel", own.replace(**changing)) if changing else own
         raw = model.compiled
         if "inertia" not in dials:
-            raw = self._weighed_by_the_engine(raw)
+            raw = weighed_by_the_engine(cast("PybulletModel", self.model), raw)
         if "equality" not in dials and self._whole and raw.neq:
             raw = copy.copy(raw)
             raw.eq_active0[:] = False
         return with_settings(model, acts, Plan(raw) if raw is not model.compiled else None)
-
-    def _weighed_by_the_engine(self, compiled: Any) -> Any:
-        """Make a compiled model whose bodies weigh what the engine gives them of its own."""
-        own = cast("PybulletModel", self.model)
-        if own.plan.file:
-            return with_weights(compiled, weights(own.plan))
-        if own.plan.weighed:
-            return with_weights_of(compiled, own.compiled)
-        raw = copy.copy(compiled)
-        raw.body_inertia[:] = self.shapes
-        return raw
-
-    @property
-    def shapes(self) -> np.ndarray:
-        """Return the inertias (nbody, 3) that the engine takes from the shapes, in the file's
-        axes.
-        """
-        raw = self.model.compiled
-        inertias = np.array(raw.body_inertia)
-        with self.model._make_data() as data:
-            world = data.raw
-            for body, link, b in world.links():
-                inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
-        return inertias
 
     @property
     def frictions(self) -> Array:
@@ -158,6 +134,32 @@ class PybulletDials(Dials):
                 pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()
             ]
         return np.array(frictions)
+
+
+def weighed_by_the_engine(model: PybulletModel, compiled: Any) -> Any:
+    """Make a compiled model whose bodies weigh what the engine gives them of its own.
+
+    Args:
+        model: A Model as the engine comes.
+        compiled: A compiled model of the same file.
+    """
+    if model.plan.file:
+        return with_weights(compiled, weights(model.plan))
+    if model.plan.weighed:
+        return with_weights_of(compiled, model.compiled)
+    raw = copy.copy(compiled)
+    raw.body_inertia[:] = inertias_of_shapes(model)
+    return raw
+
+
+def inertias_of_shapes(model: Model) -> Array:
+    """Return the inertias (nbody, 3) that the engine takes from the shapes, in the file's axes."""
+    inertias = np.array(model.compiled.body_inertia)
+    with model._make_data() as data:
+        world = data.raw
+        for body, link, b in world.links():
+            inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
+    return inertias
 
 
 def with_settings(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:

@@ -21,6 +21,7 @@ from ..why.causes_page import causes as causes_blocks
 from ..why.changes_page import steps as steps_blocks
 from ..why.cited_case_page import cited_case_blocks
 from ..why.page import three_parts
+from ..why.split_page import split_blocks
 from .compare_details import details_of
 from .compare_verdict import headline_of
 from .compared_names import traces_of
@@ -123,6 +124,7 @@ def report_page(result: CompareResult, parts: ReportParts) -> Page:
         why = [
             *causes_blocks(explanation),
             *three_parts(explanation),
+            *split_blocks(explanation, details=True),
             *cited_case_blocks(explanation, details=True),
         ]
         steps = steps_blocks(explanation)

@@ -12,6 +12,8 @@
   `assembly`: the answer from what is known so far
 - `game`: the gap with each set of causes equalized; `shapley`: shares of a gap among causes, by the
   arithmetic in `shares`; `locate`: where the rest comes from
+- `split`: the gap divided into import, joint dynamics and contact; `imported`: what the import of a
+  file made, as the installed MuJoCo runs it
 - `verdict`: what is answered, and whether that answers the question
 """
 

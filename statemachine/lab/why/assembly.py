@@ -21,7 +21,7 @@ from .causes import Cause, readable_of
 from .explained_gap import ExplainedGap
 from .explanation import Explanation, FailedSet, Share
 from .locate import Localisation
-from .request import WhyRequest, settings_of
+from .request import WhyRequest, is_one_engine
 from .run_differences import orders_of
 from .search import Search
 from .shapley import Division
@@ -80,7 +80,7 @@ def explanation_of(search: Search) -> Explanation:
         tolerance=gap.tolerance,
         floor=gap.floor,
         draws=trials.draws,
-        one_engine=_is_one_engine(left, right),
+        one_engine=is_one_engine(left, right),
         redundant=_redundant(shares) if explained > UNEXPLAINED else (),
         impossible=impossible,
         unmatched=matched.only,
@@ -99,6 +99,7 @@ def explanation_of(search: Search) -> Explanation:
         right_file=right.path.name,
         renamed=matched.renamed,
         call_periods=request.periods,
+        split=search.split,
         changes=trials.known_changes if gap.size > gap.negligible else (),
     )
 
@@ -275,9 +276,3 @@ def _still(causes: Sequence[Cause], model: Model, trace: Trace) -> tuple[str, ..
         if name in names and is_scalar and np.ptp(trace.qpos[:, place]) < _STILL:
             still.append(name)
     return tuple(still)
-
-
-def _is_one_engine(left: Model, right: Model) -> bool:
-    """Tell whether two sides are computed by one engine and release, with settings of one kind."""
-    sides = [(model.backend, model.engine_version, settings_of(model)) for model in (left, right)]
-    return sides[0] == sides[1]

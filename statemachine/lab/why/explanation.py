@@ -24,6 +24,7 @@ from .locate import Localisation
 from .rewriting import RewrittenFile
 from .shapley import Method
 from .shares import Range
+from .split import GapSplit
 from .trials import RunFailure
 from .verdict import CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
 
@@ -191,6 +192,8 @@ class Explanation:
             nobody looked.
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
+        split: The gap divided into import, joint dynamics and contact; None where there is no gap
+            to divide, and where the search was ended before.
         cited_case: The case of the battery that decides the cause, and which side is nearer to the
             truth in it; None where the cause has none, or where the run that was asked does not
             say the same.
@@ -243,6 +246,7 @@ class Explanation:
     call_periods: CallPeriods | None = None
     command: TypedCommand | None = field(default=None, metadata={"json": False})
     rewritten: RewrittenFile | None = None
+    split: GapSplit | None = None
     cited_case: CitedCase | None = None
     contradicted_case: CitedCase | None = None
 

@@ -27,6 +27,7 @@ from .changes_page import engine_as_it_comes, steps
 from .cited_case_page import cited_case_blocks
 from .explanation import Explanation
 from .rewritten_page import rewritten_blocks
+from .split_page import split_blocks
 from .table_page import summary_table
 from .verdict import UNEXPLAINED
 
@@ -76,6 +77,11 @@ class WhyPage(PageContent):
     def causes(self) -> Table:
         """Return a table of the causes, the largest share first."""
         return summary_table(self.result, self.most_rows)
+
+    @property
+    def split(self) -> Sequence[Block]:
+        """Return what of the gap is import, joint dynamics and contact."""
+        return split_blocks(self.result, details=bool(self.further))
 
     @property
     def cited_case(self) -> Sequence[Block]:

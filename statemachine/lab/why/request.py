@@ -93,6 +93,12 @@ class WhyRequest:
         return self.left.compiled is not None and self.right.compiled is not None
 
 
+def is_one_engine(left: Model, right: Model) -> bool:
+    """Tell whether two sides are computed by one engine and release, with settings of one kind."""
+    sides = [(model.backend, model.engine_version, settings_of(model)) for model in (left, right)]
+    return sides[0] == sides[1]
+
+
 def settings_of(model: Model) -> str:
     """Return whose settings a Model has: "model", or "engine" for an engine as it comes."""
     return getattr(model, "defaults", "model")

@@ -22,6 +22,7 @@ from .gap import size_of
 from .locate import Localisation, Remainder, locate
 from .request import WhyRequest
 from .shapley import SETS, Attribution
+from .split import GapSplit, split_of
 from .trials import Trials
 
 _SETS_MOST = 4096  # of all sets, where a time limit says how many can be run
@@ -41,6 +42,7 @@ class Search:
         gap: The gap that is explained; None before it is known.
         attribution: The parts of the causes; None before there are any.
         located: Where the rest was found, so far.
+        split: The gap divided by where it arises; None before that.
         ended_by: What ended it before it was complete; "" if nothing did.
     """
 
@@ -70,6 +72,7 @@ class Search:
         self.gap: ExplainedGap | None = None
         self.attribution: Attribution | None = None
         self.located: list[Localisation] = []
+        self.split: GapSplit | None = None
         self.ended_by: EndedBy = ""
         self._quantity, self._reporter = quantity, reporter
         self._runs_of_a_set = self._seconds_of_a_set = 0.0  # as measured
@@ -89,6 +92,7 @@ class Search:
             self._find_gap()
             self._rank()
             self._locate()
+            self._split()
             self._divide(ranked)
         except TimeIsUp:
             self.ended_by = "time limit"
@@ -179,6 +183,13 @@ class Search:
         with self._reporter.stage("why: where the rest comes from"):
             for part in locate(remainder):
                 self.located.append(part)
+
+    def _split(self) -> None:
+        """Divide the gap by where it arises: import, joint dynamics, contact."""
+        assert self.gap is not None
+        if self.gap.is_divided:
+            with self._reporter.stage("why: import, joint dynamics, contact"):
+                self.split = split_of(self.trials, self.request, self.gap, self.causes)
 
     def _divide(self, ranked: Callable[[], None]) -> None:
         """Divide the gap among the causes.

@@ -62,10 +62,11 @@ class Feature:
     value: float
 
 
+CONTACT = Feature("contact", "nothing touches", "contacts", False)
 # What acts now and then comes first. Gravity and the servos are not among them: they drive the
 # motion, and with it goes whatever there is between two sides.
 FEATURES = (
-    Feature("contact", "nothing touches", "contacts", False),
+    CONTACT,
     Feature("limits", "no joint limits", "limits", False),
     Feature("frictionloss", "no dry friction", "frictionloss", 0.0),
     Feature("damping", "no damping", "damping", 0.0),

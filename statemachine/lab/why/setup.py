@@ -15,6 +15,7 @@ from ..compare.matching import Matched
 from ..recordings import Rerun, SideStart, Trace, controller_of_trace, start_of, with_first_ctrl
 from ..runs.scenarios import Controller
 from .causes import EXTRA_ACTUATOR, Cause, built, causes, differences_of
+from .imported import with_imported_figures
 from .option_differences import differences_by_option, options_that_equalize
 from .order import in_order_of_left, seen_in_order_of_left, slots_of_ctrl, sorted_by_number
 from .request import WhyRequest
@@ -42,12 +43,15 @@ class RunKey:
         equalized: Names of the causes that are equalized, as far as they change this side.
         without: Names of the features that are left out.
         integrator: Another one than the file's; "" for that.
+        imported: Whether the installed MuJoCo runs the figures that the import of the side made;
+            nothing is equalized then.
     """
 
     side: int
     equalized: frozenset[str] = NONE
     without: frozenset[str] = NONE
     integrator: str = ""
+    imported: bool = False
 
 
 class Setup:
@@ -237,8 +241,11 @@ class Setup:
         """Return the Model of a run.
 
         Raises:
-            UnsupportedError, ModelError, EngineError: It cannot be made.
+            StateMachineError: It cannot be made.
         """
+        if run.imported:
+            figures = with_imported_figures(self.models[run.side], self.models[1 - run.side])
+            return leave_out(figures, run.without)
         own_settings = self._own_settings[run.side]
         edits: list[Edit] = []
         spec_edits: list[SpecEdit] = []

@@ -146,6 +146,17 @@ class Trials:
         left, right = (self._curves(run) for run in runs)
         return self.ruler.gaps(left, right) if left and right else {}
 
+    def gap_between(self, one: RunKey, other: RunKey, quantity: str) -> Deviation | None:
+        """Return the gap between any two runs; None if one of them did not reach the end.
+
+        Args:
+            one: A run.
+            other: Another, of the same side or of the other one.
+            quantity: What the gap is measured in.
+        """
+        first, second = self._curves(one), self._curves(other)
+        return self.ruler.gap(quantity, first, second) if first and second else None
+
     def is_run(self, equalized: frozenset[str]) -> bool:
         """Tell whether both runs with some causes equalized were made already."""
         return all(run in self._trials for run in self.setup.runs_of(equalized))
