@@ -120,7 +120,7 @@ class EnergyPage(PageContent):
         return self._typed_row().integrator
 
     def _typed_row(self) -> EnergyChange:
-        """Return the row of the code's run: of the tumbling body, with Euler or the engine's own."""
+        """Return the row of the code's run, with Euler or the engine's own integrator."""
         rows = {row.integrator: row for row in self.result.of_body(_TUMBLING)}
         return rows[OWN] if OWN in rows else rows["Euler"]
 
