@@ -243,14 +243,15 @@ def cli(tmp_path: Path) -> Cli:
 
 @pytest.fixture
 def without(tmp_path: Path) -> Callable[..., dict[str, str]]:
-    """Makes an environment in which modules are not there, or others, whatever this machine has."""
+    """Makes an environment in which engines or modules are not there, or other modules are."""
 
     def without(*names: str, **texts: str) -> dict[str, str]:
+        modules = tuple(ENGINES[name].module if name in ENGINES else name for name in names)
         hide = (
             "import sys\n"
             "class Hide:\n"
             "    def find_spec(self, name, path=None, target=None):\n"
-            f"        if name in {names!r}:\n"
+            f"        if name in {modules!r}:\n"
             "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
             "sys.meta_path.insert(0, Hide())\n"
         )

@@ -54,6 +54,7 @@ FACTS = {
         "mujoco": {"": "wxyz"},
         "pybullet": {"": "xyzw"},
         "pinocchio": {"": "xyzw"},
+        "motrix": {"": "xyzw"},
     },
     "velocity": {
         "mujoco": {
@@ -74,26 +75,36 @@ FACTS = {
             "linear": "body axes, body origin",
             "angular": "body axes",
         },
+        "motrix": {
+            "position": "body origin",
+            "order": "linear first",
+            "linear": "world axes, body origin",
+            "angular": "body axes",
+        },
     },
     "gravity": {
         "mujoco": {"": "0 0 -9.81"},
         "pybullet": {"": "0 0 0"},
         "pinocchio": {"": "0 0 -9.81"},
+        "motrix": {"": "0 0 -9.81"},
     },
     "timestep": {
         "mujoco": {"one step": "2 ms", "clock": "data.time"},
         "pybullet": {"one step": f"{1e3 / 240:.4g} ms", "clock": "none"},
         "pinocchio": {"one step": NO_ANSWER},
+        "motrix": {"one step": "2 ms", "clock": "none"},
     },
     "actuation": {
         "mujoco": {"no actuator": "falls", "a position actuator": "held"},
         "pybullet": {"as loaded": "held", "motor off": "falls"},
         "pinocchio": {"aba at zero torque": "falls"},
+        "motrix": {"no actuator": "falls", "a position actuator": "held"},
     },
     "command": {
         "mujoco": {"ctrl": "stays"},
         "pybullet": {"TORQUE_CONTROL": "lasts one step", "VELOCITY_CONTROL": "stays"},
         "pinocchio": {"": NO_ANSWER},
+        "motrix": {"actuator_ctrls": "stays"},
     },
     "damping": {
         "mujoco": {"a body at 1 m/s": "keeps it", "a joint at 200 rad/s": "keeps it"},
@@ -102,21 +113,25 @@ FACTS = {
             "a joint at 200 rad/s": "cut to 100 rad/s",
         },
         "pinocchio": {"": NO_ANSWER},
+        "motrix": {"a body at 1 m/s": "keeps it", "a joint at 200 rad/s": "keeps it"},
     },
     "fresh": {
         "mujoco": {"the tip": "not computed", "the contact": "not computed"},
         "pybullet": {"the tip": "computed", "the contact": "not computed"},
         "pinocchio": {"the tip": "not computed"},
+        "motrix": {"the tip": "computed"},
     },
     "write": {
         "mujoco": {"the tip": "stale", "the contact": "stale"},
         "pybullet": {"the tip": "fresh", "the contact": "stale"},
         "pinocchio": {"the tip": "stale", "the tip, after forwardKinematics": "stale"},
+        "motrix": {"the tip": "stale"},
     },
     "step": {
         "mujoco": {"the tip": "stale", "the contact": "stale"},
         "pybullet": {"the tip": "stale", "the contact": "stale"},
         "pinocchio": {"": NO_ANSWER},
+        "motrix": {"the tip": "stale"},
     },
     "joints": {
         "mujoco": {
@@ -132,6 +147,7 @@ FACTS = {
             "MJCF": DEPTH,
             "fixed joint, MJCF": "none",
         },
+        "motrix": {"MJCF": DEPTH, "fixed joint, MJCF": "none"},
     },
     "reset": {
         "mujoco": {"mj_resetData": "keeps gravity, timestep, bodies"},
@@ -142,11 +158,13 @@ FACTS = {
             ),
         },
         "pinocchio": {"": NO_ANSWER},
+        "motrix": {"SceneData.reset": "keeps gravity override, gravity, timestep, bodies"},
     },
     "friction": {
         "mujoco": {"equal priority": "the larger", "the block has priority": "the block's"},
         "pybullet": {"": "their product"},
         "pinocchio": {"": NO_ANSWER},
+        "motrix": {"": "the larger"},
     },
     "save": {
         "mujoco": {
@@ -165,6 +183,10 @@ FACTS = {
             "forgets motor target, applied force, gravity, timestep",
         ),
         "pinocchio": {"": NO_ANSWER},
+        "motrix": dict.fromkeys(
+            ("dof_pos and dof_vel copied", "reset to copies of them"),
+            "forgets actuator_ctrls, gravity override, gravity, timestep",
+        ),
     },
     "future": {
         "mujoco": {
@@ -181,11 +203,17 @@ FACTS = {
             "saveBullet, restoreState": "differs",
         },
         "pinocchio": {"a used Data, a new one": "exact"},
+        "motrix": {
+            "SceneData.reset": "exact",
+            "dof_pos and dof_vel copied": "differs",
+            "reset to copies of them": "differs",
+        },
     },
     "invalid": {
         "mujoco": {"autoreset": "starts again", 'autoreset="disable"': "NaN stays"},
         "pybullet": {"": "NaN stays"},
         "pinocchio": {"integrate": "NaN stays"},
+        "motrix": {"": "NaN stays"},
     },
 }
 

@@ -20,7 +20,11 @@ OURS = ("statemachine", "examples", "tests", "tools")
 # What an option of our command imports only when it is given, and the extra that brings it.
 EXTRA_OF_AN_OPTION = {"--html": "plot"}
 # Distributions of modules that may not be installed where this test runs.
-DISTRIBUTIONS = {"pybullet": {"pybullet", "pybullet-arm64"}, "pinocchio": {"pin"}}
+DISTRIBUTIONS = {
+    "pybullet": {"pybullet", "pybullet-arm64"},
+    "pinocchio": {"pin"},
+    "motrixsim": {"motrixsim"},
+}
 
 
 @dataclass(frozen=True)

@@ -29,28 +29,28 @@ from .support.processes import Cli, of_python
 from .support.project import pinned_lines, project_table
 from .support.requirements import ROOT
 
-NAMES = {"mujoco", "pybullet", "pybullet-arm64", "pin"}
+NAMES = {"mujoco", "pybullet", "pybullet-arm64", "pin", "motrixsim"}
 
 LINUX, LINUX_ARM = "x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"
 MAC, WINDOWS, WINDOWS_ARM = (
     "aarch64-apple-darwin", "x86_64-pc-windows-msvc", "aarch64-pc-windows-msvc",
 )  # fmt: skip
 # (platform, Python) -> the engines that it has besides MuJoCo; README's table.
-FORK = "pybullet-arm64==3.2.8"
+FORK, MOTRIX = "pybullet-arm64==3.2.8", "motrixsim==0.10.1"
 PLATFORMS = {
-    (LINUX, "3.11"): {"pybullet==3.2.7", "pin"},
-    (LINUX, "3.12"): {FORK, "pin"},
-    (LINUX, "3.13"): {FORK, "pin"},
+    (LINUX, "3.11"): {"pybullet==3.2.7", "pin", MOTRIX},
+    (LINUX, "3.12"): {FORK, "pin", MOTRIX},
+    (LINUX, "3.13"): {FORK, "pin", MOTRIX},
     (LINUX, "3.14"): {"pin"},
-    (LINUX_ARM, "3.11"): {"pin"},
-    (LINUX_ARM, "3.13"): {"pin"},
-    (MAC, "3.11"): {FORK, "pin"},
-    (MAC, "3.12"): {FORK, "pin"},
-    (MAC, "3.13"): {"pybullet-arm64==3.2.7", "pin"},
+    (LINUX_ARM, "3.11"): {"pin", MOTRIX},
+    (LINUX_ARM, "3.13"): {"pin", MOTRIX},
+    (MAC, "3.11"): {FORK, "pin", MOTRIX},
+    (MAC, "3.12"): {FORK, "pin", MOTRIX},
+    (MAC, "3.13"): {"pybullet-arm64==3.2.7", "pin", MOTRIX},
     (MAC, "3.14"): {"pin"},
-    (WINDOWS, "3.11"): {FORK},
-    (WINDOWS, "3.12"): {FORK},
-    (WINDOWS, "3.13"): {FORK},
+    (WINDOWS, "3.11"): {FORK, MOTRIX},
+    (WINDOWS, "3.12"): {FORK, MOTRIX},
+    (WINDOWS, "3.13"): {FORK, MOTRIX},
     (WINDOWS, "3.14"): set[str](),
 }
 _SYSTEMS = {"linux-gnu": "linux", "darwin": "darwin", "windows-msvc": "win32"}
@@ -61,6 +61,15 @@ def _machine(platform: str) -> tuple[str, str]:
     """Return what Python calls the system and the processor of a platform."""
     processor, _, system = platform.split("-", 2)
     return _SYSTEMS[system], _MACHINES.get(platform, processor)
+
+
+def engine_lines() -> list[str]:
+    """Return the requirements of the project, with those of the extras that bring an engine."""
+    table, extras = project_table(), {engine.extra for engine in ENGINES.values()} - {""}
+    lines = list(table["dependencies"])
+    for extra in sorted(extras):
+        lines += table["optional-dependencies"][extra]
+    return lines
 
 
 def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Requirement]:
@@ -86,7 +95,7 @@ def versions(platform: str, python: str) -> dict[str, str]:
 
 @pytest.mark.parametrize(("platform", "python"), PLATFORMS)
 def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -> None:
-    found = asked(platform, python, project_table()["dependencies"])
+    found = asked(platform, python, engine_lines())
     wanted = versions(platform, python)
     assert set(found) & NAMES == {"mujoco", *wanted}
     pinned = asked(platform, python, pinned_lines())
@@ -101,7 +110,7 @@ def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -
 def test_what_the_engines_say_to_install_is_what_the_markers_take(
     platform: str, minor: int
 ) -> None:
-    found = asked(platform, f"3.{minor}", project_table()["dependencies"])
+    found = asked(platform, f"3.{minor}", engine_lines())
     for engine in ENGINES.values():
         said = [wheel for wheel in engine.wheels if wheel.fits(*_machine(platform), minor)]
         assert {wheel.distribution for wheel in said} == set(found) & set(engine.distributions)
@@ -117,7 +126,8 @@ def test_what_the_engines_say_to_install_is_what_the_markers_take(
 def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None:
     done = of_python(
         "-m", "uv", "pip", "compile", "-q", "--no-header", "--no-annotate", "--only-binary",
-        ":all:", "--python-platform", platform, "--python-version", python, ROOT / "pyproject.toml",
+        ":all:", "--python-platform", platform, "--python-version", python, "--extra", "motrix",
+        ROOT / "pyproject.toml",
     )  # fmt: skip
     if done.returncode and re.search(r"[Ff]ailed to fetch|error sending request", done.stderr):
         pytest.skip(f"no package index can be reached: {done.stderr.splitlines()[0]}")
@@ -219,7 +229,7 @@ def test_each_machine_requires_the_engines_that_it_gets(job: dict[str, Any]) -> 
     assert set(required) == set(matrix["os"]) == set(RUNNERS)
     assert matrix["python"] == ["3.11", "3.12", "3.13"]
     for runner, python in product(matrix["os"], matrix["python"]):
-        installed = asked(RUNNERS[runner], python, project_table()["dependencies"])
+        installed = asked(RUNNERS[runner], python, engine_lines())
         engines = {name for name, e in ENGINES.items() if installed.keys() & set(e.distributions)}
         assert required[runner] - {"render", "browser"} == engines, (runner, python)
     assert job["env"]["STATEMACHINE_REQUIRE"] == "${{ matrix.require }}"

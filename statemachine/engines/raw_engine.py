@@ -38,6 +38,7 @@ class RawEngine(CompiledModels):
         supersampling: It draws so many times as large as a picture is shown.
         steps: Names of its functions f(model, data[, nstep]) that advance time.
         forwards: Names of those f(model, data) that only recompute.
+        survives_fork: Whether a model that ran in a process may run in a fork of it.
     """
 
     emulated = False
@@ -45,6 +46,7 @@ class RawEngine(CompiledModels):
     supersampling = 1
     steps: tuple[str, ...] = ()
     forwards: tuple[str, ...] = ()
+    survives_fork = True
 
     def __init__(self, name: str) -> None:
         self.name = name

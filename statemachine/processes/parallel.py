@@ -197,34 +197,23 @@ def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
         raise SystemExit(128 + ended)  # where somebody else takes the signal, and goes on
 
 
-_reasons_for_no_forks: set[str] = set()
-
-
-def forbid_forks(reason: str) -> None:
-    """Let no more forks be made of this process: all work is done in it.
-
-    Args:
-        reason: What would not work in a fork.
-    """
-    _reasons_for_no_forks.add(reason)
-
-
-def forks_for(number: int, seconds: float, jobs: int | None) -> int:
+def forks_for(number: int, seconds: float, jobs: int | None, can_fork: bool = True) -> int:
     """Return how many forks are to share some runs; 1 means that this process makes them itself.
 
-    There are none on Windows and macOS, nor where a library of this process does not survive one,
-    nor, unless asked for, beside other threads or for work that is done sooner than shared.
+    There are none on Windows and macOS, nor where an engine does not survive one, nor, unless
+    asked for, beside other threads or for work that is done sooner than shared.
 
     Args:
         number: Of runs.
         seconds: What one takes, by the clock.
         jobs: How many at most; None for as many as there are processors.
+        can_fork: Whether all that runs may run in a fork of this process.
 
     Raises:
         BadInputError: `jobs` is less than 1.
     """
     most = min(checked_jobs(jobs), number)
-    if not hasattr(os, "fork") or sys.platform == "darwin" or _reasons_for_no_forks:
+    if not can_fork or not hasattr(os, "fork") or sys.platform == "darwin":
         return 1
     if jobs is None:
         most = (
@@ -263,9 +252,7 @@ def in_forks(
     global _work  # noqa: PLW0603  (forks find it here, and nothing is pickled)
     _work = work
     limit = max(LEAST_WAIT, _LONGEST * seconds)
-    outcomes: dict[int, tuple[BaseException | None, Any]] = {}
-    if not _reasons_for_no_forks:
-        outcomes = _shared(range(len(work)), jobs, ended, limit, meanwhile)
+    outcomes = _shared(range(len(work)), jobs, ended, limit, meanwhile)
     for number, (error, _) in dict(outcomes).items():
         if isinstance(error, BrokenProcessPool):
             outcomes |= _shared([number], 1, ended, limit, meanwhile)

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...errors import EngineError
 from ...installed import require
 from ...interface import JointType
 
@@ -18,6 +20,35 @@ if TYPE_CHECKING:
 mx: Any = require("motrix")
 
 TITLE = "MotrixSim"
+
+
+class _Threads:
+    """Whether MotrixSim has threads in this process: they do not come along into a fork."""
+
+    started = False
+    lost = False
+
+
+def check_threads() -> None:
+    """Note that MotrixSim starts its threads, if it has none yet: before it is let compute.
+
+    Raises:
+        EngineError: It had them before this process was forked: it would wait for them for ever.
+    """
+    if _Threads.lost:
+        raise EngineError(
+            f"{TITLE} has run before this process was forked, and its threads did not come along: "
+            "start processes by spawn, or load its models only in the forks"
+        )
+    _Threads.started = True
+
+
+def _after_fork() -> None:
+    _Threads.lost = _Threads.started
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 @dataclass(frozen=True)

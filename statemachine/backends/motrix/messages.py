@@ -4,7 +4,7 @@ It writes to descriptor 2, with colours. What it does not read of a file it list
 attribute and line:
 
     2026-11-29T08:07:28.0Z  WARN mjcf_parser: These fields are not support yet, will be ignored:
-    In file: /home/me/so101.xml :
+    In file: so101.xml :
       option@cone at line: 10
 """
 

@@ -22,7 +22,7 @@ from ..compiled.flags import DisableFlag
 from ..compiled.stages import set_constants
 from .engine_model import EngineModel
 from .layout import Layout, layout_of
-from .links import mx
+from .links import check_threads, mx
 from .messages import ignored_fields, other_warnings
 from .settings import FIXED_BASE, NO_ACTUATORS, flags_of
 
@@ -153,6 +153,7 @@ class _Numbers:
 def _take_over_bodies(scene: Any, layout: Layout, read: _Numbers) -> None:
     """Take over masses and inertias, and friction of the geoms."""
     raw, data = read.raw, mx.SceneData(scene)
+    check_threads()  # inertias are told by them
     for body, number in enumerate(layout.links.tolist()):
         if number < 0 or not layout.same_links:
             continue

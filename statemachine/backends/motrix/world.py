@@ -7,42 +7,24 @@ the state alone.
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import EngineError
 from ...interface import FORCES, PARTS, Array
-from ...processes.parallel import forbid_forks
 from ...processes.stderr_capture import stderr_capture
 from ...rotations import matrix_from_quat, times, wxyz_from_xyzw, xyzw_from_wxyz
 from ..hidden_world import HiddenWorld, Memory, Moment, Read
 from .contact_sensors import contacts_at
 from .engine_model import EngineModel
 from .layout import Layout
-from .links import TITLE, mx
+from .links import TITLE, check_threads, mx
 from .messages import is_panic
 
 Single = NDArray[np.float32]
 # Beyond these a step may end in a panic, whose text goes to descriptor 2: it is caught there.
 _FAST, _FAR = 1e3, 1e6  # [rad/s or m/s], [rad or m]
-
-
-class _Process:
-    """Whether MotrixSim runs in this process: its threads do not come along into a fork."""
-
-    stepped = False
-    lost_threads = False
-
-
-def _after_fork() -> None:
-    _Process.lost_threads = _Process.stepped
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
 
 
 class MotrixWorld(HiddenWorld):
@@ -100,16 +82,9 @@ class MotrixWorld(HiddenWorld):
         """Take one engine step.
 
         Raises:
-            EngineError: This process is a fork of one in which MotrixSim has stepped.
+            EngineError: As `check_threads`.
         """
-        if not _Process.stepped:
-            _Process.stepped = True
-            forbid_forks(f"{TITLE} has stepped in this process, and its threads do not fork")
-        if _Process.lost_threads:
-            raise EngineError(
-                f"{TITLE} has stepped before this process was forked, and its threads did not come "
-                "along: start processes by spawn, or step only in the forks"
-            )
+        check_threads()
         self._velocities_before = self._own_velocities()
         self._velocities = None
         if self._wild:

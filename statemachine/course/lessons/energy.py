@@ -136,7 +136,8 @@ class EnergyResult:
     Attributes:
         seconds: Simulated time of the code's run [s].
         change: Relative change of the energy in the code's run, at its end.
-        rows: Of each body, and each integrator of MuJoCo.
+        rows: Of each body, and each integrator of MuJoCo; or "own", that of an engine which reads
+            none from a file.
         timesteps: At which each was run [s].
         window: At the end of each run, over which the largest change counts [s].
         provenance: What it was computed with.
@@ -233,7 +234,7 @@ def _rows(model: Model, seconds: float, progress: Progress) -> list[EnergyChange
     """
     backend = BackendChoice(model.backend)
     available = {variant.integrator for variant in variants_of(backend)}
-    names = [name for name in get_args(Integrator) if name != OWN]
+    names = [name for name in get_args(Integrator) if name != OWN or OWN in available]
     rows: list[EnergyChange] = []
     for body in BODIES:
         for name in names:

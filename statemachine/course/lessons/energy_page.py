@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...lab.validate.variants import OWN
 from ...measures.text import NO_NUMBER, milliseconds
 from ...show.blocks import Block, Table
 from ...show.engine_tables import Results, where
@@ -108,13 +109,20 @@ class EnergyPage(PageContent):
     def is_typed_run_measured(self) -> bool:
         """Tell whether the code's run ends with the energy that the run with Euler has then."""
         row = self._typed_row()
+        if not row.is_supported:
+            return False
         moment = int(np.abs(row.times - self.result.seconds).argmin())
         return bool(np.isclose(row.changes[moment], self.result.change, rtol=1e-9, atol=1e-14))
 
+    @property
+    def typed_integrator(self) -> str:
+        """Return the integrator of the code's run."""
+        return self._typed_row().integrator
+
     def _typed_row(self) -> EnergyChange:
-        """Return the row of the code's run: of the tumbling body, with Euler."""
-        rows = self.result.of_body(_TUMBLING)
-        return next(row for row in rows if row.integrator == "Euler")
+        """Return the row of the code's run, with Euler or the engine's own integrator."""
+        rows = {row.integrator: row for row in self.result.of_body(_TUMBLING)}
+        return rows[OWN] if OWN in rows else rows["Euler"]
 
 
 def contents(results: Results[EnergyResult], frame: LessonFrame) -> dict[str, EnergyPage]:

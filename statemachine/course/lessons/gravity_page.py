@@ -74,6 +74,11 @@ class GravityPage(PageContent):
         return self.result.servos_on.ctrl_untouched and self.result.servos_off.ctrl_untouched
 
     @property
+    def forces_told(self) -> bool:
+        """Tell whether the engine tells the forces on the joint."""
+        return self.result.servos_on.forces.total is not None
+
+    @property
     def balanced(self) -> bool:
         """Tell whether the forces on the joint sum to zero in both runs, if nothing moves."""
         return self.result.servos_on.balanced and self.result.servos_off.balanced

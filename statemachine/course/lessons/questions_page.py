@@ -77,6 +77,11 @@ class QuestionsPage(PageContent):
         return float(self.result.answers.gravity.servos_on.time[-1])
 
     @property
+    def forces_told(self) -> bool:
+        """Tell whether the engine tells the forces on the joint."""
+        return _forces_are_told(self.result.answers.gravity)
+
+    @property
     def load_on(self) -> float:
         """Return the size of the force of gravity on the joint [N·m]; 0 where it is not known."""
         bias = self.result.answers.gravity.servos_on.forces.bias
@@ -157,7 +162,13 @@ def _servo_carries_the_load(result: GravityResult) -> bool:
     servos_on, servos_off = result.servos_on, result.servos_off
     balanced = servos_on.balanced and servos_off.balanced
     on, off = _ends(result)
-    return balanced and servos_on.held_by == SERVO and abs(off) > abs(on)
+    by_servo = servos_on.held_by == SERVO or not _forces_are_told(result)
+    return balanced and by_servo and abs(off) > abs(on)
+
+
+def _forces_are_told(result: GravityResult) -> bool:
+    """Tell whether the engine tells the forces on the joint; without, where it is shows enough."""
+    return result.servos_on.forces.total is not None
 
 
 def _ends(result: GravityResult) -> tuple[float, float]:

@@ -20,6 +20,7 @@ class MotrixEngine(RawEngine):
     What its solver starts from can be neither read nor written: nothing primes it.
     """
 
+    survives_fork = False  # its threads do not come along
     phrases = function_of(".motrix.conventions:phrases")
     plain_run = function_of(".motrix.plain_runs:plain_run")
     restore_methods = function_of(".motrix.plain_runs:restore_methods")

@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...engines import raw_engine_of
 from ...errors import BadInputError, EngineError, TraceError
 from ...interface import Array, Ints
 from ...measures import QUANTITIES, common_moments, with_left_pair_names
@@ -239,7 +240,9 @@ def _departures(
     # A function of the user's may keep something from one run to the next.
     if jobs is None and any(rerun is not None and rerun.writes_state for rerun in reruns):
         jobs = 1
-    forks = forks_for(len(rest), seconds, jobs)
+    models = [rerun.model for rerun in reruns if rerun is not None]
+    can_fork = all(raw_engine_of(model.backend).survives_fork for model in models)
+    forks = forks_for(len(rest), seconds, jobs, can_fork)
     if forks > 1:
         for departure in in_forks(rest, forks, ran, seconds):
             if departure is None:

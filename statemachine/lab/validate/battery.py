@@ -29,7 +29,9 @@ from .verdict import CaseMeasurement, Status, failure_judgement, judgement_of
 
 _LONGEST = 0.1  # [s] of a timestep
 _UNKNOWN = "unknown"
-_EMPTY = "<mujoco><worldbody/></mujoco>"
+_PENDULUM = (
+    "<mujoco><worldbody><body><joint/><geom size='1' pos='1 0 0'/></body></worldbody></mujoco>"
+)
 
 
 @dataclass(frozen=True)
@@ -205,8 +207,7 @@ def _ways_of(
                 raise
             missing.append(error)
         else:
-            # One that reads no integrator refuses each case, and tells why.
-            ways[backend] = variants if variants else [Variant(backend, "Euler")]
+            ways[backend] = variants
     note_missing(missing, bool(ways), reporter)
     return ways
 
@@ -232,9 +233,9 @@ def _run_all(
 
 
 def version_of_engine(variant: Variant) -> str:
-    """Return the version of the engine that steps; "unknown" where it takes no empty model."""
+    """Return the version of the engine that steps; "unknown" where it takes no pendulum."""
     try:
-        with variant.loaded(_EMPTY, 0.005) as model:
+        with variant.loaded(_PENDULUM, 0.005) as model:
             return model.engine_version
     except Exception:  # of another package, which may raise anything: each case tells of it
         return _UNKNOWN

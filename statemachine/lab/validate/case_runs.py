@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from ...backends import BACKENDS
+from ...engines import raw_engine_of
 from ...errors import (
     DivergedError,
     ModelError,
@@ -78,7 +79,9 @@ def processes_for(runs: Sequence[CaseRun], jobs: int | None) -> int:
         runs: What is run.
         jobs: How many at most; None for as many as there are processors.
     """
-    return forks_for(len(runs), _MEAN, jobs)
+    names = {run.variant.backend.name for run in runs}
+    can_fork = all(raw_engine_of(name).survives_fork for name in names)
+    return forks_for(len(runs), _MEAN, jobs, can_fork)
 
 
 def outcomes_of(runs: Sequence[CaseRun], jobs: int, progress: Progress) -> list[CaseOutcome]:

@@ -15,7 +15,7 @@ from ...errors import EngineWarning, MissingEngineError, ModelError, Unsupported
 from ...interface import Model
 from .case import GRAVITY, Integrator
 
-OWN: Integrator = "own"  # of an engine as it comes, which reads none from a file
+OWN: Integrator = "own"  # of an engine that reads none from a file
 _PROBE = (
     '<mujoco><option timestep="0.005" integrator="{integrator}"/><worldbody><body>'
     '<joint name="joint" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
@@ -78,7 +78,8 @@ def variants_of(backend: BackendChoice) -> list[Variant]:
     if backend.defaults == "engine":
         return [Variant(backend, OWN)]
     candidates = [Variant(backend, name) for name in get_args(Integrator) if name != OWN]
-    return [variant for variant in candidates if _steps_so(variant)]
+    variants = [variant for variant in candidates if _steps_so(variant)]
+    return variants if variants else [Variant(backend, OWN)]  # of an engine that ignores them all
 
 
 def _steps_so(variant: Variant) -> bool:

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ...backends import on_default
+from ...engines import raw_engine_of
 from ...engines.records import KnownChange
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
@@ -218,7 +219,9 @@ class Trials:
         """
         if self._jobs is None and self.setup.scenario.is_user_function:
             return 1
-        return forks_for(number, self._seconds_of_run, self._jobs)
+        models = self.setup.models
+        can_fork = all(raw_engine_of(model.backend).survives_fork for model in models)
+        return forks_for(number, self._seconds_of_run, self._jobs, can_fork)
 
     def _curves(self, run: RunKey) -> Curves | None:
         """Return a run; None, with a reason in `ended`, if it did not reach the end."""
