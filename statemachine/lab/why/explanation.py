@@ -193,7 +193,7 @@ class Explanation:
         command: What asks something of these sides again; None where nothing was typed.
         rewritten: The right's file with the left's values; None where none was to be written.
         split: The gap divided into import, joint dynamics and contact; None where there is no gap
-            to divide, and where the search was ended before.
+            to divide, one engine runs one file on both sides, or the search was ended before.
         cited_case: The case of the battery that decides the cause, and which side is nearer to the
             truth in it; None where the cause has none, or where the run that was asked does not
             say the same.

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ...installed import DEFAULT
+from ...interface import Model
 from ..runs.provenance import model_digest
 from .causes import Cause
 from .explained_gap import ExplainedGap
@@ -90,8 +91,10 @@ class _Route:
 
 def split_of(
     trials: Trials, request: WhyRequest, gap: ExplainedGap, causes: tuple[Cause, ...]
-) -> GapSplit:
-    """Divide a gap by where it arises.
+) -> GapSplit | None:
+    """Divide a gap by where it arises; None where one engine runs one file on both sides.
+
+    The gap is then of options or of what was edited, which the causes tell.
 
     Args:
         trials: The runs.
@@ -102,6 +105,8 @@ def split_of(
     Raises:
         TimeIsUp: No time is left.
     """
+    if is_one_engine(*trials.setup.models) and _have_one_file(*trials.setup.models):
+        return None
     return _Splitting(trials, request, gap, causes).split()
 
 
@@ -163,9 +168,7 @@ class _Splitting:
 
     def _read_alike(self) -> bool:
         """Tell whether both sides have the same figures of their files."""
-        digests = model_digest(self._left.path), model_digest(self._right.path)
-        read = self._left.read_options, self._right.read_options
-        if digests[0] == digests[1] and read[0] == read[1] and self._readers[0] == self._readers[1]:
+        if self._readers[0] == self._readers[1] and _have_one_file(self._left, self._right):
             return True
         return self._request.are_compiled and not any(map(_is_of_a_file, self._causes))
 
@@ -217,6 +220,12 @@ class _Splitting:
         """Keep why a part cannot be separated; the first reason counts."""
         if not self._obstacle:
             self._obstacle, self._detail = obstacle, detail
+
+
+def _have_one_file(left: Model, right: Model) -> bool:
+    """Tell whether two Models are of the same files, read with the same options."""
+    digests = model_digest(left.path), model_digest(right.path)
+    return digests[0] == digests[1] and left.read_options == right.read_options
 
 
 def _is_of_a_file(cause: Cause) -> bool:
