@@ -17,9 +17,10 @@ from ..why.cited_case_page import CitedCasePage
 from .compared_names import name_of
 from .finer_sides import FinerGap
 from .requests.engines import EnginesResult, EnginesState, sides_of
-from .several_sides import OddOne, SidesGap
+from .several_sides import OddOne, SidesGap, Span
 
 _NOBODY = "none"
+_SPANS: dict[Span, str] = {"run": "over the run", "end": "at the end"}
 _STEPS = ("at h", "h/2", "h/4", "h/8")
 
 
@@ -136,11 +137,11 @@ class EnginesPage(PageContent):
     @property
     def groups(self) -> list[str]:
         """Return which sides agree, over the run and at its end."""
-        spans = {"run": "over the run", "end": "at the end"}
-        return [
-            f"{spans[each.span]}: {'; '.join(listed(group) for group in each.groups)}"
-            for each in self.result.groups
-        ]
+        lines: list[str] = []
+        for each in self.result.groups:
+            groups = "; ".join(listed(group) for group in each.groups)
+            lines.append(f"{_SPANS[each.span]}: {groups}")
+        return lines
 
     @property
     def steps(self) -> Literal["", "vanishes", "stays", "unclear"]:
@@ -249,16 +250,18 @@ def _page(result: EnginesResult, gaps: Sequence[SidesGap], details: bool = False
 
 def _gaps_table(gaps: Sequence[SidesGap], unit: str) -> Table:
     """Return a row for each two sides."""
-    columns: dict[str, Callable[[SidesGap], str]] = {
-        "left": lambda gap: gap.left,
-        "right": lambda gap: gap.right,
-        "quantity": lambda gap: name_of(gap.quantity),
-        "largest": lambda gap: quantity(gap.largest, unit),
-        "at the end": lambda gap: quantity(gap.end, unit),
-        "verdict": _verdict_of,
-    }
-    words = {"left", "right", "quantity", "verdict"}
-    return Table.of(gaps, columns, "", words=words, emphasis=lambda gap: gap.is_apart)
+    return Table(
+        ("left", "right", "quantity", "largest", "at the end", "verdict"),
+        [_cells(gap, unit) for gap in gaps],
+        words=frozenset({0, 1, 2, 5}),
+        emphasis=frozenset(row for row, gap in enumerate(gaps) if gap.is_apart),
+    )
+
+
+def _cells(gap: SidesGap, unit: str) -> tuple[str, ...]:
+    """Return the row of two sides."""
+    largest, end = quantity(gap.largest, unit), quantity(gap.end, unit)
+    return gap.left, gap.right, name_of(gap.quantity), largest, end, _verdict_of(gap)
 
 
 def _verdict_of(gap: SidesGap) -> str:

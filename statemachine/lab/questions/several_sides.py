@@ -158,22 +158,28 @@ def sides_gap(
     verdicts = {agreement.verdict for agreement in agreements}
     farthest = max(agreements, key=lambda agreement: _number(agreement.max))
     chances: dict[str, Chance | None] = dict.fromkeys(agreement.name for agreement in agreements)
+    width = None
     if floor is not None:
         chances = {name: floor.chance(name) for name in chances}
+        width = _largest_width(floor, chances)
     apart = [a for a in agreements if _is_apart(a, chances[a.name])]
+    end = max(_number(agreement.settled) for agreement in agreements)
+    verdict: Verdict = next(verdict for verdict in _WORST_FIRST if verdict in verdicts)
+    chance: Chance | None = next(chance for chance in _CLEAREST_FIRST if chance in chances.values())
+    is_apart_at_end = any(agreement.verdict == "differs" for agreement in apart)
     return SidesGap(
         left=labels[0],
         right=labels[1],
         quantity=farthest.name,
         largest=_number(farthest.max),
         at=farthest.at,
-        end=max(_number(agreement.settled) for agreement in agreements),
+        end=end,
         tolerance=farthest.tolerance,
-        floor=None if floor is None else _largest_width(floor, chances),
-        verdict=next(verdict for verdict in _WORST_FIRST if verdict in verdicts),
-        chance=next(chance for chance in _CLEAREST_FIRST if chance in chances.values()),
+        floor=width,
+        verdict=verdict,
+        chance=chance,
         is_apart=bool(apart),
-        is_apart_at_end=any(agreement.verdict == "differs" for agreement in apart),
+        is_apart_at_end=is_apart_at_end,
     )
 
 

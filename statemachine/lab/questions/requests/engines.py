@@ -111,10 +111,10 @@ class EnginesResult(ShownResult):
     Attributes:
         request: What was asked.
         labels: What the sides are called, those first that were named first.
-        kind: Which sort of quantity they are measured in, such as "joint": that which differs most
-            in any pair.
-        unit: Its SI unit.
         until: The last moment that is compared [s].
+        kind: Which sort of quantity they are measured in, such as "joint": that which differs most
+            in any pair; "" where too few runs reach their end.
+        unit: Its SI unit.
         gaps: Between each two sides whose runs reach the end.
         groups: Which sides agree, and which one is odd: over the whole run, and at its end.
         state: "odd" where a side is; "none" where no side is, and some are told apart; "alike"
@@ -131,16 +131,16 @@ class EnginesResult(ShownResult):
 
     request: EnginesRequest = field(metadata={"json": False})
     labels: tuple[str, ...]
-    kind: str
-    unit: str
     until: float
-    gaps: tuple[SidesGap, ...]
-    groups: tuple[SideGroups, ...]
-    state: EnginesState
-    ended: tuple[EndedSide, ...]
-    finer: FinerSides | None
-    origin: GapOrigin | None
-    missing: tuple[str, ...]
+    kind: str = ""
+    unit: str = ""
+    gaps: tuple[SidesGap, ...] = ()
+    groups: tuple[SideGroups, ...] = ()
+    state: EnginesState = "too few"
+    ended: tuple[EndedSide, ...] = ()
+    finer: FinerSides | None = None
+    origin: GapOrigin | None = None
+    missing: tuple[str, ...] = ()
 
     @property
     def span(self) -> Span:
@@ -191,15 +191,8 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
     result = EnginesResult(
         request=request,
         labels=tuple(names),
-        kind="",
-        unit="",
         until=max(each.comparison.until for each in compared.values()),
-        gaps=(),
-        groups=(),
-        state="too few",
         ended=tuple(ended.values()),
-        finer=None,
-        origin=None,
         missing=tuple(str(error) for error in missing),
     )
     if len(complete) < LEAST_SIDES:
