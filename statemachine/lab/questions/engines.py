@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ...measures import QUANTITIES
 from ...measures.text import listed, quantity, short_time
 from ...show.blocks import Page, Table
-from ...show.first_screen import first_screen, with_answer
+from ...show.first_screen import MOST_ROWS, first_that_fits, with_answer
 from ...show.templates import PageContent, render
 from ..compare.odd_side import ODD
 from ..compare.typed_command import typed_command
 from ..why.cited_case_page import CitedCasePage
 from .compared_names import name_of
-from .finer_sides import FinerGap
+from .finer_sides import FinerGap, FinerSides
 from .requests.engines import EnginesResult, EnginesState, sides_of
 from .several_sides import OddOne, SidesGap, Span
 
@@ -32,6 +32,7 @@ class EnginesPage(PageContent):
         experiment: What was run.
         result: Which side is odd.
         gaps: Table of those between each two sides.
+        more: How many of these it does not show.
         next_command: What to type next; "" for nothing.
         details: Whether everything is shown.
     """
@@ -40,6 +41,7 @@ class EnginesPage(PageContent):
     experiment: str
     result: EnginesResult
     gaps: Table
+    more: int
     next_command: str
     details: bool
 
@@ -207,6 +209,11 @@ class EnginesPage(PageContent):
         return "" if self.result.origin is None else self.result.origin.cause
 
     @property
+    def is_searched(self) -> bool:
+        """Tell whether it was looked for what the gap comes from."""
+        return self.result.origin is not None
+
+    @property
     def located_in(self) -> str:
         """Return that where it is left out on both sides, to locate the gap; else ""."""
         origin = self.result.origin
@@ -228,7 +235,20 @@ def page(result: EnginesResult, details: bool = False) -> Page:
     gaps = sorted(result.gaps, key=lambda gap: -gap.largest)
     if details:
         return _page(result, gaps, details=True)
-    return first_screen(lambda rows: _page(result, gaps[:rows]), len(gaps))
+    return first_that_fits(_shorter_pages(result, gaps))
+
+
+def _shorter_pages(result: EnginesResult, gaps: Sequence[SidesGap]) -> Iterator[Page]:
+    """Yield the page, then without how far each side moves, and then with ever fewer gaps."""
+    most = min(len(gaps), MOST_ROWS)
+    yield _page(result, gaps[:most])
+    for rows in range(most, min(most, 1) - 1, -1):
+        yield _page(replace(result, finer=_without_moves(result)), gaps[:rows])
+
+
+def _without_moves(result: EnginesResult) -> FinerSides | None:
+    """Return the runs with finer steps without how far each side moves by them."""
+    return None if result.finer is None else replace(result.finer, moved=())
 
 
 def _page(result: EnginesResult, gaps: Sequence[SidesGap], details: bool = False) -> Page:
@@ -242,6 +262,7 @@ def _page(result: EnginesResult, gaps: Sequence[SidesGap], details: bool = False
         experiment=result.request.run.experiment,
         result=result,
         gaps=_gaps_table(gaps, result.unit),
+        more=len(result.gaps) - len(gaps),
         next_command=command,
         details=details,
     )

@@ -31,7 +31,7 @@ class FinerGap:
         left: What a side is called.
         right: What the other is called.
         gaps: Between them [unit]: with the steps as given, and with ever finer ones.
-        verdict: As of a `GapLimit`.
+        verdict: As of a `GapLimit`, from as few of these gaps as make it clear.
     """
 
     left: str
@@ -139,12 +139,18 @@ def _result(
     finer: list[FinerGap] = []
     for pair, first in levels[0].items():
         sizes = [_size(gaps[pair], span) for gaps in levels]
-        verdict: LimitVerdict = "unclear"
-        if len(sizes) >= _AT_LEAST:
-            verdict, _ = verdict_of(sizes, LEAST_GAP)
-        finer.append(FinerGap(first.left, first.right, tuple(sizes), verdict))
+        finer.append(FinerGap(first.left, first.right, tuple(sizes), _verdict(sizes)))
     moved = [MovedSide(labels[side], _moved(side, runs, quantities, span)) for side in labels]
     return FinerSides(_LEVELS[: len(runs)], tuple(finer), tuple(odds), tuple(moved))
+
+
+def _verdict(sizes: list[float]) -> LimitVerdict:
+    """Return what becomes of a gap, from as few of its sizes as make it clear."""
+    for count in range(_AT_LEAST, len(sizes) + 1):
+        verdict, _ = verdict_of(sizes[:count], LEAST_GAP)
+        if verdict != "unclear":
+            return verdict
+    return "unclear"
 
 
 def _size(gap: SidesGap, span: Span) -> float:

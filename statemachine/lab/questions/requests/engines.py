@@ -221,10 +221,13 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
 
 
 def labels_of_sides(sides: Sequence[Side]) -> list[str]:
-    """Return what sides are called: by engine and options alone, where all have one file."""
+    """Return what sides are called: by what not all of them have of file, engine and options."""
     if len({side.path for side in sides}) > 1:
         return [side.label for side in sides]
-    return [side.label.partition("@")[2] for side in sides]
+    labels = [side.label.rpartition("@")[2] for side in sides]
+    if len({side.chosen_backend() for side in sides}) == 1 and all(side.options for side in sides):
+        return [label.partition(" ")[2] for label in labels]
+    return labels
 
 
 def sides_of(request: EnginesRequest) -> tuple[Side, ...]:
