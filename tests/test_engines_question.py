@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from statemachine import cli, lab
+from statemachine.backends import chosen, installed_backends
 from statemachine.cli.compare.requests import request_of
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
 from statemachine.lab.compare.chaos import Chance, ChaosFloor
@@ -118,7 +119,7 @@ def test_a_side_may_be_odd_at_the_end_alone(pendulum: Path) -> None:
         text = PENDULUM.replace("</mujoco>", servo.format(kp=kp)).replace('".5"', f'"{mass}"')
         files.append(written(pendulum.parent / f"{name}.xml", text))
     sides = [f"{files[0]} damping=0.1", f"{files[1]} damping=4", f"{files[2]} damping=0.1"]
-    result = lab.engines(sides, what="droop", seconds=6, chaos=False)
+    result = lab.engines(sides, what="droop", seconds=2, chaos=False)
     assert (result.groups[0].odd, result.span) == (None, "end")
     assert result.odd is not None
     assert result.odd.side.startswith("c.xml")
@@ -270,16 +271,44 @@ def test_where_all_are_three_one_may_be_odd() -> None:
     assert asked.backends == ("all",)
 
 
-def test_of_all_engines_one_that_is_missing_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def no_bullet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Of three engines in all, PyBullet is not installed."""
+
     def version(name: str) -> str:
         if name == "pybullet":
             raise MissingEngineError("pybullet is not here", engine=name)
         return "1"
 
-    monkeypatch.setattr("statemachine.backends.chosen.engine_version", version)
+    monkeypatch.setattr(installed_backends, "engine_version", version)
+    monkeypatch.setattr(chosen, "backend_names", lambda: [*BOTH, "another"])
     with registered("another", HIDDEN):
-        request = EnginesRequest(HOLD, ("all",))
-        refused((MissingEngineError, "pybullet is not here", lambda: answer(request)))
+        yield
+
+
+@pytest.mark.usefixtures("no_bullet")
+def test_of_all_engines_one_that_is_missing_is_left_out() -> None:
+    backends, missing = installed_backends.installed_backends(["all"])
+    assert [str(backend) for backend in backends] == ["mujoco", "another"]
+    assert [error.engine for error in missing] == ["pybullet"]
+
+
+@pytest.mark.usefixtures("no_bullet")
+def test_an_engine_that_is_named_is_never_left_out() -> None:
+    backends, missing = installed_backends.installed_backends(["mujoco", "pybullet"])
+    assert ([str(backend) for backend in backends], missing) == ([*BOTH], [])
+
+
+@pytest.mark.usefixtures("no_bullet")
+def test_where_fewer_than_three_are_left_that_is_said() -> None:
+    request = EnginesRequest(HOLD, ("all",))
+    refused((MissingEngineError, "pybullet is not here", lambda: answer(request)))
+
+
+@pytest.mark.usefixtures("no_bullet")
+def test_where_two_of_three_are_left_they_are_compared() -> None:
+    asked = typed("hold", "--backend", "all")
+    assert asked == CompareRequest(replace(HOLD, backends=("mujoco", "another")))
 
 
 @pytest.mark.parametrize("option", ["--why", "--one-step", "--converge", "--junit=x", "--html=x"])

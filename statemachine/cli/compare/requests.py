@@ -108,7 +108,7 @@ _OF_TWO = (
 
 def _names_several_backends(options: argparse.Namespace) -> bool:
     """Tell whether --backend names three engines or more; of "all" those that are installed."""
-    from ...backends.chosen import installed_backends
+    from ...backends.installed_backends import installed_backends
 
     return len(installed_backends(options.backend or ())[0]) > len(PAIR)
 
@@ -221,7 +221,8 @@ def _backends(options: argparse.Namespace, what: Sequence[str]) -> tuple[str, st
         BadInputError: There are not two.
         UnknownNameError: There is no such backend.
     """
-    from ...backends.chosen import chosen_backends, installed_backends
+    from ...backends.chosen import chosen_backends
+    from ...backends.installed_backends import installed_backends
     from ...lab.compare.sides import is_trace
 
     if not options.backend:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import ClassVar, Literal
 
-from ....backends.chosen import chosen_backends, installed_backends
+from ....backends.chosen import chosen_backends
+from ....backends.installed_backends import installed_backends
 from ....errors import BadInputError, EndedEarlyError, StateMachineError
 from ....measures.text import listed
 from ...compare.agreement import Comparison, compare
@@ -15,7 +16,8 @@ from ...compare.odd_side import LEAST_SIDES
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.sides import Request, Side
 from ...compare.two_sides import run_sides
-from ...runs.reporter import QUIET, PartReporter, Reporter
+from ...runs.part_reporter import PartReporter
+from ...runs.reporter import QUIET, Reporter
 from ...shown_result import Column, ShownResult, columns_of
 from ..finer_sides import FinerSides, finer_sides
 from ..gap_origin import GapOrigin, origin_of
