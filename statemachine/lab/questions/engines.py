@@ -16,7 +16,7 @@ from ..compare.typed_command import typed_command
 from ..why.cited_case_page import CitedCasePage
 from .compared_names import name_of
 from .finer_sides import FinerGap, FinerSides
-from .requests.engines import EnginesResult, EnginesState, sides_of
+from .requests.engines import SEARCH_SECONDS, EnginesResult, EnginesState, sides_of
 from .several_sides import OddOne, SidesGap, Span
 
 _NOBODY = "none"
@@ -212,6 +212,17 @@ class EnginesPage(PageContent):
     def is_searched(self) -> bool:
         """Tell whether it was looked for what the gap comes from."""
         return self.result.origin is not None
+
+    @property
+    def largest_effect(self) -> str:
+        """Return the cause with the largest effect, where the search was ended; else ""."""
+        origin = self.result.origin
+        return "" if origin is None or origin.is_complete else origin.cause
+
+    @property
+    def search_seconds(self) -> float:
+        """Return after how long the search for causes ends [s]."""
+        return SEARCH_SECONDS
 
     @property
     def located_in(self) -> str:

@@ -21,6 +21,8 @@ class GapOrigin:
         share: The part of the gap that this takes away; None where nothing was found.
         is_located: Whether that is where the gap is found, by leaving it out on both sides, and no
             difference between them.
+        is_complete: Whether the search came to its end; else `cause` is what has the largest
+            effect by then, and has no share yet.
         cited_case: The case that decides the cause, and which of the two is nearer to the truth in
             it; None where no case does.
     """
@@ -31,6 +33,7 @@ class GapOrigin:
     cause: str
     share: float | None
     is_located: bool
+    is_complete: bool
     cited_case: CitedCase | None
 
 
@@ -42,7 +45,19 @@ def origin_of(left: str, right: str, explanation: Explanation) -> GapOrigin:
         right: What the other is called.
         explanation: Of the gap between the two.
     """
-    found = GapOrigin(left, right, explanation.verdict.answer, "", None, False, None)
+    found = GapOrigin(
+        left=left,
+        right=right,
+        answer=explanation.verdict.answer,
+        cause="",
+        share=None,
+        is_located=False,
+        is_complete=explanation.is_complete,
+        cited_case=None,
+    )
+    if not explanation.is_complete:
+        effects = explanation.ranking
+        return replace(found, cause=effects[0].name) if effects else found
     largest = 0.0
     for row in explanation.shares:
         if row.share is not None and row.share > largest:

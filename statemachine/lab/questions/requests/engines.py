@@ -38,7 +38,7 @@ from .causes import ExplainRequest
 from .converge import ConvergeRequest
 from .gap import CompareRequest
 
-_SEARCH = 30.0  # [s] by the clock: a hint needs the largest cause, and --why finds all
+SEARCH_SECONDS = 30.0  # [s] by the clock: a hint needs the largest cause, and --why finds all
 # "too few": of fewer than three sides a run reaches its end.
 EnginesState = Literal["odd", "none", "alike", "nothing moved", "too few"]
 
@@ -306,7 +306,7 @@ def _origin(result: EnginesResult, sides: Sequence[Side], reporter: Reporter) ->
     asked = ExplainRequest(
         result.request.pair(left, right),
         measure=measure,
-        time_limit=_SEARCH,
+        time_limit=SEARCH_SECONDS,
         uncertainty=None,
     )
     try:
