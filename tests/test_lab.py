@@ -113,7 +113,7 @@ def test_an_option_that_is_elsewhere_is_still_one() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["compare", "why", "one_step", "converge", "versions", "models", "sweep"]
+    "name", ["compare", "why", "one_step", "converge", "engines", "versions", "models", "sweep"]
 )
 def test_every_argument_is_documented(name: str) -> None:
     function = getattr(lab, name)
@@ -140,7 +140,8 @@ def test_lab_loads_no_engine() -> None:
 
 
 def test_lab_lists_its_names_and_knows_no_other() -> None:
-    assert {"compare", "why", "one_step", "converge", "versions", "models"} <= set(dir(lab))
+    names = {"compare", "why", "one_step", "converge", "engines", "versions", "models"}
+    assert names <= set(dir(lab))
     assert not hasattr(lab, "comparre")
 
 

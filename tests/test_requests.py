@@ -20,6 +20,7 @@ from statemachine.lab.installation.engines import ReleasesRequest
 from statemachine.lab.probes.conventions.request import CallsRequest, ConventionsRequest
 from statemachine.lab.questions.requests.causes import ExplainRequest
 from statemachine.lab.questions.requests.converge import ConvergeRequest
+from statemachine.lab.questions.requests.engines import EnginesRequest
 from statemachine.lab.questions.requests.gap import CompareRequest
 from statemachine.lab.questions.requests.models import ModelsRequest
 from statemachine.lab.questions.requests.one_step import OneStepRequest
@@ -38,6 +39,7 @@ from .support.processes import of_python
 HOLD = Request(("hold",))
 FINE = Side("so101", options={"timestep": 0.002})
 TWO_SIDES = Request(("hold",), sides=(FINE, Side("so101", "pybullet")))
+THREE_SIDES = (Side("so101"), Side("so101", "pybullet"), Side("so101", options={"damping": 2.0}))
 TYPED: list[tuple[str, Callable[[], object]]] = [
     ("conventions gravity", lambda: ConventionsRequest(("gravity",))),
     ("conventions --calls --backend mujoco", lambda: CallsRequest(("mujoco",))),
@@ -66,6 +68,14 @@ TYPED: list[tuple[str, Callable[[], object]]] = [
     ("compare hold --why --time-limit 7", lambda: ExplainRequest(HOLD, time_limit=7.0)),
     ("compare hold --one-step", lambda: OneStepRequest(HOLD)),
     ("compare hold --converge", lambda: ConvergeRequest(HOLD)),
+    (
+        "compare hold --backend mujoco --backend pybullet --backend pybullet:engine",
+        lambda: EnginesRequest(HOLD, ("mujoco", "pybullet", "pybullet:engine")),
+    ),
+    (
+        "compare hold so101 so101@pybullet so101 damping=2 --no-chaos",
+        lambda: EnginesRequest(HOLD, (), THREE_SIDES, uncertainty=None),
+    ),
     ("compare hold --versions 3.3.7", lambda: VersionsRequest(HOLD, "3.3.7")),
     ("compare --models so101 so101/scene", lambda: ModelsRequest(("so101", "so101/scene"))),
     ("compare hold so101 timestep=0.002 so101@pybullet", lambda: CompareRequest(TWO_SIDES)),

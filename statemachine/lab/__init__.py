@@ -22,6 +22,7 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from .ask.descriptions import models as models
+    from .ask.engines import engines as engines
     from .ask.gaps import compare as compare
     from .ask.gaps import why as why
     from .ask.pages import write as write
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from .compare.sides import Side as Side
     from .questions.requests.causes import ExplainRequest as ExplainRequest
     from .questions.requests.converge import ConvergeRequest as ConvergeRequest
+    from .questions.requests.engines import EnginesRequest as EnginesRequest
     from .questions.requests.gap import CompareRequest as CompareRequest
     from .questions.requests.models import ModelsRequest as ModelsRequest
     from .questions.requests.one_step import OneStepRequest as OneStepRequest
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 _QUESTIONS = {
     "compare": "ask.gaps",
     "converge": "ask.steps",
+    "engines": "ask.engines",
     "models": "ask.descriptions",
     "one_step": "ask.steps",
     "sweep": "ask.sweeps",
@@ -53,6 +56,7 @@ _QUESTIONS = {
 _REQUESTS = {
     "CompareRequest": "questions.requests.gap",
     "ConvergeRequest": "questions.requests.converge",
+    "EnginesRequest": "questions.requests.engines",
     "ExplainRequest": "questions.requests.causes",
     "ModelsRequest": "questions.requests.models",
     "OneStepRequest": "questions.requests.one_step",

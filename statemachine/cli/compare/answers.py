@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ...engines.pictures import Renderer
     from ...lab.questions.requests.causes import ExplainRequest
     from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.engines import EnginesRequest
     from ...lab.questions.requests.gap import CompareRequest, CompareResult
     from ...lab.questions.requests.models import ModelsRequest
     from ...lab.questions.requests.one_step import OneStepRequest
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     Question = (
         CompareRequest
+        | EnginesRequest
         | ExplainRequest
         | OneStepRequest
         | ConvergeRequest
@@ -38,6 +40,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     from ...lab.questions.requests.causes import ExplainRequest
     from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.engines import EnginesRequest
     from ...lab.questions.requests.models import ModelsRequest
     from ...lab.questions.requests.one_step import OneStepRequest
     from ...lab.questions.requests.versions import VersionsRequest
@@ -50,6 +53,8 @@ def run(options: argparse.Namespace) -> int:
             return _run_one_step(options, request)
         case ConvergeRequest() as request:
             return _run_converge(options, request)
+        case EnginesRequest() as request:
+            return _run_engines(options, request)
         case VersionsRequest() as request:
             return _run_versions(options, request)
         case ExplainRequest() as request:
@@ -101,6 +106,16 @@ def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     with _stop_is_said():
         result = answer(request, TerminalReporter())
     return show(convergence.page(result, options.details), result, options.json)
+
+
+def _run_engines(options: argparse.Namespace, request: EnginesRequest) -> int:
+    """Compare each two of three sides or more, and look which one is odd."""
+    from ...lab.questions import engines
+    from ...lab.questions.requests.engines import answer
+
+    with _stop_is_said():
+        result = answer(request, TerminalReporter())
+    return show(engines.page(result, options.details), result, options.json)
 
 
 def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:

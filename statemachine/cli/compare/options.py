@@ -32,11 +32,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Run something on two sides, or open recorded traces, and compare: each quantity\n"
         "with its tolerance and a verdict. An experiment alone, or with one FILE, runs on\n"
-        "both engines; the commands of one trace are played on the other engine.\n\n"
+        "MuJoCo and PyBullet; the commands of one trace are played on the other of them.\n"
+        "Of three sides or more, the one that is odd is named.\n\n"
         "A side is FILE, FILE@ENGINE or FILE@ENGINE:engine (as the engine's own users\n"
         "meet it), and options behind it, such as timestep=0.002 contacts=off:\n"
         f"  {PROGRAM} compare hold A.xml\n"
         f"  {PROGRAM} compare hold A.xml@mujoco B.urdf@pybullet\n"
+        f"  {PROGRAM} compare hold A.xml --backend all\n"
         f"  {PROGRAM} compare hold so101 timestep=0.002 so101 timestep=0.001\n"
         f"  {PROGRAM} compare walk.py:policy A.xml B.xml --every 5 --keyframe home\n"
         f"  {PROGRAM} compare run.npz A.xml B.xml"
@@ -52,12 +54,13 @@ def add(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="WHAT",
         help="what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, a "
-        "model for both engines, two sides, or a second trace",
+        "model for all engines, two sides or more, or a second trace",
     )
     add_backend(
         parser,
-        "the left's engine, and once more the right's: mujoco, pybullet, pybullet:engine (as "
-        "its own users meet it) or a release, mujoco==3.3.7 (default mujoco and pybullet)",
+        "the left's engine, once more the right's, and more where one of several may be odd: "
+        "mujoco, pybullet, pybullet:engine (as its own users meet it), a release, mujoco==3.3.7, "
+        "or all that are installed (default mujoco and pybullet)",
     )
     add_menagerie(parser)
     add_seconds(parser)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ...lab.compare.perturbed import Uncertainty
     from ...lab.questions.requests.causes import ExplainRequest
     from ...lab.questions.requests.converge import ConvergeRequest
+    from ...lab.questions.requests.engines import EnginesRequest
     from ...lab.questions.requests.gap import CompareRequest
     from ...lab.questions.requests.models import ModelsRequest
     from ...lab.questions.requests.one_step import OneStepRequest
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     Question = (
         CompareRequest
+        | EnginesRequest
         | ExplainRequest
         | OneStepRequest
         | ConvergeRequest
@@ -40,6 +42,7 @@ def request_of(options: argparse.Namespace) -> Question:
         BadInputError: What is typed contradicts itself, or is out of range.
         UnknownNameError: There is no such experiment, model, backend or kind of quantity.
     """
+    from ...lab.compare import split_words
     from ...lab.questions.requests.converge import ConvergeRequest
     from ...lab.questions.requests.gap import CompareRequest
     from ...lab.questions.requests.one_step import OneStepRequest
@@ -53,7 +56,10 @@ def request_of(options: argparse.Namespace) -> Question:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
             f"{PROGRAM} compare hold"
         )
-    run = run_of(options)
+    what, sides = split_words(options.what, options.menagerie)
+    if len(sides) > len(PAIR) or _names_several_backends(options):
+        return _engines_request_of(options, what, sides)
+    run = _run_of(options, what, sides, _backends(options, what))
     if options.one_step:
         return OneStepRequest(run)
     if options.converge:
@@ -93,17 +99,65 @@ def explain_request_of(options: argparse.Namespace, run: Request) -> ExplainRequ
     )
 
 
-def run_of(options: argparse.Namespace) -> Request:
-    """Return what is run on two sides, or which traces are opened."""
-    from ...lab.compare import Request, split_words
+# What is asked of two sides alone.
+_OF_TWO = (
+    *("why", "one_step", "converge", "versions", "html", "junit", "plot", "film", "map"),
+    *PARTS,
+)
+
+
+def _names_several_backends(options: argparse.Namespace) -> bool:
+    """Tell whether --backend names three engines or more; of "all" those that are installed."""
+    from ...backends.installed_backends import installed_backends
+
+    return len(installed_backends(options.backend or ())[0]) > len(PAIR)
+
+
+def _engines_request_of(
+    options: argparse.Namespace, what: tuple[str, ...], sides: tuple[Side, ...]
+) -> EnginesRequest:
+    """Return which of three sides or more is to be found odd.
+
+    Raises:
+        BadInputError: Something is asked of two sides alone.
+    """
+    from ...lab.questions.requests.engines import EnginesRequest
+    from ...measures import parse_tolerances
+
+    refuse_options(options, _OF_TWO, "{} goes with two sides, and these are more")
+    backends: tuple[str, ...] = ()
+    if len(sides) > 1:
+        _check_options_of_run(options, what, sides)
+        run, named = _run_of(options, what, (), PAIR), sides
+    else:
+        run, named = _run_of(options, what, sides, PAIR), ()
+        backends = tuple(options.backend)
+    tolerances = parse_tolerances(options.tolerance)
+    return EnginesRequest(run, backends, named, tolerances, _uncertainty(options))
+
+
+def _run_of(
+    options: argparse.Namespace,
+    what: tuple[str, ...],
+    sides: tuple[Side, ...],
+    backends: tuple[str, str],
+) -> Request:
+    """Return what is run on two sides, or which traces are opened.
+
+    Args:
+        options: As typed.
+        what: What is run.
+        sides: Two; or a model for all engines; or none.
+        backends: Where no sides are named.
+    """
+    from ...lab.compare import Request
     from ...lab.runs.call_period import every_of_word
 
-    what, sides = split_words(options.what, options.menagerie)
     common: dict[str, OptionValue] = {}
     if options.timestep is not None:
         common["timestep"] = options.timestep
     model = None
-    if len(sides) == 1:  # of both engines
+    if len(sides) == 1:
         model = sides[0].model
         common |= sides[0].options
         sides = ()
@@ -114,7 +168,7 @@ def run_of(options: argparse.Namespace) -> Request:
     every = 1 if options.every is None else every_of_word(options.every)
     return Request(
         what=what,
-        backends=_backends(options, what),
+        backends=backends,
         model=model,
         menagerie=options.menagerie,
         seconds=options.seconds,
@@ -161,22 +215,27 @@ def _with_parts(
 def _backends(options: argparse.Namespace, what: Sequence[str]) -> tuple[str, str]:
     """Return the two backends; one that is named is where a trace is played.
 
+    Where "all" are two, one may be missing: its recorded run may take its side.
+
     Raises:
         BadInputError: There are not two.
         UnknownNameError: There is no such backend.
     """
     from ...backends.chosen import chosen_backends
+    from ...backends.installed_backends import installed_backends
     from ...lab.compare.sides import is_trace
 
     if not options.backend:
         return PAIR
     chosen = [str(backend) for backend in chosen_backends(options.backend)]
+    if len(chosen) > len(PAIR):
+        chosen = [str(backend) for backend in installed_backends(options.backend)[0]]
     if len(chosen) == 1 and len(what) == 1 and is_trace(what[0]):
         return chosen[0], chosen[0]
     if len(chosen) != 2:
         raise BadInputError(
-            "compare takes two engines, as in --backend mujoco --backend pybullet:engine; "
-            f"got {' and '.join(chosen)}"
+            "compare takes two engines or more, as in --backend mujoco --backend "
+            f"pybullet:engine; got {' and '.join(chosen)}"
         )
     return chosen[0], chosen[1]
 

@@ -26,7 +26,7 @@ from .series import Series, default_tip, series
 
 FINER = (1, 2, 4, 8, 16)  # engine steps to one of the first runs; from 8 on, where it is unclear
 _AT_LEAST = 3  # of these runs are made in any case
-_ROUNDING = 1e-9  # of the largest value of a quantity, or of 1
+LEAST_GAP = 1e-9  # of the largest value of a quantity, or of 1
 # What a halving divides a gap by, at orders from 0.7 (Euler's is 1) to 4.5 (RK4's is 4).
 _SLOWEST, _FASTEST = 2**0.7, 2**4.5
 _MARGIN = 0.25  # of an extrapolation, that it may be off: a safety factor of 1.25 (Roache)
@@ -321,7 +321,7 @@ def _limit(quantity: _Quantity, chosen: NDArray[np.bool_]) -> GapLimit:
     curve = quantity.curve
     gaps = [float(gap[chosen].max()) for gap in quantity.between]
     values = curve.left[chosen] if curve.left.size else np.ones(1)
-    rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))
+    rounding = LEAST_GAP * max(1.0, float(np.abs(values).max()))
     verdict, limit = verdict_of(gaps, rounding)
     return GapLimit(
         name=curve.name,

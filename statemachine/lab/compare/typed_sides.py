@@ -16,7 +16,7 @@ from ...interface import OPTIONS
 from ...interface.options import OptionValue
 from ...interface.read_options import BASES
 from ...interface.records import READ_OPTIONS
-from ...measures.text import command, listed
+from ...measures.text import command
 from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float
 from ..runs.controllers import is_function
@@ -137,14 +137,15 @@ def _option(text: str) -> tuple[str, OptionValue]:
 def split_words(
     words: Sequence[str], menagerie: str | None = None
 ) -> tuple[tuple[str, ...], tuple[Side, ...]]:
-    """Return what is to be run, and the sides: two, or one of a model without an engine, or none.
+    """Return what is to be run, and the sides: two or more, or one of a model without an engine, or
+    none.
 
     Args:
         words: As typed behind `compare`, at least one.
         menagerie: A menagerie folder to look names up in.
 
     Raises:
-        BadInputError: Sides without an experiment, one side of an engine, or more than two.
+        BadInputError: Sides without an experiment, or one side of an engine.
         StateMachineError: As `parse_sides` does.
     """
     size = len(list(takewhile(is_trace, words)))
@@ -189,7 +190,7 @@ def _refuse_sides_alone(words: Sequence[str], sides: Sequence[Side]) -> NoReturn
 def _check_number_of_sides(
     what: Sequence[str], words: Sequence[str], sides: Sequence[Side]
 ) -> None:
-    """Check that there are two sides, or a model for both engines, or none where none is needed.
+    """Check that there are sides, or a model for all engines, or none where none is needed.
 
     Args:
         what: What is to be run.
@@ -197,14 +198,11 @@ def _check_number_of_sides(
         sides: What these say.
 
     Raises:
-        BadInputError: There are too many, or too few.
+        BadInputError: There are too few, or traces have sides of their own.
     """
     is_model_alone = _is_model_alone(words, sides)
     if len(what) > 1 and sides and not is_model_alone:
         raise BadInputError("two traces have their own sides; a model is one FILE")
-    if len(sides) > 2:
-        labels = listed([side.label for side in sides])
-        raise BadInputError(f"{len(sides)} sides, {labels}: compare takes two")
     if len(sides) == 1 and not is_model_alone:
         typed = command(["statemachine", "compare", what[0], *words, _on_other_engine(sides[0])])
         raise BadInputError(f"one side only: name the other, as in: {typed}")
@@ -214,7 +212,7 @@ def _check_number_of_sides(
 
 
 def _is_model_alone(words: Sequence[str], sides: Sequence[Side]) -> bool:
-    """Tell whether the only side is a model without an engine, for both engines."""
+    """Tell whether the only side is a model without an engine, for all engines."""
     return len(sides) == 1 and sides[0].model == _split_options(words[0])[0]
 
 
