@@ -115,6 +115,9 @@ def record(
     scratch.mkdir(parents=True)
     nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
     job = folder / "job"
+    variables, shown_folders = _only_for_imports(bytecode), [student_folder]
+    if bytecode is not None:
+        shown_folders.append(bytecode)
     facts = {
         "file": str(path),
         "student_folder": str(student_folder),
@@ -125,14 +128,10 @@ def record(
         "trace": str(trace),
         "nonce": nonce,
         "alone": not sandbox.shut_in(),
+        "only_for_imports": list(variables),
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
     command = [sys.executable, "-P", "-c", CHILD_PROGRAM, str(job), str(_PACKAGES)]
-
-    variables, shown_folders = environment(backend), [student_folder]
-    if bytecode is not None:
-        variables[_BYTECODE] = str(bytecode)
-        shown_folders.append(bytecode)
 
     def has_begun() -> bool:
         return bool(content(answers, 1))
@@ -142,7 +141,7 @@ def record(
         sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
         started=has_begun,
         cwd=scratch,
-        env=variables,
+        env=environment(backend) | variables,
         writable=folder,
         view=view_of(backend, shown_folders),
         stop=stop,
@@ -169,8 +168,21 @@ def environment(backend: str) -> dict[str, str]:
     if sandbox.shut_in():
         variables["PATH"] = os.defpath
         variables["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
-        variables |= raw_engine_of(DEFAULT).import_environment()  # no backend is without it
     return {**variables, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def _only_for_imports(bytecode: Path | None) -> dict[str, str]:
+    """Return the variables that make a student's process ready sooner; his code is not told them.
+
+    Args:
+        bytecode: The folder of `with_bytecode`; None without one.
+    """
+    if not sandbox.shut_in():
+        return {}
+    variables = raw_engine_of(DEFAULT).import_environment()  # no backend is without it
+    if bytecode is not None:
+        variables = {**variables, _BYTECODE: str(bytecode)}
+    return variables
 
 
 def with_bytecode(backend: str, folder: Path) -> Path | None:
@@ -194,7 +206,7 @@ def with_bytecode(backend: str, folder: Path) -> Path | None:
         done = subprocess.run(
             [sys.executable, "-P", "-c", _PREPARING_PROGRAM, backend, str(_PACKAGES)],
             cwd=scratch,
-            env={**variables, _BYTECODE: str(folder)},
+            env=variables | _only_for_imports(folder),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -59,6 +59,8 @@ def main(job_file: str) -> None:
     from .calls import FaultError, answers_of_file
 
     sys.pycache_prefix = None  # what the student's code imports has its bytecode beside it
+    for name in job["only_for_imports"]:
+        del os.environ[name]
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
     faulthandler.enable(trace)
