@@ -586,7 +586,7 @@ def test_a_function_that_is_written_is_no_more_to_be_done(
 ) -> None:
     monkeypatch.chdir(tmp_path)  # whose name is longer than a line
     text = TEMPLATE.read_text("utf-8")
-    one_written = re.sub("raise NotImplementedError.*", "return 1", text, count=1)
+    one_written = re.sub(r"raise NotImplementedError\(.*", "return 1", text, count=1)
     code, lines = run_file(written(Path("mine.py"), one_written))
     assert (code, sum("TODO(you)" in line for line in lines)) == (0, 3)
 
