@@ -244,9 +244,16 @@ def where(error, file):
     return f"{sys.argv[0]}, line {lines[-1]}: " if lines else ""
 
 
+def about_function(function):
+    """Return the first line about a function, and whether it is still to be written."""
+    words = (function.__doc__ or function.__name__).splitlines()[0].removeprefix("TODO(you): ")
+    todo = "NotImplementedError" in function.__code__.co_names
+    return f"TODO(you): {words}" if todo else words
+
+
 def main(functions):
     """Run the function that the command line names; `functions` has the six by name."""
-    about = {name: (functions[f"demo_{name}"].__doc__ or name).splitlines()[0] for name in SHOWS}
+    about = {name: about_function(functions[f"demo_{name}"]) for name in SHOWS}
     parser = argparse.ArgumentParser(
         description="The step loop, by you: four functions to write, and two to read."
     )

@@ -584,6 +584,16 @@ def test_the_template_says_what_is_to_be_written(run_file: RunFile) -> None:
     assert (code, sum("TODO(you)" in line for line in lines)) == (0, 4)
 
 
+def test_a_function_that_is_written_is_no_more_to_be_done(
+    run_file: RunFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # whose name is longer than a line
+    text = TEMPLATE.read_text("utf-8")
+    one_written = re.sub(r"raise NotImplementedError\(.*", "return 1", text, count=1)
+    code, lines = run_file(written(Path("mine.py"), one_written))
+    assert (code, sum("TODO(you)" in line for line in lines)) == (0, 3)
+
+
 def test_a_function_that_is_to_be_written_is_one_line(run_file: RunFile) -> None:
     code, (line,) = run_file(TEMPLATE, "--gravity")
     assert code == 1

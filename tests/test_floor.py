@@ -378,7 +378,7 @@ def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path
         assert found.whole_run[0].verdict == verdict
         shown_page = page(asked(found, "fall"))
         (code,) = blocks(shown_page, Code)
-        ends = "--timestep 0.0025 --converge" if found.unclear else "--why --quantity 'joint 0'"
+        ends = "--timestep 0.0025 --converge" if found.unclear else "--one-step"
         assert code.lines[0].endswith(ends)
         everything = shown(page(asked(found, "fall"), details=True))
         assert "Commands come" not in everything

@@ -123,6 +123,13 @@ def test_worlds_that_are_apart_fit_into_the_memory_that_is_free(
     assert _many_worlds._limit(4096, 30e6) == (5, 5 * 3 * 30e6)
 
 
+def test_a_row_of_energies_is_in_per_cent_or_in_powers_of_ten() -> None:
+    page = _repage("energy", "mujoco", _on_mujoco("energy"))
+    rows = [row[1:] for table in blocks(page, Table) for row in table.rows]
+    notations = [{"%" in cell for cell in row if cell[0] in "+-"} for row in rows]
+    assert {len(notation) for notation in notations} == {1}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [lesson.name for lesson in PATH])
 def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:

@@ -83,7 +83,7 @@ def test_the_verdict_comes_first_and_the_next_command_last(tmp_path: Path) -> No
     assert not written.holds
     (code,) = blocks(written, Code)
     assert written.blocks[-1] is code
-    assert code.lines == ["statemachine compare hold so101 --why"]
+    assert code.lines == ["statemachine compare hold so101 --one-step --details"]
 
 
 def test_details_have_a_row_for_every_stage(tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_the_verdict_names_no_cause_that_why_contradicts() -> None:
     largest = max(found.differing, key=lambda gap: gap.worst if gap.unit == "N·m" else 0.0)
     assert largest.stage == "passive"
     (code,) = blocks(page_of(found), Code)
-    assert code.lines[0].endswith("--why")
+    assert code.lines[0].endswith("--one-step --details")
 
 
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from statemachine.show.blocks import (
     Items,
     Markdown,
     Page,
+    Printed,
     Question,
     Section,
     Table,
@@ -345,6 +346,12 @@ def test_no_name_and_no_figure_breaks_in_a_narrow_window(width: int) -> None:
 def test_a_table_that_fits_has_a_line_for_each_row() -> None:
     names = [line for line in lines_at(80, HOLDERS) if line.startswith(("gravity", "springs"))]
     assert [line.split("  ")[0] for line in names] == ["gravity (−bias)", "springs, damping"]
+
+
+def test_a_piped_lesson_explains_the_answer_below_what_was_printed() -> None:
+    question = Question("a or b?", ("one", "two"), 1, "So it is.")
+    lines = text_of(Page("t", "o", [question, Printed({"mujoco": "2"}), Text("On.")])).splitlines()
+    assert [line for line in lines if line][-3:] == ["    2", "So it is.", "On."]
 
 
 def test_a_piped_quiz_has_its_choices_and_the_answer() -> None:

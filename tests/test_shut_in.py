@@ -267,6 +267,32 @@ SHUT_IN_ONLY: Attacks = {
 }
 
 
+@pytest.mark.usefixtures("shut_in")
+def test_bytecode_is_made_for_all_processes_where_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.util.cache_from_source", lambda _: str(tmp_path / "none"))
+    folder = recording.with_bytecode("mujoco", tmp_path / "bytecode")
+    assert folder is not None
+    names = {file.name.partition(".")[0] for file in folder.rglob("*.pyc")}
+    assert {"child", "guard", "calls", "mujoco_backend", "numeric"} <= names
+
+
+def test_no_bytecode_is_made_where_python_has_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.util.cache_from_source", lambda _: str(tmp_path))
+    assert recording.with_bytecode("mujoco", tmp_path / "bytecode") is None
+
+
+@pytest.mark.usefixtures("shut_in")
+def test_verdicts_with_bytecode_of_the_class_are_the_same(tmp_path: Path) -> None:
+    with exercise.ExerciseJudge("mujoco") as judge:
+        before = judge.judge(SOLUTION)
+        judge.prepare()
+        assert judge.judge(SOLUTION) == before
+
+
 @pytest.fixture
 def secret(tmp_path: Path) -> Path:
     """Return a file of the teacher's, beside the folder of a class."""

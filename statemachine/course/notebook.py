@@ -36,14 +36,17 @@ from ..show.blocks import (
     Verdict,
 )
 from ..show.html.diagram import figure
+from ..show.labels import TableLabels
 from ..show.pictures import Bars, Diagram, Picture, RobotPicture, Traces
 from ..show.predictions import answer_of, judged
+from ..show.templates import environment
 from ..show.text_blocks import together
 from .lessons import LESSONS, Lesson, check_lesson, module
 from .lessons.pictures import with_picture
 from .lessons.session import fitted, page_of_lesson, take
 from .quiz import lettered
 
+_SAY = TableLabels(__name__, "notebook_labels.md.j2")
 _INSTALL = """\
 # Where the package is not installed, as on Colab: from a wheel that you uploaded beside this
 # notebook, or else from the package index.
@@ -59,21 +62,12 @@ from statemachine.course.notebook import lesson
 
 BACKEND = "mujoco"  # or "pybullet": the only word that changes
 """
-_INTRODUCTION = """\
-# A physics simulator is a state machine that you advance
 
-Ten lessons. Each has a few sentences, a question, and code to run and to change. **Write your
-prediction between the quotes before you run the code.** The cell after it measures the same on
-your engine, now, and says whether you were right.
-"""
-_END = """\
-## Your turn
 
-`exercises/step_loop.py` in this project has four functions for you to write, and
-`statemachine check exercises/step_loop.py` says what they do. In a cell: `!statemachine check ...`
-
-What goes further than a lesson is shown by an option, as in `lesson("gravity", further=True)`.
-"""
+def _said(name: str) -> str:
+    """Return the Markdown of a macro of the notebook's words that takes nothing."""
+    words = environment(__name__).get_template("notebook_labels.md.j2").module
+    return str(getattr(words, name)()).strip()
 
 
 class Shown:
@@ -105,7 +99,7 @@ class Shown:
 def _judgement(question: Question, letter: str) -> str:
     """Say what the run says of a prediction, a letter or ""."""
     if not letter:
-        return f"You made no prediction. The run says: {answer(question)}"
+        return f"{_said('no_prediction')} {answer(question)}"
     return block_as_markdown(judged(question, LETTERS.index(letter)), inline)
 
 
@@ -155,13 +149,13 @@ def _are_choices(letters: str, questions: Sequence[Question]) -> bool:
 def build() -> str:
     """Return the notebook as JSON, without outputs; its questions come from a run on MuJoCo."""
     cells = [
-        _cell("start", "markdown", _INTRODUCTION),
+        _cell("start", "markdown", _said("introduction")),
         _cell("install", "code", _INSTALL),
         _cell("setup", "code", _START),
     ]
     for number, entry in enumerate(LESSONS.values(), start=1):
         cells += _lesson_cells(entry, number)
-    cells.append(_cell("end", "markdown", _END))
+    cells.append(_cell("end", "markdown", _said("end")))
     notebook = {
         "cells": cells,
         "metadata": {
@@ -195,9 +189,9 @@ def _lesson_cells(entry: Lesson, number: int) -> Iterator[dict[str, Any]]:
 def _letters(questions: list[Question]) -> str:
     """Say which letters to choose from, as "a, b or c"."""
     if len(questions) > 1:
-        return "a letter for each question, in their order, like cab…"
+        return _SAY("several_letters")
     *first, last = LETTERS[: len(questions[0].choices)]
-    return f"{', '.join(first)} or {last}"
+    return _SAY("one_letter", first=", ".join(first), last=last)
 
 
 def _page(entry: Lesson, backend: str, options: dict[str, Any]) -> Page:
@@ -333,7 +327,7 @@ def _printed(block: Printed) -> str:
     for names, text in together(block.by_engine):
         printed = text.rstrip()
         if not printed:
-            printed = "(nothing)"
+            printed = _SAY("nothing")
         parts.append(f"{', '.join(names)}:\n\n{_fenced(printed, 'text')}")
     return "\n\n".join(parts)
 
@@ -357,7 +351,7 @@ def _section(block: Section, picture: Callable[[Picture], str]) -> str:
 
 def question_text(block: Question) -> str:
     """Write a question and its choices, without the answer."""
-    text = "" if block.always else "**Before you read on:** "
+    text = "" if block.always else f"{_said('before')} "
     choices = [f"- {_escaped(choice)}" for choice in lettered(block)]
     return "\n".join([f"{text}{_escaped(block.text)}", "", *choices])
 
@@ -367,8 +361,10 @@ def answer(block: Question) -> str:
     return f"{_escaped(capital(answer_of(block)))}. {_escaped(block.because)}"
 
 
-def _folded(inside: list[str], summary: str = "What the run says") -> str:
+def _folded(inside: list[str], summary: str = "") -> str:
+    """Return what opens under a summary; without one, that of an answer."""
     text = "\n\n".join(part for part in inside if part)
+    summary = summary or _said("found")
     return f"<details><summary>{summary}</summary>\n\n{text}\n\n</details>"
 
 

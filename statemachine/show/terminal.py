@@ -58,8 +58,9 @@ def show(page: Page, footer: str = "", reader: Audience | None = None) -> None:
         page: The page.
         footer: The last line.
         reader: Somebody who answers its questions, and is shown a screenful at a time; the
-            rest of the page waits for each answer. Without, questions are left out but
-            those that are for everybody, which stand there with their choices and the answer.
+            rest of the page waits for each answer. Without, what explains the answer of a
+            question stands in its place, and only questions that are for everybody stand there
+            with their choices and the answer.
     """
     printer = Printer(_terminal, reader.read if reader else _print, reader)
     printer.page(page, footer)
@@ -134,10 +135,15 @@ class Printer:
         self._tell(text.removeprefix("\n"))
 
     def ask(self, question: Question) -> None:
-        """Let the reader predict; without one, answer a question that is for everybody."""
-        if self._headings and (self._reader or question.always):
-            self.write(self._headings)
-            self._headings.clear()
+        """Let the reader predict; without one, answer a question that is for everybody.
+
+        Of any other question what explains its answer is kept, until the run has said its part.
+        """
+        if not (self._reader or question.always):
+            self._predicted.append(Text(question.because))
+            return
+        self.write(self._headings)
+        self._headings.clear()
         choice = self._reader.ask(question) if self._reader else None
         if choice is not None:
             from .predictions import judged  # here, for most pages are printed to nobody
@@ -145,8 +151,6 @@ class Printer:
             self._predicted.append(judged(question, choice))
             if not question.undecided:
                 self._answered.append(choice == question.right)
-            return
-        if not (self._reader or question.always):
             return
         from .predictions import answered
 
@@ -166,10 +170,10 @@ class Printer:
         shown = [*self._predicted, block] if explains else [block, *self._predicted]
         self.write([*self._headings, *shown])
         self._headings.clear()
-        if self._reader and self._predicted:
-            self._predicted.clear()
-            if following and not isinstance(following, Question):
-                self._reader.go_on()
+        was_told = bool(self._predicted)
+        self._predicted.clear()
+        if self._reader and was_told and following and not isinstance(following, Question):
+            self._reader.go_on()
 
     def end(self, page: Page, views: Sequence[str], footer: str) -> None:
         """Print the last lines: the score, how to look at the robot, the footer."""

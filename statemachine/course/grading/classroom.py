@@ -24,6 +24,7 @@ from .submissions import EXERCISE_FILES, Submission
 
 _PREDICTIONS = "lesson.json"
 _COUNTED = re.compile(r"\d+ of \d+")  # how what tests catch begins, where they could be run
+_WORTH_PREPARING = 8  # submissions to be judged
 _DIGITS = 8  # of the digest of the software that is shown
 
 
@@ -78,6 +79,8 @@ def judge_all(
             else:
                 work[submission.name] = partial(room.judge_one, submission, entry)
         names = [submission.name for submission in submitted]
+        if len(work) >= _WORTH_PREPARING:
+            judge.prepare()
 
         def kept(judged: Mapping[str, ClassEntry]) -> list[ClassEntry]:
             """Write the table of the entries so far; return these in their order."""

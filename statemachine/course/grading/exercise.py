@@ -45,6 +45,7 @@ from .recording import (
     named_by,
     record,
     refused_links,
+    with_bytecode,
 )
 
 S = TypeVar("S")  # what is right on a world
@@ -174,6 +175,7 @@ class ExerciseJudge(ExitStack):
         self.stop = threading.Event()
         self._lock = threading.Lock()
         self._keys: dict[str, AnswerKey[Any]] = {}
+        self._bytecode: Path | None = None
 
     def __enter__(self) -> Self:
         self.enter_context(unwinding())
@@ -183,6 +185,10 @@ class ExerciseJudge(ExitStack):
         self._folder = Path(name)
         self.callback(self.stop.set)  # called first
         return self
+
+    def prepare(self) -> None:
+        """Make what all students' processes share, which is worth it for a class."""
+        self._bytecode = with_bytecode(self.backend, self._folder / "bytecode")
 
     def judge(
         self,
@@ -229,7 +235,14 @@ class ExerciseJudge(ExitStack):
 
         def record_function(name: str) -> None:
             recordings[name] = record(
-                copy.path, copy.folder, name, self.backend, self.limits, folder / name, stop
+                copy.path,
+                copy.folder,
+                name,
+                self.backend,
+                self.limits,
+                folder / name,
+                stop,
+                self._bytecode,
             )
 
         work: dict[str, Callable[[], None]] = {}

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
 import os
 import re
 import secrets
 import stat
+import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ... import interface
 from ...engines import raw_engine_of
 from ...errors import BadInputError
 from ...installed import DEFAULT
@@ -35,6 +39,11 @@ CHILD_PROGRAM = (
     "import sys; sys.path.insert(0, sys.argv[2]); "
     "from statemachine.course.grading.inside.child import main; main(sys.argv[1])"
 )
+_PREPARING_PROGRAM = (
+    "import sys; sys.path.insert(0, sys.argv[2]); "
+    "from statemachine.course.grading.inside.child import prepare; prepare(sys.argv[1])"
+)
+_BYTECODE = "PYTHONPYCACHEPREFIX"  # where Python keeps it, if not beside the modules
 # What a program needs to start; the rest does not concern a student.
 _KEPT = (
     "SYSTEMROOT", "LANG", "LC_ALL",
@@ -88,6 +97,7 @@ def record(
     limits: TimeLimits,
     folder: Path,
     stop: threading.Event,
+    bytecode: Path | None = None,
 ) -> FunctionRecording:
     """Run a function of a file on its worlds.
 
@@ -99,11 +109,15 @@ def record(
         limits: What it may take.
         folder: A new one for what it writes.
         stop: Ends it.
+        bytecode: The folder of `with_bytecode`, which it reads; None for that of the modules.
     """
     scratch = folder / "scratch"  # where the student's code runs
     scratch.mkdir(parents=True)
     nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
     job = folder / "job"
+    variables, shown_folders = _only_for_imports(bytecode), [student_folder]
+    if bytecode is not None:
+        shown_folders.append(bytecode)
     facts = {
         "file": str(path),
         "student_folder": str(student_folder),
@@ -114,6 +128,7 @@ def record(
         "trace": str(trace),
         "nonce": nonce,
         "alone": not sandbox.shut_in(),
+        "only_for_imports": list(variables),
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
     command = [sys.executable, "-P", "-c", CHILD_PROGRAM, str(job), str(_PACKAGES)]
@@ -126,9 +141,9 @@ def record(
         sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
         started=has_begun,
         cwd=scratch,
-        env=environment(backend),
+        env=environment(backend) | variables,
         writable=folder,
-        view=view_of(backend, [student_folder]),
+        view=view_of(backend, shown_folders),
         stop=stop,
     )
     recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
@@ -153,8 +168,51 @@ def environment(backend: str) -> dict[str, str]:
     if sandbox.shut_in():
         variables["PATH"] = os.defpath
         variables["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
-        variables |= raw_engine_of(DEFAULT).import_environment()  # no backend is without it
     return {**variables, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def _only_for_imports(bytecode: Path | None) -> dict[str, str]:
+    """Return the variables that make a student's process ready sooner; his code is not told them.
+
+    Args:
+        bytecode: The folder of `with_bytecode`; None without one.
+    """
+    if not sandbox.shut_in():
+        return {}
+    variables = raw_engine_of(DEFAULT).import_environment()  # no backend is without it
+    if bytecode is not None:
+        variables = {**variables, _BYTECODE: str(bytecode)}
+    return variables
+
+
+def with_bytecode(backend: str, folder: Path) -> Path | None:
+    """Compile what every student's process imports, once for all of them, and return the folder.
+
+    None where Python has that bytecode, as in most places, and where a student's code is not shut
+    in: it could write there. A system on which Python writes no bytecode, such as many a
+    container, would compile all modules again in every process.
+
+    Args:
+        backend: Of the backend.
+        folder: A new one, which students' processes are shown.
+    """
+    known = Path(importlib.util.cache_from_source(interface.__file__))
+    if known.exists() or not sandbox.shut_in():
+        return None
+    folder.mkdir()
+    variables = environment(backend)
+    del variables["PYTHONDONTWRITEBYTECODE"]
+    with tempfile.TemporaryDirectory() as scratch:
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _PREPARING_PROGRAM, backend, str(_PACKAGES)],
+            cwd=scratch,
+            env=variables | _only_for_imports(folder),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            check=False,
+        )
+    return folder if done.returncode == 0 else None
 
 
 def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,8 @@ _KEPT = 1e-3  # of the energy: less is no change that the question asks for
 _EXACT = 1e-6  # of the energy: an integrator that changes less keeps it
 _ROUNDING = 1e-11  # of the energy: of less no course with the timestep is seen
 _TUMBLING = "tumbling"
+_IN_PERCENT = 1e-4  # of the energy: a row with less in all columns is shown as powers of ten
+_DECIMALS_MOST = 6
 _EVERY = 20  # of the moments is drawn
 
 
@@ -162,7 +165,7 @@ def _bodies(results: Results[EnergyResult]) -> Table:
     for name, result in results.items():
         by_body = [result.of_body(body.name) for body in BODIES]
         for of_integrator in zip(*by_body, strict=True):
-            cells = [_change(row, row.longest) for row in of_integrator]
+            cells = _changes([row.longest if row.is_supported else None for row in of_integrator])
             lines.append([f"{where(results, name)}{of_integrator[0].integrator}", *cells])
     return Table(headers, lines)
 
@@ -174,7 +177,7 @@ def _course(results: Results[EnergyResult]) -> Table:
     headers = [_SAY("integrator"), *(_SAY("until", seconds=f"{time:g}") for time in times)]
     lines: list[list[str]] = []
     for name, row in _named_rows(results):
-        lines.append([name, *(_change(row, row.until(time)) for time in times)])
+        lines.append([name, *_changes([row.until(time) for time in times])])
     return Table(headers, lines)
 
 
@@ -185,18 +188,34 @@ def _timesteps(results: Results[EnergyResult]) -> Table:
     lines: list[list[str]] = []
     for name, row in _named_rows(results):
         order = NO_NUMBER if row.order is None else f"{row.order:.1f}"
-        cells = [_change(row, change) for change in row.by_timestep.tolist()]
-        lines.append([name, *cells, order])
+        lines.append([name, *_changes(row.by_timestep.tolist()), order])
     return Table((_SAY("integrator"), *steps, _SAY("order")), lines)
 
 
-def _change(row: EnergyChange, change: float) -> str:
-    """Return a relative change as it is read; what it is without the integrator."""
-    if not row.is_supported:
-        return _SAY("unsupported")
-    if abs(change) < 1e-4:
-        return f"{change:+.0e}"
-    return f"{change:+.2%}"
+def _changes(changes: Sequence[float | None]) -> list[str]:
+    """Return the relative changes of a row, all in per cent or all as powers of ten.
+
+    Args:
+        changes: In each column; None where the engine lacks the integrator.
+    """
+    largest = max((abs(change) for change in changes if change is not None), default=0.0)
+    texts: list[str] = []
+    for change in changes:
+        if change is None:
+            texts.append(_SAY("unsupported"))
+        elif largest < _IN_PERCENT:
+            texts.append(f"{change:+.0e}")
+        else:
+            texts.append(f"{change:+.{_decimals(change)}%}")
+    return texts
+
+
+def _decimals(change: float) -> int:
+    """Return how many decimals of a per cent show a digit of a change: two, or more if needed."""
+    percent = 100.0 * abs(change)
+    if percent == 0:
+        return 2
+    return min(max(2, -math.floor(math.log10(percent))), _DECIMALS_MOST)
 
 
 def _curves(results: Results[EnergyResult]) -> list[Block]:

@@ -61,9 +61,14 @@ class GravityPage(PageContent):
         return float(self.result.servos_on.time[-1])
 
     @property
+    def held_at(self) -> float:
+        """Return where the joint is at the end with the servos on [rad or m]."""
+        return float(self.result.servos_on.position[-1])
+
+    @property
     def right(self) -> int:
         """Return the number of the right choice: fallen, exactly at zero, or sagged."""
-        sagged = abs(float(self.result.servos_on.position[-1]))
+        sagged = abs(self.held_at)
         if sagged >= np.radians(1):
             return 0
         return 1 if sagged == 0 else 2

@@ -12,6 +12,7 @@ from ...show.templates import PageContent, render_blocks
 from ..compare import Agreement, Comparison
 from ..compare.instead import Instead
 from ..compare.motion import MotionExtent
+from ..compare.series import SETTLED
 from ..runs.floating import Bases
 from .compared_names import name_of, noun_phrase, short_labels, shortened
 from .finding import Divergence, EarlyEnd, Finding
@@ -58,6 +59,11 @@ class DifferVerdict(_Verdict, PageContent):
     """The runs differ."""
 
     template = "compare_differ.md.j2"
+
+    @property
+    def window(self) -> float:
+        """Return the time at the end over which the final figures are a mean [s]."""
+        return SETTLED * self.comparison.until
 
     @property
     def bodies(self) -> str:

@@ -25,7 +25,9 @@ _WORST_FIRST = ("stays", "in part", "unclear", "discretisation")
 _FINER_BY = 4  # than the steps as given, where those are too coarse
 _OTHER_EXPERIMENT = "waves"  # moves whatever has an actuator
 
-NextStep = Literal["why", "same period", "smaller steps", "finer", "another experiment", "nothing"]
+NextStep = Literal[
+    "one step", "same period", "smaller steps", "finer", "another experiment", "nothing"
+]
 
 
 @dataclass(frozen=True)
@@ -267,7 +269,7 @@ def _next_step(limits: Convergence, run: Request, periods: CallPeriods | None) -
             return "finer"
         case "unclear" if limits.touch is None:
             return "smaller steps"
-    return "why"
+    return "one step"
 
 
 def _next_command(
@@ -279,10 +281,8 @@ def _next_command(
     match next_step:
         case "same period":
             return typed_command(run).lines("--converge")
-        case "why" if QUANTITIES[limits.lead.kind].is_coordinate:
-            return typed_command(run).lines("--why", "--quantity", name_of(limits.lead.name))
-        case "why":
-            return typed_command(run).lines("--why")
+        case "one step":  # not --why, which leads here
+            return typed_command(run).lines("--one-step")
         case "smaller steps":
             return typed_command(_with_finer_steps(run, limits.steps)).lines("--converge")
         case "finer":

@@ -26,7 +26,7 @@ class OneStepPage(PageContent):
         steps: The gap of each stage.
         worst: Table of the first stages that differ.
         more: How many stages differ that it does not show.
-        next_command: What to type next.
+        next_command: What to type next; "" for nothing.
         details: Whether everything is shown.
     """
 
@@ -129,7 +129,8 @@ def _page(result: OneStepResult, worst: Sequence[StageGap], details: bool = Fals
     """Return the page with some of the stages that differ; with details a table has all of them."""
     run = result.request.run
     left, right = run.labels
-    question: tuple[str, ...] = () if result.first is None else ("--why",)
+    # Not --why, which leads here.
+    next_command = "" if details else typed_command(run).lines("--one-step", "--details")
     more = 0 if details else len(result.differing) - len(worst)
     content = OneStepPage(
         experiment=run.experiment,
@@ -138,7 +139,7 @@ def _page(result: OneStepResult, worst: Sequence[StageGap], details: bool = Fals
         steps=result,
         worst=_worst_table(worst),
         more=more,
-        next_command=typed_command(run).lines(*question),
+        next_command=next_command,
         details=details,
     )
     return with_answer(render(content))

@@ -349,10 +349,12 @@ def _costs(row: CaseResult) -> list[str]:
 
 
 def _next_command(result: ValidateResult, details: bool) -> str:
-    """Return what to type next, with what was asked for: its details, or with them its JSON.
+    """Return how to see the details of what was asked for; "" where they are shown.
 
-    Where no case is named it is of the worst.
+    Where no case is named they are those of the worst.
     """
+    if details:
+        return ""
     request = result.request
     worst = max(result.results, key=badness)
     words = [NAME, "validate"]
@@ -363,7 +365,7 @@ def _next_command(result: ValidateResult, details: bool) -> str:
         words += ["--case", case]
     for timestep in request.timesteps:
         words += ["--timestep", repr(timestep)]
-    words.append("--json" if details else "--details")
+    words.append("--details")
     return command(words, ("--jobs", request.jobs, None))
 
 

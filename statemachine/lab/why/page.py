@@ -126,6 +126,11 @@ class WhyPage(PageContent):
         return engine_as_it_comes(self.result)
 
     @property
+    def places(self) -> list[str]:
+        """Return what the rest of the gap is found in."""
+        return [place.name for place in self.result.found_in]
+
+    @property
     def rewritten(self) -> Sequence[Block]:
         """Return what was written of the right's file; empty where that was not asked."""
         if self.result.rewritten is None:

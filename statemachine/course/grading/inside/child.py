@@ -9,6 +9,7 @@ number out can write what he likes: it is judged elsewhere, as what anybody migh
 from __future__ import annotations
 
 import faulthandler
+import importlib
 import json
 import os
 import sys
@@ -17,10 +18,18 @@ from typing import Any
 
 from ....errors import one_line
 from .guard import Guard
-from .worlds import Scenes, worlds_of
+from .worlds import FUNCTIONS, Scenes, worlds_of
 
 _LONGEST = 8_000_000  # characters of a line
 _TOO_MUCH = {"text": "it returns more than can be looked at", "written": True}
+
+
+def prepare(backend: str) -> None:
+    """Import all that `main` imports before it runs a student's code; that is compiled then."""
+    for function in FUNCTIONS:
+        worlds_of(function, Scenes(backend, Path.cwd()))
+    importlib.import_module(".calls", __package__)
+    importlib.import_module("....processes.sandbox", __package__)
 
 
 def main(job_file: str) -> None:
@@ -49,6 +58,9 @@ def main(job_file: str) -> None:
     from ....processes.sandbox import limit_cpu
     from .calls import FaultError, answers_of_file
 
+    sys.pycache_prefix = None  # what the student's code imports has its bytecode beside it
+    for name in job["only_for_imports"]:
+        del os.environ[name]
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
     faulthandler.enable(trace)
