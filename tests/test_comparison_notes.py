@@ -268,6 +268,7 @@ def test_the_worst_is_looked_for_among_what_is_beyond() -> None:
     assert measure(gaps).worst == (0, 1)
     masked = measure(gaps, null=np.array([[0, 9.0, 0], [0, 0, 0]]))
     assert masked.worst == (1, 0)
+    assert measure([[0.6, 0.1, 0.2], [0.7, 9.0, 0.2]]).worst == (1, 1)
     assert measure([[0.1, 0.2, 0.05]]).worst == (0, 1)  # nothing is beyond: of all
 
 
