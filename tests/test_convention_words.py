@@ -187,8 +187,9 @@ def test_a_reading_is_fresh_that_is_right_before_it_is_recomputed(
 ) -> None:
     true = (1.0, 2.0, 3.0)
     first, second = ((1.0 + 0.6 * size, 2.0, 3.0 - 0.8 * size) for size in (read, recomputed))
+    reading: ReadTwice = ("the tip", np.array(first), np.array(second), true)
     for question in (answers.write, answers.step):
-        (found,) = question.answer([ReadTwice("the tip", first, second, true)])
+        (found,) = question.answer([reading])
         assert (found.answer, found.of) == (word, "the tip")
         assert figures(found) == {
             "off by": pytest.approx(read),

@@ -268,7 +268,9 @@ class Effects:
         # The first one's frame as the second one would have it, in the second one's own.
         off = pair.right.place.inverse @ above.align @ pair.left.place @ pair.align.inverse
         far = max(float(np.linalg.norm(off.of(tip) - tip)) for tip in self._tips(pair))
-        effect = f"moves what it carries by up to {rounded(far, 'm')}" if far else ""
+        effect = ""
+        if far > _ON_ITS_AXIS:
+            effect = f"moves what it carries by up to {rounded(far, 'm')}"
         joint = pair.right.joint
         if joint is not None and joint.kind in SCALAR and _is_about(off, joint):
             effect = f"only its zero is elsewhere: {effect}" if effect else "its zero is elsewhere"
