@@ -499,6 +499,42 @@ def test_the_commands_before_the_start_are_that_of_the_start(tmp_path: Path) -> 
     assert np.abs(history).sum() == 3 * (1 + 3) + 2 * (2 + 4)
 
 
+@pytest.mark.parametrize(
+    ("counts", "places"), [([2, 0], range(6)), ([0, 3], range(10, 18)), ([0, 0], range(0))]
+)
+def test_the_buffers_of_a_world_lie_in_those_that_all_share(
+    tmp_path: Path, counts: list[int], places: range
+) -> None:
+    """Each has two numbers of its own, and a time and a command for each that is kept."""
+    before = driven(tmp_path, '<motor joint="j"/>', '<motor joint="k"/>')
+    shared = delays.with_room(before, np.array([4, 3]))
+    assert shared.actuator_historyadr.tolist() == [0, 10]
+    assert shared.nhistory == 18
+    own = delays.with_room_of(shared, before, np.array(counts))
+    assert own.actuator_history[:, 0].tolist() == counts
+    assert own.nhistory == len(places)
+    assert delays.places_of(before, shared, np.array(counts)).tolist() == list(places)
+
+
+def test_a_model_with_room_enough_stays(tmp_path: Path) -> None:
+    raw = driven(tmp_path, '<motor joint="j" delay=".03" nsample="20"/>', '<motor joint="k"/>')
+    assert delays.with_room(raw) is raw
+    assert delays.with_room(raw, np.array([20, 0])) is raw
+    more = delays.with_room(raw, np.array([21, 0]))
+    assert (more.actuator_history[0, 0], raw.actuator_history[0, 0]) == (21, 20)
+    assert more.nhistory == raw.nhistory + 2 + 21 * 2
+
+
+def test_the_commands_of_each_world_are_held_in_its_own_buffer(tmp_path: Path) -> None:
+    before = driven(tmp_path, '<motor joint="j"/>', '<motor joint="k"/>')
+    shared = delays.with_room(before, np.array([2, 1]))
+    history = np.zeros((2, shared.nhistory))
+    ctrl = np.array([[1.0, 2.0], [3.0, 4.0]])
+    delays.hold(shared, history, ctrl, np.array([[2, 1], [1, 0]]))
+    assert history[0].tolist() == [0, 0, 0, 0, 1, 1, 0, 0, 0, 2]
+    assert history[1].tolist() == [0, 0, 0, 3, 0, 0, 0, 0, 0, 0]
+
+
 # Options in a compiled model.
 
 SERVO = '<position joint="j" kp="3" kv=".5"/>'
