@@ -231,7 +231,7 @@ THREE = (
 
 
 def test_products_of_frictions_are_those_of_the_pairs(tmp_path: Path) -> None:
-    raw = raw_of(tmp_path, THREE.format(".2 .01 .001", ".4 .02 .002", ".4 .02 .002"))
+    raw = raw_of(tmp_path, THREE.format(".2 .01 .001", ".4 .02 .002", ".8 .03 .002"))
     surfaces = Surfaces(raw)
     assert [solid.geoms for solid in surfaces.solids] == [(0,), (1,), (2,)]
     assert [solid.plane for solid in surfaces.solids] == [True, False, False]

@@ -121,6 +121,7 @@ def test_sensors_in_another_order_are_put_into_it(tmp_path: Path) -> None:
     left = compiled(tmp_path / "left.xml")
     assert [raw.sensor(k).name for k in range(3)] == ["p", "f", "v"]
     assert [raw.sensor(name).id for name in ("p", "f", "v")] == [0, 1, 2]
+    assert [raw.joint("j").id, raw.site("t").id, raw.body("b").id] == [0, 1, 1]
     for name in ("sensor_adr", "sensor_dim", "sensor_type", "sensor_objid"):
         assert getattr(raw, name).tolist() == getattr(left, name).tolist()
 
