@@ -1,4 +1,4 @@
-"""What two files differ in that no engine uses, as keyframes and sensors; and where bodies start."""
+"""What no engine uses of two files, as keyframes and sensors; and where bodies start."""
 
 from __future__ import annotations
 
