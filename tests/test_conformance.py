@@ -52,7 +52,12 @@ def lab(request: pytest.FixtureRequest) -> Iterator[conformance.Lab]:
 def test_a_backend_keeps_what_the_contract_asks(lab: conformance.Lab, check: str) -> None:
     if "witness" in check:
         need_engine("pinocchio")
-    conformance.CHECKS[check](lab)
+    try:
+        conformance.CHECKS[check](lab)
+    except UnsupportedError as error:  # of a force that MotrixSim does not tell
+        if not lab.lacks(error.feature):
+            raise
+        pytest.skip(str(error))
 
 
 def test_a_backend_that_refuses_everything_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:

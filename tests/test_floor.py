@@ -17,7 +17,7 @@ from statemachine.lab.compare import Uncertainty, chaos_floor, compare, perturbe
 from statemachine.lab.compare.chaos import Band
 from statemachine.lab.compare.convergence import Convergence, convergence, verdict_of
 from statemachine.lab.compare.matching import match_models
-from statemachine.lab.compare.perturbed import ROUNDING, RUNS, parse_uncertainty
+from statemachine.lab.compare.perturbed import RUNS, parse_uncertainty
 from statemachine.lab.compare.sides import Request
 from statemachine.lab.questions.convergence import page
 from statemachine.lab.questions.finding import finding_of, leading
@@ -54,8 +54,9 @@ def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> Band
 
 
 def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) -> None:
-    band = band_of(rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([0.3])), "swing")
-    assert 0 < band.most < 5 * ROUNDING
+    run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([0.3]))
+    band = band_of(run, "swing")
+    assert 0 < band.most < 5 * run.model.capabilities.rounding
     assert band.end < band.most
 
 
@@ -238,7 +239,7 @@ def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
     run = Rerun(sm.load("so101"), lambda _: lambda _model, data: None, 0.1)
     for trace in perturbed_runs(run, runs=1, derive=False):
         assert (trace.ctrl == trace.ctrl[0]).all()
-        assert 0 < np.abs(trace.ctrl[0]).max() <= ROUNDING
+        assert 0 < np.abs(trace.ctrl[0]).max() <= run.model.capabilities.rounding
 
 
 def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:

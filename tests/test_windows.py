@@ -27,6 +27,8 @@ PACKAGE = ROOT / "statemachine"
 GUARDED = {
     ("backends/bullet/client.py", "memfd_create"),
     ("backends/hidden_world.py", "register_at_fork"),
+    ("backends/motrix/links.py", "register_at_fork"),
+    ("processes/stderr_capture.py", "register_at_fork"),
     ("interface/exclusive_access.py", "register_at_fork"),
     ("backends/served/child_server.py", "poll"),
     ("processes/__init__.py", "resource"),  # there is no /proc

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...engines import raw_engine_of
 from ...errors import BadInputError, EngineError, TraceError
-from ...interface import Array, Ints
+from ...interface import Array, Ints, Model
 from ...measures import QUANTITIES, common_moments, with_left_pair_names
 from ...processes.parallel import forks_for, in_forks
 from ..recordings import Rerun, Trace
@@ -27,7 +27,7 @@ from ..runs.drive import Progress, no_progress
 from . import perturbed
 from .agreement import Agreement, Comparison
 from .outcomes import outcomes_of
-from .perturbed import EXACT, ROUNDING, Uncertainty, perturbed_run
+from .perturbed import EXACT, Uncertainty, perturbed_run
 from .series import NORMAL, at_the_end, series, touches
 
 CLEAR = 3.0  # times the floor: a larger gap is more than chance
@@ -93,7 +93,8 @@ class ChaosFloor:
         runs: How many perturbed runs were made of each side.
         sides: The sides that were run again: 0 the left, 1 the right. A recorded run cannot be.
         seed: Of what was drawn.
-        rounding: What starts and commands were changed by, relative.
+        rounding: What starts and commands were changed by, relative; on the side that is less
+            exact.
         uncertain: What the start is uncertain by besides.
         ended: How many of the runs ended early; from then on the band has no bound.
         bands: One for each quantity that is compared.
@@ -182,7 +183,7 @@ def chaos_floor(
         runs=runs,
         sides=sides,
         seed=seed,
-        rounding=ROUNDING,
+        rounding=max(model.capabilities.rounding for model in _models_of(reruns)),
         uncertain=uncertain,
         ended=ended,
         bands=tuple(bands),
@@ -240,8 +241,8 @@ def _departures(
     # A function of the user's may keep something from one run to the next.
     if jobs is None and any(rerun is not None and rerun.writes_state for rerun in reruns):
         jobs = 1
-    models = [rerun.model for rerun in reruns if rerun is not None]
-    can_fork = all(raw_engine_of(model.backend).survives_fork for model in models)
+    engines = {model.backend for model in _models_of(reruns)}
+    can_fork = all(raw_engine_of(engine).survives_fork for engine in engines)
     forks = forks_for(len(rest), seconds, jobs, can_fork)
     if forks > 1:
         for departure in in_forks(rest, forks, ran, seconds):
@@ -253,6 +254,11 @@ def _departures(
         departure = call()
         yield departure
         ran(number, departure)
+
+
+def _models_of(reruns: Sequence[Rerun | None]) -> list[Model]:
+    """Return the Models of the sides that were run here."""
+    return [rerun.model for rerun in reruns if rerun is not None]
 
 
 def _departure(

@@ -18,7 +18,6 @@ from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.scenarios import Controller
 
 RUNS = 8  # of each side
-ROUNDING = 1e-12  # of a value, or of 1 where it is less; some thousand times that of a float64
 
 
 @dataclass(frozen=True)
@@ -66,9 +65,9 @@ def perturbed_runs(
 ) -> Iterator[Trace]:
     """Repeat the run with starts and commands that differ by rounding, and yield the traces.
 
-    Positions, velocities and commands change by at most 1e-12 of themselves (of 1 where they
-    are less), drawn anew for each run and each command. A quaternion is turned by such an
-    angle, and stays one. Where the start is uncertain by more, each coordinate of it is
+    Positions, velocities and commands change by at most `Capabilities.rounding` of themselves (of
+    1 where they are less), drawn anew for each run and each command. A quaternion is turned by such
+    an angle, and stays one. Where the start is uncertain by more, each coordinate of it is
     displaced by all of that, to a side that is drawn, and in the next run to the other side:
     the corners of what is possible.
 
@@ -117,7 +116,7 @@ def perturbed_run(
         return side * float(corner.choice((-1.0, 1.0)))
 
     qpos = displaced(rerun.model, qpos, uncertain, corner, along, far=lambda: side)
-    controller = nudged_controller(rerun.controller(rerun.model), draw)
+    controller = nudged_controller(rerun.model, rerun.controller(rerun.model), draw)
     qpos, qvel = nudged_start(rerun.model, qpos, qvel, draw)
     # What an engine warns of, and what is wrong with the start, is told of the run itself.
     with warnings.catch_warnings(action="ignore", category=EngineWarning):
@@ -169,11 +168,12 @@ def nudged_start(
 
     What belongs to a body that sleeps from the start stays as it is: any change wakes the body.
     """
-    nudged = _nudged(qpos, draw)
+    rounding = model.capabilities.rounding
+    nudged = _nudged(qpos, draw, rounding)
     for _, place in model._quaternions:
         nudged[place : place + 4] = qpos[place : place + 4]
-        turn(nudged[place : place + 4], ROUNDING * direction(draw))
-    velocities = _nudged(qvel, draw)
+        turn(nudged[place : place + 4], rounding * direction(draw))
+    velocities = _nudged(qvel, draw, rounding)
     asleep = asleep_from_the_start(model)
     velocities[asleep] = qvel[asleep]
     for joint in np.flatnonzero(asleep[model.jnt_dofadr]):
@@ -198,21 +198,29 @@ def direction(draw: np.random.Generator) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def _nudged(values: Array, draw: np.random.Generator) -> Array:
-    """Return values (n,) changed by rounding; what is not finite stays."""
+def _nudged(values: Array, draw: np.random.Generator, rounding: float) -> Array:
+    """Return values (n,) changed by rounding, relative; what is not finite stays."""
     finite = np.where(np.isfinite(values), values, 0.0)
-    return values + ROUNDING * np.maximum(1.0, np.abs(finite)) * draw.uniform(-1, 1, len(values))
+    return values + rounding * np.maximum(1.0, np.abs(finite)) * draw.uniform(-1, 1, len(values))
 
 
-def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
+def nudged_controller(
+    of: Model, controller: Controller | None, draw: np.random.Generator
+) -> Controller:
     """Return a controller whose commands differ by rounding from those of another one.
 
     Where a controller gives no command, the ctrl of the start is nudged once, and stays.
+
+    Args:
+        of: The Model that it commands.
+        controller: The other one.
+        draw: Of the differences.
     """
+    rounding = of.capabilities.rounding
 
     def nudging(model: Model, data: Data) -> Array | None:
         ctrl = None if controller is None else controller(model, data)
-        return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw)
+        return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw, rounding)
 
     # Once: a ctrl that stays as it is must not wander.
-    return with_first_ctrl(lambda data: _nudged(data.ctrl, draw), nudging)
+    return with_first_ctrl(lambda data: _nudged(data.ctrl, draw, rounding), nudging)

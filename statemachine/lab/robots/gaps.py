@@ -64,7 +64,7 @@ def run(model: Model, orders: Array, nudge: np.random.Generator | None = None) -
         reset(model, data, keyframe_of(model))
         if nudge is not None:
             data.qpos[:], data.qvel[:] = nudged_start(model, data.qpos, data.qvel, nudge)
-            controller = nudged_controller(controller, nudge)
+            controller = nudged_controller(model, controller, nudge)
         try:
             for _ in drive(model, data, controller, len(orders)):
                 rows.append(np.concatenate((data.qpos, data.qvel)))

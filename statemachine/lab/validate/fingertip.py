@@ -24,7 +24,7 @@ from ..runs.drive import Progress, no_progress
 from ..runs.provenance import provenance
 from ..runs.readings import Tip, tips_of
 from .fingertip_poses import checked_poses, engine_poses, random_qpos, relative
-from .fingertip_result import SAME_FRAME, TOLERANCE, FingertipResult, FrameOffset, TipGap
+from .fingertip_result import SAME_FRAME, FingertipResult, FrameOffset, TipGap
 from .witness_parts import WitnessFrame, WitnessParts
 from .witness_places import witness_parts
 
@@ -89,7 +89,7 @@ def certify(
         relative_to=parts.relative_to,
         renamed_joints=renamed_joints,
         poses=wanted,
-        tolerance=TOLERANCE,
+        tolerance=model.capabilities.rounding,
         witness_file=asked.file,
         grade=known.grade,
         reason=asked.reason,
@@ -219,6 +219,7 @@ def _gaps(asked: _Witness, configurations: Array, progress: Progress) -> list[Ti
             body=bodies[tip.body],
             frames=frame.offset,
             default_pose=default_pose,
+            tolerance=parts.model.capabilities.rounding,
         )
         gaps.append(_with_differences(gap, places, theirs))
     return gaps

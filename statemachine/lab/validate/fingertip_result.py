@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -59,6 +59,7 @@ class TipGap:
         position_median: Median difference in position [m].
         rotation_worst: Largest entry of the difference of the rotation matrices, over all poses.
         rotation_median: Median over the poses of the largest entry.
+        tolerance: Up to which both worst differences are none [m, and 1].
     """
 
     site: str
@@ -71,6 +72,7 @@ class TipGap:
     position_median: float | None = None
     rotation_worst: float | None = None
     rotation_median: float | None = None
+    tolerance: float = field(default=TOLERANCE, metadata={"json": False})
 
     @property
     def worst(self) -> float:
@@ -82,7 +84,7 @@ class TipGap:
     @property
     def agrees(self) -> bool:
         """Tell whether both worst differences are within the tolerance."""
-        return self.worst <= TOLERANCE
+        return self.worst <= self.tolerance
 
 
 @dataclass(frozen=True)
