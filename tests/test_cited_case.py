@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
+from unittest.mock import Mock
 
 import mujoco
 import numpy as np
@@ -374,6 +375,17 @@ def test_of_a_limited_servo_the_installed_release_is_nearer(old_releases: None) 
     assert cited.left.size == pytest.approx(0.0033, rel=0.1)
     assert cited.right.size < 1e-9
     _check_first_screen(result)
+
+
+def test_how_a_side_steps_is_found_once_for_all_cases(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thrown body does not tell these integrators apart; one that tumbles does."""
+    finding = Mock(side_effect=variants_of)
+    monkeypatch.setattr(case_of_cause, "variants_of", finding)
+    sides = _tumbling(tmp_path, "Euler", "implicitfast", centre=0.3)
+    _explained(_asked(sides))
+    assert finding.call_count == len(sides)
 
 
 def test_an_interrupt_while_the_case_is_checked_keeps_the_answer(

@@ -63,7 +63,7 @@ def divided(left: Model, right: Model, what: str = "hold", **asked: Any) -> tupl
     trials = Trials(request, match(left, right), Deadline(None))
     causes, first = trials.setup.causes(finer=False), trials.gaps(NONE)
     gap = explained_gap(trials, request, request.quantity, first)
-    return split_of(trials, request, gap, causes), gap.size
+    return split_of(trials, gap, causes), gap.size
 
 
 def parts(split: GapSplit | None) -> dict[str, Any]:

@@ -9,7 +9,7 @@ the case cited.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ...backends import BackendChoice
 from ...engines import raw_engine_of
@@ -35,6 +35,21 @@ _PERIOD = 0.1  # [s]
 _VANISHING: tuple[DecidedCause, ...] = ("integrator", "offset centre of mass")
 
 
+@dataclass(frozen=True, eq=False)
+class _JudgedSide:
+    """A side, and how it runs cases.
+
+    Attributes:
+        model: Its Model, with what both sides were run with.
+        variant: How it steps.
+        cone: Its friction cone, where that is the cause; else "".
+    """
+
+    model: Model
+    variant: Variant
+    cone: str
+
+
 def with_cited_case(result: Explanation, question: WhyRequest) -> Explanation:
     """Return an explanation with the case that decides its cause, where there is one.
 
@@ -42,11 +57,37 @@ def with_cited_case(result: Explanation, question: WhyRequest) -> Explanation:
         result: What the gap comes from.
         question: Whose sides run the case.
     """
-    for row in deciding_cases(result, question):
-        cited = _cited(row, question, cones_of(result))
+    rows = deciding_cases(result, question)
+    sides = _judged_sides(question, cones_of(result)) if rows else None
+    if sides is None:
+        return result
+    for row in rows:
+        cited = _cited(row, *sides)
         if cited is not None:
             return _checked(result, cited, question)
     return result
+
+
+def _judged_sides(
+    question: WhyRequest, cones: tuple[str, str]
+) -> tuple[_JudgedSide, _JudgedSide] | None:
+    """Return how each side runs cases; None where one steps in no way that the battery knows.
+
+    Args:
+        question: Whose sides they are.
+        cones: The friction cones of both sides.
+    """
+    judged: list[_JudgedSide] = []
+    for model, cone in zip((question.left, question.right), cones, strict=True):
+        try:
+            as_run = _as_run(model, question)
+            variant = variant_of(as_run)
+        except StateMachineError:  # its engine does not run
+            return None
+        if variant is None:
+            return None
+        judged.append(_JudgedSide(as_run, variant, cone))
+    return judged[0], judged[1]
 
 
 def _checked(result: Explanation, cited: CitedCase, question: WhyRequest) -> Explanation:
@@ -67,11 +108,10 @@ def _are_two_laws(cited: CitedCase, in_run: ErrorsInRun | None) -> bool:
     return cited.cause not in _VANISHING and in_run is not None and not in_run.converges
 
 
-def _cited(row: DecidingCase, question: WhyRequest, cones: tuple[str, str]) -> CitedCase | None:
+def _cited(row: DecidingCase, left_side: _JudgedSide, right_side: _JudgedSide) -> CitedCase | None:
     """Return what both sides give in a case; None where they give the same, or one refuses it."""
     try:
-        left = side_in_case(row, _as_run(question.left, question), cones[0])
-        right = side_in_case(row, _as_run(question.right, question), cones[1])
+        left, right = _side_in_case(row, left_side), _side_in_case(row, right_side)
     except StateMachineError:  # a side does not take the case: it decides nothing
         return None
     if left is None or right is None:
@@ -99,28 +139,23 @@ def _as_run(model: Model, question: WhyRequest) -> Model:
     return model.replace(**options) if options else model
 
 
-def side_in_case(row: DecidingCase, model: Model, cone: str = "") -> SideInCase | None:
-    """Run a case as a side runs; None where the side steps in no way that the battery knows.
-
-    Args:
-        row: Which case.
-        model: Of the side.
-        cone: The friction cone of the side, where that is the cause; else "".
+def _side_in_case(row: DecidingCase, side: _JudgedSide) -> SideInCase | None:
+    """Run a case as a side runs; None where there is none for its cone.
 
     Raises:
         StateMachineError: The side does not take the case.
     """
-    name = row.case_for(cone)
-    variant = variant_of(model)
-    if name is None or variant is None:
+    name = row.case_for(side.cone)
+    if name is None:
         return None
+    model, variant = side.model, side.variant
     case = CASES[name]
     own_timestep = model.timestep / model.substeps
     timestep = timestep_of_case(own_timestep)
     measurement = measure(case, variant, timestep)
     return SideInCase(
         case=name,
-        setting=_setting(row, model, variant, cone),
+        setting=_setting(row, side),
         backend=str(variant.backend),
         integrator=variant.integrator,
         timestep=timestep,
@@ -147,15 +182,15 @@ def timestep_of_case(own_timestep: float) -> float:
     return _PERIOD / steps
 
 
-def _setting(row: DecidingCase, model: Model, variant: Variant, cone: str) -> str:
+def _setting(row: DecidingCase, side: _JudgedSide) -> str:
     """Return what a side has of a cause."""
     if row.cause == "cone":
-        return cone
+        return side.cone
     if row.cause == "release":
-        return model.engine_version
-    if row.cause == "integrator" and variant.integrator != OWN:
-        return variant.integrator
-    return str(variant.backend)
+        return side.model.engine_version
+    if row.cause == "integrator" and side.variant.integrator != OWN:
+        return side.variant.integrator
+    return str(side.variant.backend)
 
 
 def variant_of(model: Model) -> Variant | None:

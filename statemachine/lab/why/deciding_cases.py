@@ -7,7 +7,7 @@ in `lab/validate`, whose truth is known: there each side can be held against it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -57,6 +57,12 @@ class DecidingCase:
         return self.cases.get(setting, self.cases.get(""))
 
 
+_THROWN_OFF_CENTRE = DecidingCase(
+    "offset centre of mass",
+    "free body off its centre of mass",
+    {"": "thrown-off-centre"},
+    "a thrown body's centre of mass moves on a straight line, seen from above",
+)
 # Of a cause the first case counts whose part the robot has, and in which the sides' errors differ.
 # A robot that swings is judged by a spring before it is by a servo, and by that before a pendulum.
 DECIDING_CASES: tuple[DecidingCase, ...] = (
@@ -66,18 +72,8 @@ DECIDING_CASES: tuple[DecidingCase, ...] = (
         {"elliptic": "block-slides-diagonal", "pyramidal": "block-slides-diagonal-pyramidal"},
         "the cone sets how much friction acts along the diagonal of the contact frame",
     ),
-    DecidingCase(
-        "offset centre of mass",
-        "free body off its centre of mass",
-        {"": "thrown-off-centre"},
-        "a thrown body's centre of mass moves on a straight line, seen from above",
-    ),
-    DecidingCase(
-        "integrator",
-        "free body off its centre of mass",
-        {"": "thrown-off-centre"},
-        "a thrown body's centre of mass moves on a straight line, seen from above",
-    ),
+    _THROWN_OFF_CENTRE,
+    replace(_THROWN_OFF_CENTRE, cause="integrator"),
     DecidingCase(
         "integrator",
         "free or ball joint",

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...backends import load_to_run, on_default
 from ...engines import raw_engine_of
-from ...errors import BadInputError, UnsupportedError
+from ...errors import BadInputError, StateMachineError, UnsupportedError
 from ...interface import Model
 from ...release_names import engine_of
 
@@ -14,6 +14,18 @@ from ...release_names import engine_of
 def reader_of(model: Model) -> str:
     """Return what reads the file of a Model, with its version: "mujoco 4.0.0"."""
     return raw_engine_of(engine_of(model.backend)).reader(model)
+
+
+def are_compiled_as_read(model: Model) -> bool:
+    """Tell whether the compiled model of a Model has the figures that its reader made of the file.
+
+    Of other figures the causes of a gap, which are of compiled models, tell nothing.
+    """
+    try:
+        figures = raw_engine_of(engine_of(model.backend)).figures_as_read(model)
+    except StateMachineError:
+        return False
+    return figures is not None and figures is model.compiled
 
 
 def with_imported_figures(model: Model, other: Model) -> Model:

@@ -189,7 +189,7 @@ class Search:
         assert self.gap is not None
         if self.gap.is_divided:
             with self._reporter.stage("why: import, joint dynamics, contact"):
-                self.split = split_of(self.trials, self.request, self.gap, self.causes)
+                self.split = split_of(self.trials, self.gap, self.causes)
 
     def _divide(self, ranked: Callable[[], None]) -> None:
         """Divide the gap among the causes.

@@ -17,8 +17,8 @@ from ..runs.provenance import model_digest
 from .causes import Cause
 from .explained_gap import ExplainedGap
 from .gap import size_of
-from .imported import have_same_options, reader_of
-from .request import WhyRequest, is_one_engine
+from .imported import are_compiled_as_read, have_same_options, reader_of
+from .request import is_one_engine
 from .settings import CONTACT, TITLES
 from .setup import RunKey
 from .trials import Trials
@@ -89,16 +89,13 @@ class _Route:
     moved: tuple[RunKey, RunKey] | None
 
 
-def split_of(
-    trials: Trials, request: WhyRequest, gap: ExplainedGap, causes: tuple[Cause, ...]
-) -> GapSplit | None:
+def split_of(trials: Trials, gap: ExplainedGap, causes: tuple[Cause, ...]) -> GapSplit | None:
     """Divide a gap by where it arises; None where one engine runs one file on both sides.
 
     The gap is then of options or of what was edited, which the causes tell.
 
     Args:
         trials: The runs.
-        request: The question.
         gap: That is divided.
         causes: What the sides differ in.
 
@@ -107,16 +104,14 @@ def split_of(
     """
     if is_one_engine(*trials.setup.models) and _have_one_file(*trials.setup.models):
         return None
-    return _Splitting(trials, request, gap, causes).split()
+    return _Splitting(trials, gap, causes).split()
 
 
 class _Splitting:
     """The division of one gap."""
 
-    def __init__(
-        self, trials: Trials, request: WhyRequest, gap: ExplainedGap, causes: tuple[Cause, ...]
-    ) -> None:
-        self._trials, self._request, self._gap, self._causes = trials, request, gap, causes
+    def __init__(self, trials: Trials, gap: ExplainedGap, causes: tuple[Cause, ...]) -> None:
+        self._trials, self._gap, self._causes = trials, gap, causes
         self._left, self._right = trials.setup.models
         self._readers = reader_of(self._left), reader_of(self._right)
         self._reads_alike = self._read_alike()
@@ -170,7 +165,9 @@ class _Splitting:
         """Tell whether both sides have the same figures of their files."""
         if self._readers[0] == self._readers[1] and _have_one_file(self._left, self._right):
             return True
-        return self._request.are_compiled and not any(map(_is_of_a_file, self._causes))
+        if not (are_compiled_as_read(self._left) and are_compiled_as_read(self._right)):
+            return False
+        return not any(map(_is_of_a_file, self._causes))
 
     def _differ_in_files_alone(self) -> bool:
         """Tell whether both sides compute the same, but for what was read."""
