@@ -77,6 +77,7 @@ def test_zeros_of_a_fresh_data_are_no_rotation(box: Model, fresh: Data) -> None:
     assert sm.freshness(box, fresh)["site_xmat"].gaps == (Gap(None, "rad", ""),)
 
 
+@each_of_both
 def test_contacts_of_a_fresh_data_appear(box: Model, fresh: Data) -> None:
     assert sizes(sm.freshness(box, fresh)["contacts"].gaps) == {"appears": 4.0}
 
@@ -88,6 +89,7 @@ def test_the_fingertip_of_a_fresh_data_is_at_the_origin(box: Model, fresh: Data)
     assert sizes(found.gaps)["m"] == pytest.approx(tip, abs=1e-4)
 
 
+@each_of_both
 def test_a_write_to_ctrl_makes_what_the_servos_do_stale_and_no_pose(arm: Model) -> None:
     with opened(arm, qpos=TARGET, ctrl=TARGET, derived=True) as (model, data):
         data.ctrl[1] += 1e-3
@@ -101,6 +103,7 @@ def test_a_write_to_ctrl_makes_what_the_servos_do_stale_and_no_pose(arm: Model) 
     }
 
 
+@each_of_both
 def test_a_write_to_qvel_makes_damping_and_bias_stale_and_no_pose(arm: Model) -> None:
     with opened(arm, qpos=TARGET, ctrl=TARGET, derived=True) as (model, data):
         data.qvel[1] += 0.1

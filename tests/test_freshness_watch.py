@@ -13,7 +13,7 @@ from statemachine.errors import BadInputError, ClosedDataError, StaleReadError
 from statemachine.freshness.watch import Watch
 from statemachine.interface import Data, Model
 
-from .support.backends import readable_arrays
+from .support.backends import each_of_both, readable_arrays
 from .support.claims import assert_has, assert_in, refused
 from .support.motions import opened
 
@@ -76,6 +76,7 @@ def test_what_forward_computes_is_of_now(box: Model, watched: Data) -> None:
     assert count(box, watched, "xpos") == ("now", 0, 0)
 
 
+@each_of_both
 def test_writes_are_counted_of_what_an_array_depends_on(box: Model, watched: Data) -> None:
     sm.forward(box, watched)
     write_four_times(box, watched)
@@ -90,6 +91,7 @@ def test_the_entries_that_were_written_are_named(box: Model, watched: Data) -> N
     assert written[:2] == ("qpos[1] (shoulder_lift)", "ctrl[0] (shoulder_pan)")
 
 
+@each_of_both
 def test_a_value_that_is_back_where_it_was_makes_poses_of_now(box: Model, watched: Data) -> None:
     sm.forward(box, watched)
     write_four_times(box, watched)
@@ -105,6 +107,7 @@ def test_a_step_begins_the_counts_anew(box: Model, watched: Data) -> None:
     assert count(box, watched, "xpos") == ("1 step ago", 1, 0)
 
 
+@each_of_both
 def test_writes_after_a_step_are_counted_beside_it(box: Model, watched: Data) -> None:
     watched.ctrl[:] = 0.1
     sm.step(box, watched, 12)
@@ -163,6 +166,7 @@ def test_all_can_be_read_after_forward(box: Model, strict: Data) -> None:
         getattr(strict, name)
 
 
+@each_of_both
 def test_only_what_depends_on_a_write_cannot_be_read(box: Model, strict: Data) -> None:
     sm.forward(box, strict)
     strict.qvel[0] = 0.5
@@ -244,6 +248,7 @@ def test_a_watch_names_the_line_that_reads(hold: tuple[Watch, list[float]]) -> N
     assert_has(read, name="site_xpos", count=60, of="1 step ago", place=place)
 
 
+@each_of_both
 def test_a_watch_keeps_the_worst_read(hold: tuple[Watch, list[float]]) -> None:
     (read,), lags = hold[0].stale_reads, hold[1]
     assert read.gaps[0].size == max(lags) == pytest.approx(9.95e-3, abs=1e-5)

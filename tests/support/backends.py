@@ -15,8 +15,9 @@ import statemachine as sm
 from statemachine import backends, releases
 from statemachine.backends.served.engine_process import ServedEngine, Server
 from statemachine.backends.served.release_backend import served
+from statemachine.errors import UnsupportedError
 from statemachine.installed import engine_version, require
-from statemachine.interface import DERIVED, PARTS, Behaviour
+from statemachine.interface import DERIVED, Behaviour
 
 
 @contextmanager
@@ -49,14 +50,30 @@ def slow_on(name: str, among: Sequence[str] = ()) -> list[Any]:
 
 
 def readable_arrays(model: sm.Model) -> list[str]:
-    """Return what can be read of a Data: what is derived, but for forces that no engine tells."""
+    """Return what can be read of a Data: what is derived.
+
+    Forces and contacts are left out that the engine does not tell, where its record says so.
+    """
     behaviours = model.capabilities.behaviours
-    unavailable: list[str] = []
+    names = [*DERIVED, "contacts"]
+    doubtful: list[str] = []
     if behaviours["forces by part"].support == "unsupported":
-        unavailable += PARTS
+        doubtful += [name for name in names if name.startswith("qfrc")]
     if behaviours["contacts"].support == "unsupported":
-        unavailable.append("contacts")
-    return [name for name in (*DERIVED, "contacts") if name not in unavailable]
+        doubtful.append("contacts")
+    if not doubtful:
+        return names
+    with sm.make_data(model) as data:
+        return [name for name in names if name not in doubtful or _is_told(data, name)]
+
+
+def _is_told(data: sm.Data, name: str) -> bool:
+    """Tell whether an engine tells of something that is derived."""
+    try:
+        getattr(data, name)
+    except UnsupportedError:
+        return False
+    return True
 
 
 def bullet_clients() -> set[int]:
