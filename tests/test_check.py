@@ -125,8 +125,11 @@ def test_a_command_that_was_written_for_nothing_is_mentioned(prepared: Prepare) 
     assert "you wrote ctrl" in remark
 
 
-def test_every_wrong_solution_has_a_message_of_its_own() -> None:
-    assert len({attempt.message for attempt in WRONG}) == len(WRONG)
+def test_no_two_mistakes_have_the_same_message() -> None:
+    mistakes_of: dict[str, set[str]] = {}
+    for attempt in WRONG:
+        mistakes_of.setdefault(attempt.message, set()).add(attempt.name)
+    assert [names for names in mistakes_of.values() if len(names) > 1] == []
 
 
 _HEAD = """

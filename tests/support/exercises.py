@@ -754,9 +754,13 @@ def _attempts(tables: dict[str, dict[str, tuple[str, Changes]]]) -> Iterator[Att
             for old, new in changes.items():
                 assert old in source, (name, old)
                 source = source.replace(old, new)
-            short, _, raw = name.partition(", ")
+            mistake, _, variant = name.partition(", ")
             yield Attempt(
-                f"{solves}-{short}", f"demo_{solves}", _IMPORTS + source, message, bool(raw)
+                f"{solves}-{mistake}",
+                f"demo_{solves}",
+                _IMPORTS + source,
+                message,
+                variant == "raw",
             )
 
 

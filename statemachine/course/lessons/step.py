@@ -152,9 +152,7 @@ def _replace_lines(changes: Mapping[str, bool | str], integrator: str) -> str:
     line = f"model = model.replace({', '.join(words)})\n"
     if not integrator:
         return line
-    return (
-        f"# The file's integrator is {integrator}; Stepper makes the step of {INTEGRATOR}.\n{line}"
-    )
+    return f"# integrator: {integrator} in the file, {INTEGRATOR} in Stepper\n{line}"
 
 
 def run(play: CodeRun, options: Options, progress: Progress) -> StepLessonResult:
