@@ -351,9 +351,11 @@ def _remedy(engine: Engine) -> str:
     from .installing import install_command, pip  # here, for most runs lack nothing
 
     if wheel := wheel_here(engine):
-        command = f"{pip()} install {wheel.requirement}"
-        if engine.extra:
-            command = install_command(engine.extra)
+        command = (
+            install_command(engine.extra)
+            if engine.extra
+            else f"{pip()} install {wheel.requirement}"
+        )
         return f"{command} (wheels for {engine.places})"
     where = f"{platform.system()} {platform.machine()} and Python 3.{sys.version_info.minor}"
     return f"no wheel for {where}, only for {engine.places}"

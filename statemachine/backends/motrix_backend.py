@@ -24,7 +24,7 @@ from .compiled.model import check_numbers, compile_file, compiler_warnings, fact
 from .hidden_data import HiddenModel
 from .motrix.engine_model import EngineModel
 from .motrix.links import TITLE
-from .motrix.reading import Reading, read_file
+from .motrix.reading import MotrixReading, read_file
 from .motrix.settings import settings_between
 from .motrix.world import MotrixWorld
 
@@ -103,7 +103,7 @@ def load(path: Path, defaults: Defaults = "model") -> MotrixModel:
     return MotrixModel(reading, reading.raw, substeps=1)
 
 
-def _tell(reading: Reading) -> None:
+def _tell(reading: MotrixReading) -> None:
     """Warn of what MotrixSim ignores in a file, or reads otherwise."""
     told: list[str] = []
     if reading.ignored:
@@ -125,12 +125,16 @@ class MotrixModel(HiddenModel):
         reading: What MotrixSim makes of the file.
     """
 
-    reading: Reading
+    reading: MotrixReading
     _compiled: MjModel
     _asked: Array | None  # max_qvel, where it was set
 
     def __init__(
-        self, reading: Reading, compiled: MjModel, substeps: int, max_qvel: Array | None = None
+        self,
+        reading: MotrixReading,
+        compiled: MjModel,
+        substeps: int,
+        max_qvel: Array | None = None,
     ) -> None:
         settings = settings_between(reading.raw, compiled)
         if settings and not reading.layout.same_links:
@@ -180,7 +184,7 @@ _START = ("_holds_start", "read_options", "defaults", "options")
 
 
 def _made_again(
-    reading: Reading,
+    reading: MotrixReading,
     compiled: MjModel,
     substeps: int,
     asked: Array | None,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(init=False, eq=False)
-class Layout:
+class MotrixLayout:
     """Where MotrixSim has the elements of a compiled model.
 
     Attributes:
@@ -58,7 +58,7 @@ class Layout:
     same_links: bool
 
 
-def layout_of(world: Any, scene: Any, raw: MjModel) -> Layout:
+def layout_of(world: Any, scene: Any, raw: MjModel) -> MotrixLayout:
     """Find the elements of a compiled model in what MotrixSim reads of the same file.
 
     Args:
@@ -82,7 +82,7 @@ def layout_of(world: Any, scene: Any, raw: MjModel) -> Layout:
     bodies = {name: number for number, name in enumerate(scene.body_names)}
     if any(name not in bodies for name in led):
         raise _other("mocap", "a body that is led has no name that it knows")
-    layout = Layout()
+    layout = MotrixLayout()
     layout.links, layout.same_links = links, same_links
     layout.qpos, layout.qvel, layout.quaternions = _coordinates(scene, raw)
     layout.sites, layout.site_bodies = _sites(scene, raw), raw.site_bodyid.astype(np.int64)

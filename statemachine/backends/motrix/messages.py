@@ -18,6 +18,8 @@ from ...errors import one_line
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _FIELD = re.compile(r"^\s+(?P<element>[\w/]+)@(?P<attribute>\w+) at line: \d+")
 _OTHER = re.compile(r"^\S+Z\s+(WARN|ERROR) \S+: (?P<text>.*)")
+# What the adapter does for every engine: a latency.
+_DONE_HERE = {"delay", "nsample"}
 _LIST_FOLLOWS = "will be ignored"
 _PICTURE_WORDS = ("texture", "camera", "trackcom", "light", "skybox")
 # Elements that no motion depends on.
@@ -36,7 +38,9 @@ def ignored_fields(lines: Sequence[str]) -> tuple[str, ...]:
     fields: dict[str, None] = {}
     for line in lines:
         match = _FIELD.match(_COLOURS.sub("", line))
-        if match and match["element"] not in _OF_PICTURES:
+        if match is None or match["element"] in _OF_PICTURES:
+            continue
+        if match["attribute"] not in _DONE_HERE:
             fields[f"{match['element']} {match['attribute']}"] = None
     return tuple(fields)
 

@@ -21,7 +21,7 @@ from ..compiled.algebra import principal_axes
 from ..compiled.flags import DisableFlag
 from ..compiled.stages import set_constants
 from .engine_model import EngineModel
-from .layout import Layout, layout_of
+from .layout import MotrixLayout, layout_of
 from .links import check_threads, mx
 from .messages import ignored_fields, other_warnings
 from .settings import FIXED_BASE, NO_ACTUATORS, flags_of
@@ -37,7 +37,7 @@ _ROUNDED_INERTIA = 1e-4  # of the largest entry
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class MotrixReading:
     """What MotrixSim makes of a file.
 
     Attributes:
@@ -50,14 +50,14 @@ class Reading:
     """
 
     engine: EngineModel
-    layout: Layout
+    layout: MotrixLayout
     raw: MjModel
     ignored: tuple[str, ...]
     warnings: tuple[str, ...]
     otherwise: tuple[str, ...]
 
 
-def read_file(path: Path, raw: MjModel) -> Reading:
+def read_file(path: Path, raw: MjModel) -> MotrixReading:
     """Let MotrixSim read a file that MuJoCo has compiled.
 
     Args:
@@ -85,7 +85,9 @@ def read_file(path: Path, raw: MjModel) -> Reading:
         own.opt.disableflags = flags
     if FIXED_BASE in engine.settings:
         otherwise = (*otherwise, "a base that floats, which is fixed here as in MuJoCo")
-    return Reading(engine, layout, own, ignored_fields(lines), other_warnings(lines), otherwise)
+    return MotrixReading(
+        engine, layout, own, ignored_fields(lines), other_warnings(lines), otherwise
+    )
 
 
 def _of_urdf(world: msd.World, raw: MjModel) -> dict[str, Array]:
@@ -99,7 +101,9 @@ def _of_urdf(world: msd.World, raw: MjModel) -> dict[str, Array]:
     return settings
 
 
-def with_numbers_of(scene: Any, layout: Layout, raw: MjModel) -> tuple[MjModel, tuple[str, ...]]:
+def with_numbers_of(
+    scene: Any, layout: MotrixLayout, raw: MjModel
+) -> tuple[MjModel, tuple[str, ...]]:
     """Return a copy of a compiled model that has MotrixSim's numbers, and what differed.
 
     Args:
@@ -150,7 +154,7 @@ class _Numbers:
             ours[differs] = told[differs]
 
 
-def _take_over_bodies(scene: Any, layout: Layout, read: _Numbers) -> None:
+def _take_over_bodies(scene: Any, layout: MotrixLayout, read: _Numbers) -> None:
     """Take over masses and inertias, and friction of the geoms."""
     raw, data = read.raw, mx.SceneData(scene)
     check_threads()  # inertias are told by them
@@ -183,7 +187,7 @@ def _take_over_inertia(read: _Numbers, body: int, name: str, theirs: Array) -> N
     raw.body_inertia[body], raw.body_iquat[body] = principal_axes(theirs)
 
 
-def _take_over_joints(scene: Any, layout: Layout, read: _Numbers) -> None:
+def _take_over_joints(scene: Any, layout: MotrixLayout, read: _Numbers) -> None:
     """Take over armature, damping, dry friction and limits of the joints."""
     raw, low = read.raw, scene.low
     dampings = np.asarray(low.dof_force_dampings)

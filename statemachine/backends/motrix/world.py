@@ -18,7 +18,7 @@ from ...rotations import matrix_from_quat, times, wxyz_from_xyzw, xyzw_from_wxyz
 from ..hidden_world import HiddenWorld, Memory, Moment, Read
 from .contact_sensors import contacts_at
 from .engine_model import EngineModel
-from .layout import Layout
+from .layout import MotrixLayout
 from .links import TITLE, check_threads, mx
 from .messages import is_panic
 
@@ -34,7 +34,7 @@ class MotrixWorld(HiddenWorld):
     unavailable = frozenset((*FORCES, *PARTS))
 
     def __init__(
-        self, engine: EngineModel, layout: Layout, qpos0: Array, timestep: float, nu: int
+        self, engine: EngineModel, layout: MotrixLayout, qpos0: Array, timestep: float, nu: int
     ) -> None:
         """Make a world.
 
@@ -198,7 +198,7 @@ class MotrixWorld(HiddenWorld):
         self.raw = None
 
 
-def put_state(data: Any, layout: Layout, qpos: Array, qvel: Array) -> None:
+def put_state(data: Any, layout: MotrixLayout, qpos: Array, qvel: Array) -> None:
     """Write a state into a SceneData.
 
     Args:

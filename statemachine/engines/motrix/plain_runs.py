@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...backends.motrix.layout import Layout
+from ...backends.motrix.layout import MotrixLayout
 from ...backends.motrix.links import mx
 from ...backends.motrix.messages import is_panic
 from ...backends.motrix.world import put_command, put_state
@@ -35,7 +35,7 @@ def data_in(model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Any:
     return data
 
 
-def _layout(model: Model) -> Layout:
+def _layout(model: Model) -> MotrixLayout:
     if not isinstance(model, MotrixModel):
         raise TypeError(f"{model!r} is no model of MotrixSim's")
     return model.reading.layout
@@ -76,7 +76,7 @@ def plain_run(path: Path, commands: Array, keyframe: int | None) -> Array | None
     return np.array(rows)
 
 
-def _row(data: Any, layout: Layout) -> Array:
+def _row(data: Any, layout: MotrixLayout) -> Array:
     """Return positions and velocities (nq + nv,) in MuJoCo's order."""
     return np.concatenate((data.dof_pos[layout.qpos], data.dof_vel[layout.qvel]), dtype=np.float64)
 

@@ -82,14 +82,14 @@ def certify(
     gaps.sort(key=lambda gap: -gap.worst)
     left_out = tuple(tip.name for tip in tips if tip not in asked.tips)
     renamed_joints = tuple(parts.renamed_joints())
-    versions = {WITNESS: known.version}
+    versions, tolerance = {WITNESS: known.version}, model.capabilities.rounding
     result = FingertipResult(
         tips=tuple(gaps),
         left_out=left_out,
         relative_to=parts.relative_to,
         renamed_joints=renamed_joints,
         poses=wanted,
-        tolerance=model.capabilities.rounding,
+        tolerance=tolerance,
         witness_file=asked.file,
         grade=known.grade,
         reason=asked.reason,
