@@ -42,7 +42,7 @@ CART = """
 <body name="cart"><joint name="rail" type="slide" axis="1 0 0" limited="true" range="-2 2"/>
   <geom type="box" size=".2 .1 .05" mass="1" contype="0" conaffinity="0"/>
   <body name="pole"><joint name="hinge" axis="0 1 0"/>
-    <geom type="capsule" fromto="0 0 0 0 0 .6" size=".03" mass=".1" contype="0" conaffinity="0"/>
+    <geom type="box" pos="0 0 .3" size=".03 .03 .3" mass=".1" contype="0" conaffinity="0"/>
     <site name="top" pos="0 0 .6"/></body></body>
 """
 PUSH = (
