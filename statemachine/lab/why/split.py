@@ -154,7 +154,7 @@ class _Splitting:
         moved = self._share_without_contact(*route.moved)
         if moved is None:
             return imported, None, None
-        return imported, moved, 1.0 - imported - moved
+        return imported, moved, self._without_rounding(1.0 - imported - moved)
 
     def _contact_of_all(self) -> float | None:
         """Return the share of contact where import and joint dynamics are one part."""
@@ -211,7 +211,11 @@ class _Splitting:
         if between is None:
             self._hinder("not run", self._trials.ended)
             return None
-        return size_of(between, self._gap.measure) / self._gap.size
+        return self._without_rounding(size_of(between, self._gap.measure) / self._gap.size)
+
+    def _without_rounding(self, share: float) -> float:
+        """Return a share; 0 where it is no more than rounding makes of a run."""
+        return share if abs(share) * self._gap.size > self._gap.negligible else 0.0
 
     def _hinder(self, obstacle: Obstacle, detail: str) -> None:
         """Keep why a part cannot be separated; the first reason counts."""
