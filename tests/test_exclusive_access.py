@@ -24,7 +24,7 @@ from statemachine.errors import (
     DivergedError,
     EngineError,
 )
-from statemachine.interface import PARTS
+from statemachine.interface import DERIVED
 
 from .support.backends import readable_arrays, registered
 from .support.claims import refused
@@ -65,7 +65,7 @@ def test_a_second_thread_is_refused_while_one_steps_or_resets(
     model: sm.Model, verb: str, hook: str, name: str
 ) -> None:
     """And the Data is not one that diverged: it is only in the middle of something."""
-    if name in PARTS and name not in readable_arrays(model):
+    if name in DERIVED and name not in readable_arrays(model):
         pytest.skip(f"{model.backend} tells no {name}")
     with opened(model, 0, nstep=20) as (_, data), opened(model, 0, nstep=20) as (_, alone):
         raised = meanwhile(data, lambda: USES[name](model, data), hook)

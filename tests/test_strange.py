@@ -173,6 +173,7 @@ def test_a_message_is_cut_and_keeps_its_ends(tmp_path: Path) -> None:
     assert 0 < len(warnings_of(lambda: load(' damping="-1"'))[1]) <= 2000
 
 
+@each_of_both  # which MuJoCo compiles for
 def test_what_compiling_warns_of_is_said_and_leaves_no_file(backend: str, tmp_path: Path) -> None:
     """MuJoCo tells of the letters NaN, here in a user's own numbers, in a log file."""
     (tmp_path / "m.xml").write_text(_model().replace("<worldbody>", f"{NAN_OF_A_USER}<worldbody>"))
