@@ -30,13 +30,14 @@ from statemachine.errors import (
 from statemachine.gym import RobotVectorEnv, Start, WorldView, joint_state, make_env, make_vec
 from statemachine.show.drawing.scene import Camera
 
+from .support.backends import each_of_both
 from .support.claims import assert_has, refused
 from .support.files import written
 from .support.processes import runs_in_silence
 from .support.requirements import ROOT
 from .support.small_models import loaded, mjcf
 
-pytestmark = pytest.mark.filterwarnings("error")
+pytestmark = pytest.mark.filterwarnings("error", "ignore:MotrixSim, of scene.*.xml. it ignores")
 
 CART = """
 <body name="cart"><joint name="rail" type="slide" axis="1 0 0" limited="true" range="-2 2"/>
@@ -247,6 +248,7 @@ def test_a_world_has_13_attributes_to_read() -> None:
     assert len(READABLE) == 13
 
 
+@each_of_both
 @pytest.mark.parametrize("name", READABLE)
 def test_what_a_function_reads_is_that_of_the_data(
     name: str, seen: tuple[WorldView, WorldView, Any]

@@ -21,6 +21,7 @@ from statemachine.backends.compiled import model as compiled
 from statemachine.backends.mujoco import alarms as mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
+from .support.backends import each_of_both
 from .support.claims import assert_has, overlapping, refused
 from .support.motions import opened
 from .support.processes import runs_in_silence
@@ -287,6 +288,7 @@ def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
         _refuses_ctrl(model, data, 1)
 
 
+@each_of_both  # which restore exactly in a Data of another history
 @pytest.mark.parametrize("latency", [0.0, 0.01])
 def test_an_infinite_ctrl_is_clamped_on_its_way_and_in_many_worlds(
     backend: str, latency: float

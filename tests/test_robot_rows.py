@@ -42,6 +42,7 @@ from statemachine.lab.robots.request import RobotsRequest
 from statemachine.lab.robots.table import read_table, write_table
 from statemachine.processes import sandbox
 
+from .support.backends import BOTH
 from .support.files import written
 from .support.small_models import loaded
 
@@ -496,6 +497,7 @@ def examined(
     """Return the row of a small model that is loaded so, and the parts that were told."""
     parts: list[str] = []
     patch.setattr(examine, "load_to_run", loads)
+    patch.setattr(examine, "backend_names", lambda: list(BOTH))
     patch.setattr(gaps, "run_gap", run_gap)
     patch.setattr(examine, "certify", lambda *_, **__: 1 / 0)
     path = written(folder / "tiny.xml", TINY)

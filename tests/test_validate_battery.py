@@ -412,15 +412,24 @@ def gives_up_in_a_fall(path: Path, defaults: Defaults) -> Model:
     text = path.read_text("utf-8")
     if 'model="free-fall"' in text:
         raise EngineError("gave up")
-    if "<mujoco><worldbody/></mujoco>" in text:
-        raise UnsupportedError("no bodies")
+    return load(path, "mujoco", defaults=defaults)
+
+
+def takes_named_models(path: Path, defaults: Defaults) -> Model:
+    if "<mujoco model=" not in path.read_text("utf-8"):
+        raise UnsupportedError("no name")
     return load(path, "mujoco", defaults=defaults)
 
 
 @pytest.fixture(autouse=True)
 def other_backends(monkeypatch: pytest.MonkeyPatch) -> None:
     backend_names()
-    for loader in (raises_in_its_loader, returns_nothing, gives_up_in_a_fall):
+    for loader in (
+        raises_in_its_loader,
+        returns_nothing,
+        gives_up_in_a_fall,
+        takes_named_models,
+    ):
         monkeypatch.setitem(BACKENDS, loader.__name__, f"{__name__}:{loader.__name__}")
 
 
@@ -448,8 +457,8 @@ def test_what_other_backends_and_cases_do_is_not_lost_by_a_run_that_fails() -> N
 
 def test_a_version_that_cannot_be_read_is_unknown() -> None:
     need_engine("mujoco")
-    request = ValidateRequest(backends=("gives_up_in_a_fall",), cases=("thrown-body",))
-    assert answer(request).versions == {"gives_up_in_a_fall": "unknown"}
+    request = ValidateRequest(backends=("takes_named_models",), cases=("thrown-body",))
+    assert answer(request).versions == {"takes_named_models": "unknown"}
 
 
 def test_a_measure_that_is_no_number_is_a_run_that_diverged() -> None:

@@ -453,8 +453,10 @@ def test_one_thread_at_a_time(worlds: many.Worlds, use: Callable[[many.Worlds], 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 def test_worlds_belong_to_the_process_that_made_them(backend: str) -> None:
     code = f"""
-import os, statemachine as sm
+import os, warnings
+import statemachine as sm
 from statemachine.worlds import make_worlds, step
+warnings.simplefilter("ignore")
 worlds = make_worlds(sm.load("so101", backend="{backend}"), 4, workers=2)
 if not os.fork():
     try:
