@@ -179,11 +179,11 @@ class Capabilities:
         lines = [f"options of replace: {', '.join(self.options)}"]
         for reason, names in names_by_reason.items():
             lines.append(f"not {', '.join(names)}: {reason}")
-        lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
+        without = self.refused.get("integrator", "as in the file")
+        lines.append(f"integrators: {', '.join(self.integrators) or without}")
         shared = "share the compiled model" if self.shared_model else "share its description only"
         lines.append(f"several Data of a Model {shared}")
-        if self.precision != "float64":
-            lines.append(f"numbers: {self.precision}; poses are exact to {self.rounding:g}")
+        lines.append(f"numbers: {self.precision}; poses are exact to {self.rounding:g}")
         if self.data_per_process is not None:
             lines.append(f"Data that one process can hold: {self.data_per_process}")
         for name, behaviour in self.behaviours.items():
