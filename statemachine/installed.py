@@ -10,16 +10,15 @@ import ctypes
 import importlib
 import importlib.metadata
 import os
-import platform
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
 from typing import Any
 
+from .engine_wheels import Engine, Wheel
 from .errors import MissingEngineError, unknown_name
 
 # Keep what C code prints off the terminal, and have it for an error message.
@@ -102,52 +101,6 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_STREAMS.renew)
 
 
-@dataclass(frozen=True)
-class Wheel:
-    """A distribution that brings an engine, and one kind of machine that it has a wheel for.
-
-    Attributes:
-        requirement: What pip takes, such as "pybullet-arm64==3.2.8".
-        system: Of `sys.platform`; "" for any.
-        machines: Of `platform.machine()`, in lower case; empty for any.
-        pythons: The oldest and the newest minor version of CPython 3.
-    """
-
-    requirement: str
-    system: str = ""
-    machines: tuple[str, ...] = ()
-    pythons: tuple[int, int] = (11, 999)
-
-    @property
-    def distribution(self) -> str:
-        """Return the requirement's name alone."""
-        return self.requirement.partition("==")[0]
-
-    def fits(self, system: str, machine: str, python: int) -> bool:
-        """Tell whether a wheel can be installed on a machine."""
-        return (
-            self.system in ("", system)
-            and (not self.machines or machine.lower() in self.machines)
-            and self.pythons[0] <= python <= self.pythons[1]
-        )
-
-
-@dataclass(frozen=True)
-class Engine:
-    """One engine: what it is called where, and where its wheels work."""
-
-    name: str
-    module: str
-    distributions: tuple[str, ...]  # the original first; never two of them in one environment
-    wheels: tuple[Wheel, ...]  # pyproject.toml says the same as markers, which a test compares
-    places: str  # the same in words
-    probe: str  # an attribute that only the right package of that name has
-    role: str  # what it is here for
-    runs: bool = True  # whether there is a backend for it
-    extra: str = ""  # the extra of this library that brings it; "" where all installations have it
-    writes_to_stderr: bool = False  # whether it writes to descriptor 2 while it is imported
-
-
 DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJCF for all others
 WITNESS = "pinocchio"  # what computes places independently
 PAIR = ("mujoco", "pybullet")  # what is compared where nothing else is asked for
@@ -217,17 +170,11 @@ def engine_version(name: str) -> str:
     engine = ENGINES[name]
     found = _installed(engine)
     if not found:
-        raise _missing(engine)
+        from .installing import missing_error  # here, for most runs lack nothing
+
+        raise missing_error(engine)
     ((distribution, version),) = found.items()
     return version if distribution == engine.distributions[0] else f"{version} ({distribution})"
-
-
-def wheel_here(engine: Engine) -> Wheel | None:
-    """Return what can be installed on this machine without a compiler."""
-    here = (sys.platform, platform.machine(), sys.version_info.minor)
-    if platform.python_implementation() != "CPython":
-        return None
-    return next((wheel for wheel in engine.wheels if wheel.fits(*here)), None)
 
 
 def require(name: str) -> ModuleType:
@@ -255,18 +202,20 @@ def require(name: str) -> ModuleType:
         with silence(), sigint_blocked(), _quiet(engine):
             module = importlib.import_module(engine.module)
     except ModuleNotFoundError as error:
+        from .installing import broken_error, missing_error  # here, for most runs lack nothing
+
         if error.name != engine.module:
-            raise _broken(engine, error) from error
-        raise _missing(engine) from None
+            raise broken_error(engine, error) from error
+        raise missing_error(engine) from None
     except Exception as error:  # a missing shared library, a bad MUJOCO_GL, …
+        from .installing import broken_error
+
         raise_if_interrupted(error)
-        raise _broken(engine, error) from error
+        raise broken_error(engine, error) from error
     if not hasattr(module, engine.probe):
-        raise MissingEngineError(
-            f"the installed package {engine.module!r} is not the engine {name}: "
-            f"pip uninstall {engine.module}, then {_remedy(engine)}",
-            engine=name,
-        )
+        from .installing import other_module_error
+
+        raise other_module_error(engine)
     return module
 
 
@@ -338,39 +287,7 @@ def _installed(engine: Engine) -> dict[str, str]:
         with suppress(importlib.metadata.PackageNotFoundError):
             found[distribution] = importlib.metadata.version(distribution)
     if len(found) > 1:
-        raise MissingEngineError(
-            f"{' and '.join(found)} are both installed, and each has overwritten files of the "
-            f"other: pip uninstall -y {' '.join(found)}, then {_remedy(engine)}",
-            engine=engine.name,
-        )
+        from .installing import overwritten_error
+
+        raise overwritten_error(engine, list(found))
     return found
-
-
-def _remedy(engine: Engine) -> str:
-    """Return what to type on this machine, or that nothing can be installed."""
-    from .installing import install_command, pip  # here, for most runs lack nothing
-
-    if wheel := wheel_here(engine):
-        command = (
-            install_command(engine.extra)
-            if engine.extra
-            else f"{pip()} install {wheel.requirement}"
-        )
-        return f"{command} (wheels for {engine.places})"
-    where = f"{platform.system()} {platform.machine()} and Python 3.{sys.version_info.minor}"
-    return f"no wheel for {where}, only for {engine.places}"
-
-
-def _missing(engine: Engine) -> MissingEngineError:
-    message = f"{engine.name} is not installed here: {_remedy(engine)}"
-    return MissingEngineError(message, engine=engine.name)
-
-
-def _broken(engine: Engine, error: Exception) -> MissingEngineError:
-    reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-    message = f"{engine.name} is installed and does not load: {reason}"
-    if "libgomp" in reason:
-        message += "; on Debian and Ubuntu: apt-get install libgomp1"
-    elif engine.name == "mujoco" and os.environ.get("MUJOCO_GL"):
-        message += f"; MUJOCO_GL={os.environ['MUJOCO_GL']} is set: unset it"
-    return MissingEngineError(message, engine=engine.name)

@@ -9,8 +9,8 @@ import sys
 from dataclasses import dataclass, replace
 
 from ...engines import raw_engine_of
-from ...installed import DEFAULT, ENGINES, engine_version, wheel_here
-from ...installing import install_command, pip
+from ...installed import DEFAULT, ENGINES, engine_version
+from ...installing import install_command, pip, wheel_here
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
 
