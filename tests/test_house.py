@@ -17,7 +17,7 @@ from .support.requirements import ROOT
 
 PACKAGE = ROOT / "statemachine"
 # Rooms and files that may name an engine: its backend, its room, the table, the witness.
-MAY_NAME = ("backends/", "engines/", "installed.py", "kinematics.py", "witness/")
+MAY_NAME = ("backends/", "engines/", "installed.py", "installing.py", "kinematics.py", "witness/")
 # A backend's file and a room are called after the engine, or after the first half of its name.
 NAMES = frozenset(ENGINES) | {engine.module for engine in ENGINES.values()}
 

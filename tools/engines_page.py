@@ -11,6 +11,7 @@ from __future__ import annotations
 import datetime
 import sys
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ import statemachine as sm
 from statemachine.atomic_files import replace_text
 from statemachine.backends import backend_names
 from statemachine.course.notebook import block_as_markdown
+from statemachine.errors import EngineWarning
 from statemachine.installed import available
 from statemachine.interface.records import BEHAVIOURS
 from statemachine.lab.probes.conventions import Conventions, probe
@@ -147,6 +149,7 @@ def document(text: str, computed: str) -> str:
 
 def main() -> int:
     """Ask the engines, and write the page; the exit code."""
+    warnings.simplefilter("ignore", EngineWarning)  # what an engine ignores of the arm's file
     date = datetime.datetime.now(datetime.UTC).date().isoformat()
     computed = computed_part(probe(available()[0]), backend_names(), date)
     replace_text(TARGET, document(TARGET.read_text("utf-8"), computed))
