@@ -12,7 +12,6 @@ import pytest
 from statemachine.interface import Model
 from statemachine.lab.compare import Uncertainty, compare, perturbed_runs
 from statemachine.lab.compare.instead import Instead
-from statemachine.lab.compare.perturbed import ROUNDING
 from statemachine.lab.compare.sides import Request, Side
 from statemachine.lab.questions.finding import EarlyEnd, Finding, MissingPart, Rounding, finding_of
 from statemachine.lab.questions.next_command import next_command
@@ -194,4 +193,4 @@ def test_of_two_perturbed_runs_one_starts_opposite_to_the_other(rerun: Rerun) ->
 def test_without_uncertainty_a_start_is_off_by_rounding(rerun: Rerun) -> None:
     for trace in perturbed_runs(rerun, runs=2, derive=False):
         off = np.abs(trace.qpos[0] - rerun.start()[0])
-        assert 0 < off.max() <= 3 * ROUNDING
+        assert 0 < off.max() <= 3 * rerun.model.capabilities.rounding
