@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.engines import raw_engine_of
 from statemachine.errors import BadInputError, StateMachineError, TraceError, UnknownNameError
 from statemachine.lab.compare import (
     Comparison,
@@ -24,6 +25,7 @@ from statemachine.lab.compare import (
     run_sides,
     split_words,
 )
+from statemachine.lab.compare.sides import ReplacedParts
 from statemachine.lab.recordings import RunStart, record, write
 from statemachine.lab.runs.controllers import function_scenario
 
@@ -668,3 +670,33 @@ def test_a_binary_model_is_given_nothing(
     trusted, refusal = here(*words, code=2).stderr.splitlines()
     assert "is trusted" in trusted
     assert "b.mjb is binary" in refusal
+
+
+@pytest.fixture
+def with_the_other_actuators() -> sm.Model:
+    """The arm of a URDF, on PyBullet as it comes, with the actuators of the MJCF."""
+    need_engine("pybullet")
+    arm = ReplacedParts(("actuators",), Side("so101"))
+    return arm.apply_to(
+        sm.load(ROOT / "models/so101/so101.urdf", backend="pybullet", defaults="engine")
+    )
+
+
+def test_an_engine_as_it_comes_keeps_its_world_with_parts_of_another_file(
+    with_the_other_actuators: sm.Model,
+) -> None:
+    assert with_the_other_actuators.nu == 6
+    assert with_the_other_actuators.timestep == pytest.approx(1 / 240)
+    assert np.array_equal(with_the_other_actuators.gravity, np.zeros(3))
+
+
+def test_what_is_emulated_of_a_file_has_the_parts_that_were_given(
+    with_the_other_actuators: sm.Model,
+) -> None:
+    dials = raw_engine_of("pybullet").dials(with_the_other_actuators, {})
+    assert dials is not None
+    of_file = sm.load(ROOT / "models/so101/so101.urdf", backend="pybullet")
+    assert dials.emulated.nu == 6
+    assert dials.emulated.timestep == of_file.timestep
+    assert np.array_equal(dials.emulated.gravity, of_file.gravity)
+    assert np.array_equal(dials.emulated.body_mass, of_file.body_mass)

@@ -47,7 +47,7 @@ class PybulletEngine(RawEngine):
             UnsupportedError: PyBullet fixes the floating base of the model.
         """
         from ...backends import pybullet_backend as backend
-        from .dials import PybulletDials
+        from .dials import PybulletDials, with_parts_of
 
         if not isinstance(model, backend.PybulletModel) or model.defaults != "engine":
             return None
@@ -59,7 +59,8 @@ class PybulletEngine(RawEngine):
                 feature="causes of a gap",
                 reason="a floating joint is fixed",
             )
-        emulated = backend.load(model.path, read_options=model.read_options).replace(**options)
+        of_file = backend.load(model.path, read_options=model.read_options)
+        emulated = with_parts_of(of_file, model).replace(**options)
         return PybulletDials(model.replace(**options), emulated)
 
     def unlike_its_users(self, model: Model) -> list[str]:

@@ -34,6 +34,29 @@ _FASTEST = 100.0  # [rad/s]
 _WIDE = 1e6  # [rad or m] a range that no joint leaves
 
 
+def with_parts_of(emulated: PybulletModel, model: PybulletModel) -> Model:
+    """Return the Model of a file with the geoms and actuators that another Model of it was given.
+
+    Args:
+        emulated: The Model of the file, behind the contract.
+        model: One of the same file, as it comes, which may have parts of another file.
+    """
+    own, given = emulated.compiled, model.compiled
+    if not _has_other_parts(own, given):
+        return emulated
+    # The weights are the file's: those of `model` are what PyBullet makes of the shapes.
+    with_parts = emulated.with_compiled(with_weights_of(given, own))
+    return with_parts.replace(gravity=emulated.gravity, timestep=emulated.timestep)
+
+
+def _has_other_parts(own: Any, given: Any) -> bool:
+    """Tell whether two compiled models of one file differ in geoms or actuators."""
+    if (own.ngeom, own.nu) != (given.ngeom, given.nu):
+        return True
+    fields = ("geom_type", "geom_size", "geom_pos", "actuator_gainprm", "actuator_biasprm")
+    return not all(np.array_equal(getattr(own, name), getattr(given, name)) for name in fields)
+
+
 class PybulletDials(Dials):
     """One file on PyBullet, and all that can be set in the engine's way or in the model's."""
 

@@ -160,11 +160,17 @@ class ReplacedParts:
             "body": _renamed(source_model.body_names, model.body_names, matched.bodies),
             "site": _renamed(source_model.site_names, model.site_names, matched.sites),
         }
-        return model.with_compiled(
+        given = model.with_compiled(
             raw_engine_of(DEFAULT).with_parts(
                 model.path, source_model.path, self.parts, names, model.read_options
             )
         )
+        # An engine as it comes has not the gravity and the timestep of the file.
+        own: dict[str, OptionValue] = {}
+        for name in ("gravity", "timestep"):
+            if not np.array_equal(getattr(given, name), getattr(model, name)):
+                own[name] = getattr(model, name)
+        return given.replace(**own) if own else given
 
 
 def _renamed(
