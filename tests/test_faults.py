@@ -68,6 +68,7 @@ def test_every_fault_has_a_patch_and_a_test() -> None:
 
 
 @pytest.mark.slow
+@each_of_both  # for which the faults are made
 def test_the_solution_passes_and_catches_every_fault(backend: str) -> None:
     # A fault that changed nothing would survive here.
     found = examine(SOLUTION, backend)

@@ -48,6 +48,7 @@ from statemachine.lab.sweep.kinds import VariableNames, resolve_kinds
 from statemachine.lab.sweep.rows import KEY, RowWriter, iter_cell_outcomes, remove_failed
 from statemachine.lab.sweep.worker import environment_difference, run_batch
 
+from .support.backends import BOTH
 from .support.claims import assert_has, assert_in, refused
 from .support.files import written
 from .support.processes import files_below, in_its_own_python, soon, without_estimates
@@ -646,7 +647,8 @@ def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> 
 @pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_jobs_do_not_change_results(tmp_path: Path) -> None:
-    sweep = Sweep("hold", ("timestep=0.005,0.01", "damping=1x,2x"), seeds=2, seconds=0.1)
+    vary = ("timestep=0.005,0.01", "damping=1x,2x")
+    sweep = Sweep("hold", vary, seeds=2, seconds=0.1, backends=BOTH)
     serial = sorted(rows_of(sweep), key=lambda row: row["cell"])
     for jobs, ran in ((1, 16), (2, 16), (2, 0)):
         summary = run_sweep(sweep, tmp_path / str(jobs), jobs=jobs)

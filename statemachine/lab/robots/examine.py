@@ -215,7 +215,10 @@ class _Examination:
         orders = gaps.commands(model, _SAME, self.seed)
         rows, _ = gaps.run(model, orders)
         theirs = own.plain_run(self.path, orders[: len(rows) - 1], gaps.keyframe_of(model))
-        return None if theirs is None else rows.tobytes() == theirs[: len(rows)].tobytes()
+        if theirs is None:
+            return None
+        # The first row is the start, which was written: an engine in single precision rounds it.
+        return rows[1:].tobytes() == theirs[1 : len(rows)].tobytes()
 
     def _restores(self, model: Model) -> bool | None:
         """Return whether two futures of a State are one, and that of the run itself if promised."""

@@ -178,17 +178,13 @@ step = question(
 def invalid(results: Sequence[AfterNan]) -> Iterator[EngineAnswer]:
     """Tell what each way to use an engine makes of a NaN."""
     for result in results:
-        figures = (
-            Measurement("angle after a step", result.angle, "rad"),
-            Measurement("it says", result.said or "nothing"),
-        )
+        said = Measurement("it says", result.said or "nothing")
         if math.isnan(result.angle):
-            words = "NaN stays"
-        elif abs(result.angle) < _NEAR_START:
-            words = "starts again"
-        else:
-            words = "NaN is not written"
-        yield EngineAnswer(words, figures, result.part)
+            yield EngineAnswer("NaN stays", (said,), result.part)
+            continue
+        words = "starts again" if abs(result.angle) < _NEAR_START else "NaN is not written"
+        angle = Measurement("angle after a step", result.angle, "rad")
+        yield EngineAnswer(words, (angle, said), result.part)
 
 
 @question(
