@@ -28,7 +28,7 @@ from .cited_case_page import cited_case_blocks
 from .explanation import Explanation
 from .rewritten_page import rewritten_blocks
 from .split_page import split_blocks
-from .table_page import summary_table
+from .table_page import equalizable_shares, summary_table
 from .verdict import UNEXPLAINED
 
 Conclusion = Literal["wider", "divided", "stopped", "no gap", "refused", "chance", "nothing moved"]
@@ -77,6 +77,12 @@ class WhyPage(PageContent):
     def causes(self) -> Table:
         """Return a table of the causes, the largest share first."""
         return summary_table(self.result, self.most_rows)
+
+    @property
+    def has_table(self) -> bool:
+        """Tell whether the table of causes says more than the verdict, which names one."""
+        count = len(equalizable_shares(self.result)) + len(self.result.found_in)
+        return self.most_rows > 0 or count > 1
 
     @property
     def split(self) -> Sequence[Block]:
