@@ -50,6 +50,10 @@ def main() -> int:
         return run()
     except KeyboardInterrupt:  # just before the command answers it, or just after
         return 130
+    finally:
+        # While Python ends, a second interrupt would be a traceback of its threads.
+        if _HANDLER is _signal.default_int_handler:
+            _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
 
 
 if __name__ == "__main__":
