@@ -12,11 +12,13 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
 from statemachine.cli import main as statemachine
-from statemachine.installed import ENGINES, engine_version
+from statemachine.installed import ENGINES, WITNESS, engine_version
+from statemachine.lab.robots import examine
 
 from . import questions
 from .cases import HERE, MODELS, PAIRS, ROOT, Case, of_model, of_pair
@@ -41,7 +43,12 @@ def machine() -> dict[str, str]:
 def _of(case: Case) -> Figures:
     """Return the figures of a command, with its exit code."""
     shown = io.StringIO()
-    with contextlib.redirect_stdout(shown), contextlib.redirect_stderr(io.StringIO()):
+    # The table of robots asks all engines; single precision has other digits on each processor.
+    with (
+        mock.patch.object(examine, "backend_names", lambda: list(_BACKENDS)),
+        contextlib.redirect_stdout(shown),
+        contextlib.redirect_stderr(io.StringIO()),
+    ):
         try:
             code = statemachine(list(case.arguments))
         except SystemExit as end:
@@ -61,7 +68,8 @@ def _commands(cases: Callable[..., Iterable[Case]], *of: str) -> dict[str, Figur
 
 def _engines() -> dict[str, Figures]:
     """Return the figures of every convention, of the contract, and of a Data of each engine."""
-    asked = {"conventions": _of(Case("", "conventions", ("conventions", "--json")))}
+    engines = [word for name in (*_BACKENDS, WITNESS) for word in ("--backend", name)]
+    asked = {"conventions": _of(Case("", "conventions", ("conventions", *engines, "--json")))}
     for backend in _BACKENDS:
         asked[f"contract, {backend}"] = questions.contract(backend)
         asked[f"Data, {backend}"] = questions.one_data(backend)

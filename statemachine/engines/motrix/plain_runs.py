@@ -13,7 +13,7 @@ from ...backends.motrix.links import mx
 from ...backends.motrix.messages import is_panic
 from ...backends.motrix.world import put_command, put_state
 from ...backends.motrix_backend import MotrixModel
-from ...interface import Array, Model
+from ...interface import Array, Model, make_data, reset
 from ...processes.stderr_capture import stderr_capture
 from ..records import EngineTerm, WayBack
 
@@ -57,7 +57,7 @@ def plain_run(path: Path, commands: Array, keyframe: int | None) -> Array | None
     from ...backends import load_to_run
 
     model = load_to_run(path, "motrix")
-    layout, key = _layout(model), None if keyframe is None else model.keyframes[keyframe]
+    layout = _layout(model)
     try:
         with stderr_capture():
             scene = mx.load_model(str(path))
@@ -66,8 +66,9 @@ def plain_run(path: Path, commands: Array, keyframe: int | None) -> Array | None
             return None
         raise
     data = mx.SceneData(scene)
-    if key is not None:
-        put_state(data, layout, key.qpos, key.qvel)
+    with make_data(model) as start:  # its own default state is rounded otherwise
+        reset(model, start, keyframe)
+        put_state(data, layout, start.qpos, start.qvel)
     rows = [_row(data, layout)]
     for ctrl in commands:
         put_command(scene, data, ctrl)
