@@ -45,7 +45,7 @@ def _of(case: Case) -> Figures:
     shown = io.StringIO()
     # The table of robots asks all engines; single precision has other digits on each processor.
     with (
-        mock.patch.object(examine, "backend_names", lambda: list(_BACKENDS)),
+        mock.patch.object(examine, "backend_names", return_value=list(_BACKENDS)),
         contextlib.redirect_stdout(shown),
         contextlib.redirect_stderr(io.StringIO()),
     ):
