@@ -112,6 +112,12 @@ def test_a_gap_of_the_default_backend_itself_is_not_told() -> None:
     assert len(row.wrong("pybullet")) == 1
 
 
+@pytest.mark.parametrize(("backend", "is_wrong"), [("pybullet", True), ("motrix", False)])
+def test_a_gap_is_wrong_where_our_backend_computes_the_joints(backend: str, is_wrong: bool) -> None:
+    rows = {backend: BackendRow(without_contacts=RunGap(400, 0.1))}
+    assert bool(ExaminedModel("", "", "", backends=rows).wrong("mujoco")) is is_wrong
+
+
 def test_a_part_is_a_model_where_it_loads_and_moves() -> None:
     part = ExaminedModel("a.xml", "", "", part_of="b.xml")
     assert not part.is_model

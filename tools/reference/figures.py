@@ -71,6 +71,8 @@ def flatten(value: Any, kind: str, key: tuple[str, ...] = ()) -> Iterator[tuple[
         yield " | ".join((*key[:-1], last.removesuffix(" #"))), len(value)
     elif isinstance(value, dict):
         for field, inner in value.items():
+            if "*" in last and _WORDS.get(kind, {}).get(field) == "-":
+                continue
             word = last.replace("*", field) if "*" in last else _word(field, kind)
             before = key[:-1] if "*" in last else key
             if word != "-":

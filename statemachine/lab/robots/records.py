@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from ...engines import ROOMS, raw_engine_of
+from ...installed import DEFAULT
 from ...show.blocks import only_on_pages
 
 TOLERANCE = 1e-6  # of a gap without contacts [rad or m]
@@ -287,7 +289,7 @@ class ExaminedModel:
                 said.append(f"{name}: not the bits of the engine without us")
             if row.restores is False:
                 said.append(f"{name}: two restores of one State part")
-            if name != default and row.unexplained:
+            if name != default and row.unexplained and not _is_as_it_comes(name):
                 said.append(f"{name}: {_gap_words(row.without_contacts)}")
             gap = row.with_contacts
             if gap is not None and gap.explodes:
@@ -296,6 +298,14 @@ class ExaminedModel:
         if witness is not None and witness.gap is not None and not witness.gap <= PLACES:
             said.append(f"the witness places a frame {witness.gap:.1e} m elsewhere")
         return tuple(said)
+
+
+def _is_as_it_comes(backend: str) -> bool:
+    """Tell whether a backend promises no joint dynamics, so that its gap is its engine's.
+
+    The default one's are what is promised. Of a backend of another package it is not known.
+    """
+    return backend in ROOMS and backend != DEFAULT and not raw_engine_of(backend).emulated
 
 
 def _gap_words(gap: RunGap | None) -> str:
