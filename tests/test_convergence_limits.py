@@ -437,10 +437,10 @@ def typed(found: Convergence, run: Request | None = None) -> list[str]:
 @pytest.mark.parametrize(
     ("whole", "touch", "ends"),
     [
-        ([STAYS], None, ["--why", "--quantity", "swing"]),
-        ([gap_limit("stays", "energy", "energy")], None, ["hold", "--why"]),
+        ([STAYS], None, ["hold", "--one-step"]),
+        ([gap_limit("stays", "energy", "energy")], None, ["hold", "--one-step"]),
         ([UNCLEAR], None, ["--timestep", "0.0005", "--converge"]),
-        ([UNCLEAR], 0.5, ["--why", "--quantity", "swing"]),
+        ([UNCLEAR], 0.5, ["hold", "--one-step"]),
         ([DISCRETE], None, ["hold", "--timestep", "0.0005"]),
     ],
 )
@@ -558,7 +558,7 @@ def controlled(folder: Path) -> Request:
     ("limit", "right", "ends"),
     [
         (STAYS, 0.004, ["--every", "4ms", "--converge"]),
-        (STAYS, 0.002, ["--every", "2ms", "--why", "--quantity", "swing"]),
+        (STAYS, 0.002, ["--every", "2ms", "--one-step"]),
         (NONE, 0.004, []),
     ],
 )

@@ -134,7 +134,7 @@ def test_the_first_screen_has_the_stages_that_differ() -> None:
     ]
     assert [row[0] for row in table.rows] == ["bias", "passive", FORCE]
     (code,) = blocks(asked, Code)
-    assert " ".join(code.lines).endswith("--why")
+    assert " ".join(code.lines).endswith("--one-step --details")
     same = page(result_of(steps_of(SAME)))
     assert not any("--why" in line for code in blocks(same, Code) for line in code.lines)
 

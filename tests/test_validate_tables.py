@@ -399,7 +399,7 @@ def test_the_next_command_names_the_worst_case_and_the_backends_that_are_not_usu
     assert typed(result_of(*rows))[1:] == ["validate", "--case", "roll", "--details"]
     request = {"backends": ("pybullet", "mujoco"), "cases": ("free-fall",)}
     asked = ["--backend", "pybullet", "--backend", "mujoco", "--case", "free-fall"]
-    assert typed(result_of(*rows, **request), details=True)[1:] == ["validate", *asked, "--json"]
+    assert typed(result_of(*rows, **request))[1:] == ["validate", *asked, "--details"]
 
 
 def test_a_failed_test_tells_its_errors_its_order_and_its_record() -> None:

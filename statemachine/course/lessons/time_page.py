@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...lab.runs.interleaved_timing import MIN_ROUNDS
-from ...measures.text import duration
+from ...measures.text import duration, significant
 from ...show.blocks import Block, Table
 from ...show.engine_tables import Results, by_engine
 from ...show.labels import TableLabels
@@ -124,7 +124,7 @@ def _paces(results: Results[TimeResult]) -> Table:
 
 def _unpaced(result: TimeResult) -> str:
     """Write the wall time of the run that does not wait."""
-    return f"{duration(result.free)}, {result.factor:.3g} × real time"
+    return f"{duration(result.free)}, {significant(result.factor, 3)} × real time"
 
 
 def _paced_by_clock(result: TimeResult) -> str:
