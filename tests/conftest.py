@@ -105,7 +105,13 @@ def _memory_is_given_back() -> Iterator[None]:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-@pytest.fixture(params=backend_names())
+# The contract on the third engine is for the slow part; its own file has quick tests.
+_EACH = [
+    pytest.param(name, marks=[pytest.mark.slow] * (name not in BOTH)) for name in backend_names()
+]
+
+
+@pytest.fixture(params=_EACH)
 def backend(request: pytest.FixtureRequest) -> str:
     """Every backend whose engine is here."""
     engine = backend_engine(request.param)
