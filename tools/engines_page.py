@@ -28,6 +28,8 @@ from statemachine.lab.runs.usual_commands import hold_ctrl
 from statemachine.measures.text import versions_of
 from statemachine.show.blocks import Table
 
+from .validate_table import no_picture
+
 TARGET = Path(__file__).parent.parent / "docs" / "engines.md"
 START = "<!-- What follows is made by `python -m tools.engines_page`. -->"
 END = "<!-- What was made by `python -m tools.engines_page` ends here. -->"
@@ -129,12 +131,8 @@ def computed_part(conventions: Conventions, backends: Sequence[str], date: str) 
     }
     parts = [START, f"*{versions_of(conventions.versions)}*"]
     for title, table in tables.items():
-        parts += [f"## {title}", block_as_markdown(table, _no_picture)]
+        parts += [f"## {title}", block_as_markdown(table, no_picture)]
     return "\n\n".join([*parts, END])
-
-
-def _no_picture(_picture: object) -> str:
-    return ""
 
 
 def document(text: str, computed: str) -> str:

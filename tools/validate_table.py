@@ -167,11 +167,14 @@ def document(result: ValidateResult, text: str) -> str:
             of_case = [row for row in result.results if row.name == name]
             rows += [row.cells for row in rows_of(of_case)]
         parts.append(f"## {group.capitalize()}")
-        parts.append(block_as_markdown(Table(_HEADERS, rows, words=frozenset({0, 1, 4, 5})), _no))
+        parts.append(
+            block_as_markdown(Table(_HEADERS, rows, words=frozenset({0, 1, 4, 5})), no_picture)
+        )
     return "\n\n".join(parts) + "\n"
 
 
-def _no(_picture: object) -> str:
+def no_picture(_picture: object) -> str:
+    """Return nothing: these tables have no pictures beside them."""
     return ""
 
 
