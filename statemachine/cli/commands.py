@@ -20,6 +20,7 @@ COMMANDS = {
     "robots": "any folder of models: what each does on every engine",
     "fingertip": "the engine's fingertip against an independent witness",
     "validate": "every engine against closed forms: who is right, by how much",
+    "policy": "a walking policy on each engine, as its contract says",
     "conventions": "what each engine takes for granted, asked of the engines",
     "engines": "other releases of an engine, to run and to compare",
 }

@@ -13,11 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from ...interface import Array, JointType
+from ...interface import JointType
 from ...measures import QUANTITIES, SAME_MOMENT, tolerance_of
-from ...rotations import matrix_from_quat
 from ..recordings import Trace
-from ..runs.floating import free_joint_of_robot
+from ..runs.floating import fallen_moments, free_joint_of_robot
 from .series import base_label
 
 FELL, DISTANCE, TRACKING, SLIDE_TRACKING = (
@@ -33,7 +32,6 @@ OUTCOMES: Mapping[str, str] = {
     TRACKING: "tracking",
     SLIDE_TRACKING: "slide tracking",
 }
-_LOWEST = 1 / 3  # of its height at the start: a base below it has fallen
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,7 @@ def outcomes_of_run(trace: Trace, until: float) -> dict[str, float | None]:
     if joint is not None and len(rows):
         first = trace.header.jnt_qposadr[joint]
         poses = trace.qpos[rows, first : first + 7]
-        fallen = _fallen(poses)
+        fallen = fallen_moments(poses)
         outcomes[FELL] = float(time[rows[fallen.argmax()]]) if fallen.any() else None
         outcomes[DISTANCE] = float(np.linalg.norm(poses[-1, :2] - poses[0, :2]))
     for name, kind in ((TRACKING, JointType.HINGE), (SLIDE_TRACKING, JointType.SLIDE)):
@@ -121,17 +119,6 @@ def outcomes_of_run(trace: Trace, until: float) -> dict[str, float | None]:
         if error is not None:
             outcomes[name] = error
     return outcomes
-
-
-def _fallen(poses: Array) -> Array:
-    """Tell at which moments (n,) a base with these poses (n, 7) has fallen."""
-    with np.errstate(invalid="ignore"):  # all zero is no rotation
-        matrices = matrix_from_quat(poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1)[:, None])
-    upward = matrices[:, 2]  # the direction that points up, in the axes of the base
-    fallen = upward @ upward[0] < 0
-    if poses[0, 2] > 0:  # below the origin there is no third of a height
-        fallen |= poses[:, 2] < _LOWEST * poses[0, 2]
-    return fallen
 
 
 def _tracking_error(trace: Trace, count: int, kind: JointType) -> float | None:

@@ -9,8 +9,11 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...interface import JointType
+from ...interface import Array, JointType
 from ...interface.records import Base
+from ...rotations import matrix_from_quat
+
+_LOWEST = 1 / 3  # of its height at the start: a base below it has fallen
 
 
 class RobotFacts(Protocol):
@@ -170,3 +173,21 @@ def _free_joint_above(facts: RobotFacts, body: int) -> int | None:
             return int(free[0])
         body = int(parents[body])
     return None
+
+
+def fallen_moments(poses: Array) -> Array:
+    """Tell at which moments (n,) a base has fallen.
+
+    It is below a third of its height at the start then, or the direction of its own that pointed up
+    at the start points down.
+
+    Args:
+        poses: (n, 7) of the base: position [m] and quaternion wxyz.
+    """
+    with np.errstate(invalid="ignore"):  # all zero is no rotation
+        matrices = matrix_from_quat(poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1)[:, None])
+    upward = matrices[:, 2]  # the direction that points up, in the axes of the base
+    fallen = upward @ upward[0] < 0
+    if poses[0, 2] > 0:  # below the origin there is no third of a height
+        fallen |= poses[:, 2] < _LOWEST * poses[0, 2]
+    return fallen

@@ -1,0 +1,106 @@
+"""`statemachine policy`: a walking policy on each engine, and what of its contract is wrong."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ..installed import DEFAULT
+from ..typed_numbers import typed_float
+from .common import (
+    CONTRACT_BACKENDS,
+    TerminalReporter,
+    add_backend,
+    add_json,
+    add_menagerie,
+    number_list,
+    show,
+)
+
+if TYPE_CHECKING:
+    from ..lab.policy.request import PolicyRequest
+    from ..lab.policy.walk import Command
+
+_SECONDS = 10.0
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add its options."""
+    parser.description = (
+        "Run a walking policy on engines, straight on and turning, as its contract says: which "
+        "speeds it reaches, whether it falls, and which servos are at their limits."
+    )
+    parser.epilog = (
+        "Exit code 1: it falls on an engine, or a speed is off by more than 0.1 m/s (rad/s) and a "
+        "quarter of what is asked."
+    )
+    parser.add_argument("policy", metavar="POLICY.onnx", help="the network")
+    parser.add_argument("model", metavar="NAME|FILE", help="the robot, on its ground")
+    parser.add_argument(
+        "--contract",
+        required=True,
+        metavar="FILE",
+        help="what the policy expects: gaitkeeper/contract/v3, or Unitree's deploy.yaml",
+    )
+    add_backend(parser, CONTRACT_BACKENDS)
+    parser.add_argument(
+        "--command",
+        action="append",
+        type=number_list,
+        metavar="VX,VY,WZ",
+        help="speeds that are asked for [m/s, m/s, rad/s]; may be repeated, a run each (default: "
+        "straight on, and turning)",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=typed_float,
+        default=_SECONDS,
+        metavar="S",
+        help=f"length of each run ({_SECONDS:g})",
+    )
+    parser.add_argument("--keyframe", metavar="NAME", help="where it starts (home)")
+    parser.add_argument(
+        "--details", action="store_true", help="way to the left, height and power of each run"
+    )
+    add_menagerie(parser)
+    add_json(parser)
+
+
+def request_of(options: argparse.Namespace) -> PolicyRequest:
+    """Return what was asked for.
+
+    Raises:
+        BadInputError: A command is no three numbers, or the time is out of range.
+        UnknownNameError: There is no such backend.
+    """
+    from ..lab.policy.request import PolicyRequest
+
+    return PolicyRequest(
+        policy=options.policy,
+        contract=options.contract,
+        model=options.model,
+        backends=tuple(options.backend or [DEFAULT]),
+        commands=tuple(_command_of(numbers) for numbers in options.command or ()),
+        seconds=options.seconds,
+        keyframe=options.keyframe,
+        menagerie=options.menagerie,
+    )
+
+
+def _command_of(numbers: list[float]) -> Command:
+    """Return the speeds of one run."""
+    from ..errors import BadInputError
+    from ..lab.policy.walk import Command
+
+    if len(numbers) != 3:
+        raise BadInputError(f"a command is vx,vy,wz, three numbers; got {len(numbers)}")
+    return Command(*numbers)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run it, and show."""
+    from ..lab.policy.page import page
+    from ..lab.policy.request import answer
+
+    result = answer(request_of(options), TerminalReporter())
+    return show(page(result, options.details), result, options.json)

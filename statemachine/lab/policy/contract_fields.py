@@ -1,0 +1,235 @@
+"""Fields of a contract's file, each checked as it is read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeGuard, cast
+
+import numpy as np
+
+from ...errors import BadInputError, did_you_mean, shown
+from ...interface import Array
+
+
+class Section:
+    """A section of a contract's file, which remembers what was read of it.
+
+    Attributes:
+        path: Where it stands: "control.actuators"; "" for the whole file.
+    """
+
+    def __init__(self, content: object, path: str, file: str) -> None:
+        if not isinstance(content, Mapping):
+            raise BadInputError(f"{file}: {path or 'a contract'} is a table; got {shown(content)}")
+        self._content = cast("Mapping[object, object]", content)
+        self._file = file
+        self._read: set[str] = set()
+        self._sections: list[Section] = []
+        self.path = path
+
+    def name_of(self, key: str) -> str:
+        """Return where a field stands: "control.actuators.kp"."""
+        return f"{self.path}.{key}" if self.path else key
+
+    def error(self, key: str, expected: str) -> BadInputError:
+        """Return the error for a field that is not what was expected."""
+        value = self._content.get(key)
+        name = self.name_of(key)
+        if value is None:
+            known = [str(name) for name in self._content]
+            return BadInputError(
+                f"{self._file}: {name} is missing; {expected}{did_you_mean(key, known)}"
+            )
+        return BadInputError(f"{self._file}: {name}: {expected}; got {shown(value)}")
+
+    def value(self, key: str) -> object:
+        """Return a field as it stands; None where it is missing."""
+        self._read.add(key)
+        return self._content.get(key)
+
+    def has(self, key: str) -> bool:
+        """Tell whether a field is there, and not null."""
+        return self._content.get(key) is not None
+
+    def fields(self) -> list[str]:
+        """Return the names of all fields, in their order."""
+        return [str(key) for key in self._content]
+
+    def section(self, key: str) -> Section:
+        """Return a section of this one; an empty one where it is missing."""
+        content = self.value(key)
+        section = Section({} if content is None else content, self.name_of(key), self._file)
+        self._sections.append(section)
+        return section
+
+    def sections(self, key: str) -> list[Section]:
+        """Return a list of sections.
+
+        Raises:
+            BadInputError: It is no list with at least one.
+        """
+        entries = self.value(key)
+        if not _is_list(entries) or not len(entries):
+            raise self.error(key, "a list of tables is expected")
+        sections: list[Section] = []
+        for number, entry in enumerate(entries):
+            sections.append(Section(entry, f"{self.name_of(key)}[{number}]", self._file))
+        self._sections += sections
+        return sections
+
+    def text(self, key: str, choices: Sequence[str], default: str = "") -> str:
+        """Return a word that is one of several.
+
+        Raises:
+            BadInputError: It is none of them.
+        """
+        word = self.value(key)
+        if word is None and default:
+            return default
+        if not isinstance(word, str) or (choices and word not in choices):
+            hint = did_you_mean(word, choices) if isinstance(word, str) else ""
+            wanted = f"one of {', '.join(choices)} is expected" if choices else "a name is expected"
+            raise self.error(key, wanted + hint)
+        return word
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """Return a finite number.
+
+        Raises:
+            BadInputError: It is none.
+        """
+        value = self.value(key)
+        if value is None and default is not None:
+            return default
+        if not _is_number(value):
+            raise self.error(key, "a finite number is expected")
+        return float(value)
+
+    def positive(self, key: str) -> float:
+        """Return a number above 0.
+
+        Raises:
+            BadInputError: It is none.
+        """
+        value = self.number(key)
+        if value <= 0.0:
+            raise self.error(key, "a number above 0 is expected")
+        return value
+
+    def count(self, key: str, default: int | None = None, least: int = 0) -> int:
+        """Return a whole number.
+
+        Raises:
+            BadInputError: It is none, or below the least.
+        """
+        value = self.number(key, default)
+        if value != int(value) or value < least:
+            raise self.error(key, f"a whole number from {least} on is expected")
+        return int(value)
+
+    def flag(self, key: str, default: bool) -> bool:
+        """Return true or false.
+
+        Raises:
+            BadInputError: It is neither.
+        """
+        value = self.value(key)
+        if value is None:
+            return default
+        if not isinstance(value, bool):
+            raise self.error(key, "true or false is expected")
+        return value
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Return names, each once.
+
+        Raises:
+            BadInputError: It is no such list.
+        """
+        entries = self.value(key)
+        if not _is_list(entries) or not len(entries):
+            raise self.error(key, "a list of names is expected")
+        names = [str(entry) for entry in entries]
+        if len(set(names)) != len(names):
+            raise self.error(key, "each name once is expected")
+        return tuple(names)
+
+    def numbers(self, key: str, size: int, default: float | None = None) -> Array:
+        """Return `size` numbers, given as a list, or as one number for all.
+
+        Raises:
+            BadInputError: It is neither.
+        """
+        value = self.value(key)
+        if value is None and default is not None:
+            value = default
+        if _is_number(value):
+            return np.full(size, float(value))
+        if (
+            not _is_list(value)
+            or len(value) != size
+            or not all(_is_number(entry) for entry in value)
+        ):
+            raise self.error(key, f"{size} numbers, or one for all, are expected")
+        return np.array(value, dtype=np.float64)
+
+    def pair(self, key: str) -> tuple[float, float] | None:
+        """Return a lower and an upper limit; None where it is missing.
+
+        Raises:
+            BadInputError: It is no pair of numbers in order.
+        """
+        if not self.has(key):
+            self.value(key)
+            return None
+        low, high = self.numbers(key, 2)
+        if low > high:
+            raise self.error(key, "the lower limit comes first")
+        return float(low), float(high)
+
+    def per_joint(self, key: str, joints: Sequence[str], null: float | None = None) -> Array | None:
+        """Return a number for each joint, (n,); None where the field is missing.
+
+        Args:
+            key: The field: a table by the names of joints, a list in their order, or one number.
+            joints: Their names.
+            null: What stands for a joint whose number is null; None where that is an error.
+
+        Raises:
+            BadInputError: A joint has no number.
+        """
+        value = self.value(key)
+        if value is None:
+            return None
+        if not isinstance(value, Mapping):
+            return self.numbers(key, len(joints))
+        table = cast("Mapping[object, object]", value)
+        numbers: list[float] = []
+        for joint in joints:
+            number = table.get(joint)
+            if joint in table and number is None and null is not None:
+                number = null
+            if not isinstance(number, int | float) or isinstance(number, bool):
+                hint = did_you_mean(joint, [str(name) for name in table])
+                raise BadInputError(
+                    f"{self._file}: {self.name_of(key)} has no number for the joint {joint!r}{hint}"
+                )
+            numbers.append(float(number))
+        return np.array(numbers)
+
+    def unread(self) -> Iterator[str]:
+        """Yield the fields that nothing has read, and that are not null."""
+        for key in self.fields():
+            if key not in self._read and self.has(key):
+                yield self.name_of(key)
+        for section in self._sections:
+            yield from section.unread()
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_list(value: object) -> TypeGuard[Sequence[object]]:
+    return isinstance(value, list | tuple)

@@ -1,0 +1,357 @@
+"""A contract from its file: gaitkeeper's format, or what Unitree's robots are deployed with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, cast, get_args
+
+import numpy as np
+
+from ...errors import BadInputError, did_you_mean, one_line
+from ...installed import require_extra
+from ...interface import Array
+from ...models import AnyPath, check_is_file
+from .contract import (
+    AXES,
+    Action,
+    ActuatorKind,
+    Clock,
+    Contract,
+    Frame,
+    History,
+    Init,
+    Layout,
+    Order,
+    QuatOrder,
+    Servos,
+    Term,
+    TermId,
+    Timing,
+)
+from .contract_fields import Section
+
+# The format of the package gaitkeeper 0.5 (Apache-2.0).
+SCHEMA: Final = "gaitkeeper/contract/v3"
+EXTRA: Final = "policy"
+_TERMS: tuple[TermId, ...] = get_args(TermId)
+_FRAMES: tuple[Frame, ...] = get_args(Frame)
+_KINDS: tuple[ActuatorKind, ...] = get_args(ActuatorKind)
+_OF_THREE = ("base_lin_vel", "base_ang_vel", "projected_gravity", "velocity_commands")
+_OF_ENCODERS = ("joint_pos_rel", "joint_vel_rel")
+_OF_CLOCK = {"gait_phase": 2, "gait_phase_legs": 4}
+# Sections that say where the figures come from: nothing is computed from them.
+_SOURCES = ("schema", "source", "provenance", "evidence")
+_LARGEST_FILE = 2_000_000  # bytes; a contract has a few thousand
+_WHOLE = 1e-6  # of a step: a number of steps that is nearer to a whole one is that one
+
+
+def read_contract(file: AnyPath) -> Contract:
+    """Return the contract that a file holds.
+
+    Args:
+        file: YAML of the format `gaitkeeper/contract/v3`, or a `deploy.yaml` of Unitree's.
+
+    Raises:
+        BadInputError: The file is missing, or a field is missing, misspelt or out of range.
+        MissingEngineError: PyYAML is not installed.
+    """
+    path = Path(file)
+    content = _yaml_of(path)
+    if "joint_ids_map" in content:
+        from .unitree_deploy import contract_of_deploy
+
+        return contract_of_deploy(content, path.name)
+    schema = content.get("schema")
+    if schema != SCHEMA:
+        raise BadInputError(
+            f"{path.name} is no contract: schema is {schema!r}, and {SCHEMA!r} is expected (or a "
+            "deploy.yaml of Unitree's, which has joint_ids_map)"
+        )
+    return _contract_of(Section(content, "", path.name), path.name)
+
+
+def _yaml_of(path: Path) -> Mapping[str, object]:
+    """Return the table that a YAML file holds."""
+    yaml = require_extra("yaml", "a policy's contract", "PyYAML", EXTRA)
+    check_is_file(path)
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise BadInputError(f"{path} is too large for a contract (2 MB)")
+        content = yaml.safe_load(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise BadInputError(f"there is no contract {path}") from None
+    except (OSError, UnicodeDecodeError, RecursionError, ValueError) as error:
+        raise BadInputError(f"{path} cannot be read: {one_line(error)}") from error
+    except yaml.YAMLError as error:
+        raise BadInputError(f"{path.name} is no YAML: {one_line(error)}") from error
+    if not isinstance(content, Mapping):
+        raise BadInputError(f"{path.name} is no contract: a table is expected")
+    return cast("Mapping[str, object]", content)
+
+
+def _contract_of(root: Section, file: str) -> Contract:
+    """Return the contract of a file in gaitkeeper's format."""
+    for key in _SOURCES:
+        root.value(key)
+    policy_io, control = root.section("policy_io"), root.section("control")
+    joints = policy_io.section("joints").names("names")
+    default = control.per_joint("default_joint_pos", joints)
+    if default is None:
+        raise control.error("default_joint_pos", "an angle for each joint is expected")
+    group = policy_io.section("observation_groups").section("policy")
+    imu = _imu(policy_io.section("imu"))
+    terms = _terms(group, joints, default, imu)
+    contract = Contract(
+        file=file,
+        schema=SCHEMA,
+        joints=joints,
+        default_joint_pos=default,
+        terms=terms,
+        quat_order=imu.quat_order,
+        history=_history(group.section("history")),
+        clips_before_scale=group.flag("clip_then_scale", True),
+        action=_action(control.section("actions").section("joint_pos"), joints, default),
+        servos=_servos(control.section("actuators"), root.section("model"), joints),
+        timing=_timing(root.section("timing")),
+        command_limits=_command_limits(policy_io.section("commands").section("base_velocity")),
+    )
+    unread = tuple(root.unread())
+    return replace(contract, unread=unread)
+
+
+@dataclass(frozen=True)
+class _Imu:
+    """How the harness reads the sensors of the base.
+
+    Attributes:
+        frame: In which axes the gyroscope tells the angular velocity.
+        site: Whose axes these are; "" for those of the base.
+        quat_order: In which order the quaternion of the base is taken for its numbers.
+    """
+
+    frame: Frame
+    site: str
+    quat_order: QuatOrder
+
+
+def _imu(imu: Section) -> _Imu:
+    """Return how the harness reads the sensors of the base."""
+    imu.value("body")
+    rotation = imu.numbers("rotation_in_root", 4) if imu.has("rotation_in_root") else None
+    if rotation is not None and not np.array_equal(np.abs(rotation), (1.0, 0.0, 0.0, 0.0)):
+        raise imu.error(
+            "rotation_in_root", "a sensor that is turned is told by imu.site, a site of the model"
+        )
+    return _Imu(
+        frame=cast("Frame", imu.text("frame", _FRAMES, "body")),
+        site=imu.text("site", (), "") if imu.has("site") else "",
+        quat_order=cast("QuatOrder", imu.text("quat_order", get_args(QuatOrder), "wxyz")),
+    )
+
+
+def _terms(group: Section, joints: Sequence[str], default: Array, imu: _Imu) -> tuple[Term, ...]:
+    """Return the terms of an observation."""
+    terms: list[Term] = []
+    for section in group.sections("terms"):
+        term = _term(section, joints, default, imu)
+        if any(known.name == term.name for known in terms):
+            raise section.error("source_name", f"a name of its own for the second {term.id}")
+        terms.append(term)
+    return tuple(terms)
+
+
+def _term(section: Section, joints: Sequence[str], default: Array, imu: _Imu) -> Term:
+    """Return one term of an observation."""
+    term_id = cast("TermId", section.text("id", _TERMS))
+    parameters = section.section("params")
+    dim = _dim(term_id, parameters, len(joints))
+    if section.count("dim", dim, 1) != dim:
+        raise section.error("dim", f"{term_id} has {dim} numbers")
+    if parameters.count("lag", 1) != 1:
+        raise parameters.error("lag", "the last action alone (1) can be observed")
+    if parameters.has("index"):
+        raise parameters.error("index", "terms are taken whole")
+    frame, site = imu.frame, imu.site
+    if term_id == "base_lin_vel":
+        frame, site = "body", ""
+    if term_id in ("base_lin_vel", "base_ang_vel"):
+        frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
+        site = parameters.text("site", (), "") if parameters.has("site") else site
+    told = _told_joints(parameters, joints) if term_id in _OF_ENCODERS else ()
+    reference: Array | None = None
+    if term_id == "joint_pos_rel":
+        reference = parameters.per_joint("default", told or joints)
+        if reference is None:
+            order = [joints.index(joint) for joint in told or joints]
+            reference = default[order]
+    values: tuple[float, ...] = ()
+    if term_id == "constant":
+        values = tuple(parameters.numbers("value", dim).tolist())
+    return Term(
+        id=term_id,
+        name=section.text("source_name", (), term_id),
+        scale=section.numbers("scale", dim, 1.0),
+        clip=section.pair("clip"),
+        joints=told,
+        reference=reference,
+        frame=frame,
+        site=site,
+        clock=_clock(parameters) if term_id in _OF_CLOCK else None,
+        values=values,
+    )
+
+
+def _told_joints(parameters: Section, joints: Sequence[str]) -> tuple[str, ...]:
+    """Return whose angles or speeds a term tells; empty for those of the policy, in its order."""
+    if not parameters.has("joints"):
+        return ()
+    told = parameters.names("joints")
+    if sorted(told) != sorted(joints):
+        raise parameters.error("joints", "the joints of the policy are expected, in any order")
+    return () if told == tuple(joints) else told
+
+
+def _dim(term_id: TermId, parameters: Section, n: int) -> int:
+    """Return how many numbers a term has."""
+    if term_id in _OF_THREE:
+        return 3
+    if term_id in _OF_CLOCK:
+        return _OF_CLOCK[term_id]
+    if term_id == "constant":
+        value = parameters.value("value")
+        return len(value) if isinstance(value, list) else 1
+    return n
+
+
+def _clock(parameters: Section) -> Clock:
+    """Return the clock of a term that tells a phase."""
+    parameters.value("clock")
+    parameters.value("arithmetic")  # of which precision the phase is
+    if parameters.has("stand") or parameters.has("gate"):
+        key = "stand" if parameters.has("stand") else "gate"
+        raise parameters.error(key, "a clock that stops is told by stand_threshold alone")
+    threshold: float | None = None
+    if parameters.has("stand_threshold"):
+        threshold = parameters.number("stand_threshold")
+    return Clock(
+        period=parameters.positive("period"),
+        offset=parameters.number("offset", 0.5),
+        offset_steps=parameters.count("clock_offset_steps", 0),
+        stand_threshold=threshold,
+    )
+
+
+def _history(section: Section) -> History:
+    """Return how earlier observations are handed over."""
+    for key in ("chunks", "first_frame"):
+        if section.has(key):
+            raise section.error(key, "a history is told by length, layout, order and init alone")
+    return History(
+        length=section.count("length", 1, 1),
+        layout=cast("Layout", section.text("layout", get_args(Layout), "term_major")),
+        order=cast("Order", section.text("order", get_args(Order), "oldest_first")),
+        init=cast("Init", section.text("init", get_args(Init), "repeat_first")),
+    )
+
+
+def _action(section: Section, joints: Sequence[str], default: Array) -> Action:
+    """Return how actions become targets."""
+    section.value("kind")
+    section.value("joints")
+    stage = section.text("clip_stage", ("processed", "none"), "processed")
+    section.text("filter", ("none",), "none")
+    scale = section.per_joint("scale", joints)
+    offset = section.per_joint("offset", joints)
+    clip: Array | None = None
+    if section.has("clip") and stage == "processed":
+        clip = _clip(section, len(joints))
+    else:
+        section.value("clip")
+    return Action(
+        scale=np.ones(len(joints)) if scale is None else scale,
+        offset=default if offset is None else offset,
+        clip=clip,
+        delay_steps=section.count("delay_steps", 0),
+    )
+
+
+def _clip(section: Section, n: int) -> Array:
+    """Return the limits (n, 2) of the targets, given as one pair or as one for each joint."""
+    value = section.value("clip")
+    if isinstance(value, list) and len(value) == n and isinstance(value[0], list):
+        clip = np.array(value, dtype=np.float64)
+        if clip.shape == (n, 2):
+            return clip
+    pair = section.pair("clip")
+    if pair is None:
+        raise section.error("clip", "a lower and an upper limit are expected")
+    return np.tile(pair, (n, 1))
+
+
+def _servos(actuators: Section, model: Section, joints: Sequence[str]) -> Servos:
+    """Return what drives the joints."""
+    for key in ("pd_period", "integrator", "torque_limit_at"):
+        actuators.value(key)
+    kind: ActuatorKind | None = None
+    if actuators.has("kind"):
+        kind = cast("ActuatorKind", actuators.text("kind", _KINDS))
+    else:
+        actuators.value("kind")
+    for key in ("root", "velocity_limit", "training_envelope"):
+        model.value(key)
+    servos = Servos(
+        kind=kind,
+        kp=actuators.per_joint("kp", joints),
+        kd=actuators.per_joint("kd", joints),
+        effort_limit=model.per_joint("effort_limit", joints, np.inf),
+        armature=model.per_joint("armature", joints),
+        damping=model.per_joint("joint_damping", joints),
+        friction=model.per_joint("joint_friction", joints),
+    )
+    if kind == "explicit_pd" and (servos.kp is None or servos.kd is None):
+        raise actuators.error("kp", "torques that are computed outside need kp and kd")
+    return servos
+
+
+def _timing(section: Section) -> Timing:
+    """Return how often the policy is called."""
+    for key in ("order", "target_hold"):
+        section.value(key)
+    policy_dt = section.positive("policy_dt")
+    decimation: int | None = None
+    if section.has("decimation"):
+        decimation = section.count("decimation", None, 1)
+    if section.has("sim_dt"):
+        steps = policy_dt / section.positive("sim_dt")
+        if abs(steps - round(steps)) > _WHOLE * steps:
+            raise section.error("sim_dt", f"a whole part of policy_dt = {policy_dt:g} is expected")
+        if decimation is not None and decimation != round(steps):
+            raise section.error("decimation", f"policy_dt / sim_dt = {round(steps)} is expected")
+        decimation = round(steps)
+    return Timing(policy_dt, decimation)
+
+
+def _command_limits(section: Section) -> dict[str, tuple[float, float]]:
+    """Return the speeds that the policy may be asked for, by axis."""
+    for key in ("name", "trained", "heading"):
+        section.value(key)
+    for key in ("shaping", "gate"):
+        if section.has(key):
+            raise section.error(key, "commands go to the policy as they are")
+    limits: dict[str, tuple[float, float]] = {}
+    if not section.has("limit"):
+        section.value("limit")
+        return limits
+    limit = section.section("limit")
+    for axis in limit.fields():
+        if axis not in AXES:
+            raise BadInputError(
+                f"{limit.name_of(axis)} is no axis of a command{did_you_mean(axis, AXES)}; "
+                f"known: {', '.join(AXES)}"
+            )
+        pair = limit.pair(axis)
+        if pair is not None:
+            limits[axis] = pair
+    return limits

@@ -1,0 +1,264 @@
+"""Page of a policy on engines: whether it walks, and how."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...measures.text import command, percent, significant
+from ...program import NAME
+from ...show.blocks import Page, Table, TableCell
+from ...show.templates import PageContent, render
+from .adapted import ContractChange
+from .checks import ContractNote
+from .request import EngineWalks, PolicyResult
+from .walk import Walk
+
+_NO_NUMBER = "–"
+
+
+@dataclass(frozen=True)
+class _Trouble:
+    """A run that did not do as it was asked.
+
+    Attributes:
+        backend: As it is typed behind --backend.
+        walk: What came of it.
+    """
+
+    backend: str
+    walk: Walk
+
+    @property
+    def verdict(self) -> str:
+        """Return what came of it."""
+        return self.walk.verdict
+
+    @property
+    def axis(self) -> str:
+        """Return the axis whose speed is farthest from the one asked for."""
+        return self.walk.worst_axis
+
+    @property
+    def asked(self) -> float:
+        """Return the speed that was asked for on that axis."""
+        return float(getattr(self.walk.command, self.axis))
+
+    @property
+    def reached(self) -> float:
+        """Return the speed that was reached on it."""
+        assert self.walk.reached is not None
+        return self.walk.reached[("vx", "vy", "wz").index(self.axis)]
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of both."""
+        return "rad/s" if self.axis == "wz" else "m/s"
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What the contract says otherwise than the model's file.
+
+    Attributes:
+        change: The change.
+    """
+
+    change: ContractChange
+
+    @property
+    def name(self) -> str:
+        """Return which property."""
+        return self.change.name
+
+    @property
+    def is_of_servos(self) -> bool:
+        """Tell whether it is who computes the torques."""
+        return self.change.file is None
+
+    @property
+    def file(self) -> str:
+        """Return the values in the file."""
+        return _range(self.change.file, self.change.unit)
+
+    @property
+    def contract(self) -> str:
+        """Return the values in the contract."""
+        return _range(self.change.contract, self.change.unit)
+
+
+@dataclass(frozen=True)
+class PolicyPage(PageContent):
+    """What the page of a policy shows.
+
+    Attributes:
+        result: What was computed.
+        troubles: The runs that did not do as they were asked.
+        refused: The engines that refused the contract.
+        walks: Table with a row for each engine and command.
+        changes: What the contract says otherwise than the model's file.
+        next_command: What to type next; "" for nothing.
+    """
+
+    template = "policy.md.j2"
+    result: PolicyResult
+    troubles: Sequence[_Trouble]
+    refused: Sequence[EngineWalks]
+    walks: Table
+    changes: Sequence[_Change]
+    next_command: str
+
+    @property
+    def origin(self) -> str:
+        """Return contract, model and engines, with their versions."""
+        result = self.result
+        engines = ", ".join(
+            f"{engine.backend} ({engine.provenance.versions[engine.provenance.backend]})"
+            for engine in result.engines
+        )
+        model = result.engines[0].provenance.model_file
+        return f"{result.contract.file}, {model}, {engines}"
+
+    @property
+    def policy(self) -> str:
+        """Return the name of the policy's file."""
+        return self.result.network.file
+
+    @property
+    def model_file(self) -> str:
+        """Return the name of the model's file."""
+        return self.result.engines[0].provenance.model_file.rpartition("/")[2]
+
+    @property
+    def contract_file(self) -> str:
+        """Return the name of the contract's file."""
+        return self.result.contract.file
+
+    @property
+    def backends(self) -> list[str]:
+        """Return the engines."""
+        return [engine.backend for engine in self.result.engines]
+
+    @property
+    def seconds(self) -> float:
+        """Return how long each run is [s]."""
+        return self.result.request.seconds
+
+    @property
+    def commands(self) -> int:
+        """Return the number of runs on each engine."""
+        return len(self.result.commands)
+
+    @property
+    def notes(self) -> Sequence[ContractNote]:
+        """Return what is odd about the contract and the model."""
+        return self.result.notes
+
+    @property
+    def decimation(self) -> int:
+        """Return the number of steps of the engine between two calls."""
+        timing = self.result.contract.timing
+        timestep = self.result.engines[0].provenance.timestep
+        return timing.decimation or round(timing.policy_dt / timestep)
+
+
+def page(result: PolicyResult, details: bool = False) -> Page:
+    """Return the result as a page.
+
+    Args:
+        result: What was computed.
+        details: Whether lateral way, height and power of each run are shown.
+    """
+    troubles: list[_Trouble] = []
+    for engine in result.engines:
+        for walk in engine.walks:
+            if walk.verdict != "walks":
+                troubles.append(_Trouble(engine.backend, walk))
+    content = PolicyPage(
+        result=result,
+        troubles=troubles,
+        refused=[engine for engine in result.engines if engine.refusal],
+        walks=_table_of_walks(result, details),
+        changes=[_Change(change) for change in result.engines[0].changes],
+        next_command=_next_command(result, details),
+    )
+    return render(content)
+
+
+def _table_of_walks(result: PolicyResult, details: bool) -> Table:
+    """Return the table with a row for each engine and command."""
+    headers = ["engine", "asked", "vx", "vy", "wz", "it", "at a limit"]
+    if details:
+        headers = ["engine", "asked", "it", "to the left", "turned", "height", "power"]
+    rows: list[list[str]] = []
+    for engine in result.engines:
+        for walk in engine.walks:
+            cells = [engine.backend, walk.command.words]
+            rows.append(cells + (_details(walk) if details else _speeds(walk)))
+    words = {headers.index(name) for name in ("engine", "asked", "it")}
+    return Table(headers, rows, words=frozenset(words))
+
+
+def _speeds(walk: Walk) -> list[str]:
+    """Return what a row shows of a run."""
+    speeds = [_NO_NUMBER] * 3
+    if walk.reached is not None:
+        speeds = [f"{speed:z.2f}" for speed in walk.reached]
+    return [*speeds, _outcome(walk), percent(walk.at_limit)]
+
+
+def _details(walk: Walk) -> list[str]:
+    """Return what a row of the details shows of a run."""
+    height = _NO_NUMBER if walk.height is None else f"{walk.height:.3f} m"
+    return [
+        _outcome(walk),
+        f"{walk.lateral:z.2f} m",
+        f"{math.degrees(walk.turned):z.0f}°",
+        height,
+        f"{walk.power:.0f} W",
+    ]
+
+
+def _outcome(walk: Walk) -> str:
+    """Return what came of a run, in words."""
+    verdict = "agrees" if walk.verdict == "walks" else "differs"
+    text: str = walk.verdict
+    if walk.ending != "walked":
+        text = f"{walk.verdict} at {walk.seconds:.1f} s"
+    return TableCell(text, verdict=verdict)
+
+
+def _range(values: tuple[float, float] | None, unit: str) -> str:
+    """Return the least and the largest of values, once where they are equal."""
+    if values is None:
+        return ""
+    low, high = (significant(value, 3) for value in values)
+    text = low if low == high else f"{low} to {high}"
+    return f"{text} {unit}"
+
+
+def words_of_request(result: PolicyResult) -> list[str]:
+    """Return how the question is typed."""
+    request = result.request
+    words = [NAME, "policy", str(request.policy), str(request.model)]
+    words += ["--contract", str(request.contract)]
+    for backend in request.backends:
+        words += ["--backend", backend]
+    for asked in request.commands:
+        words.append(f"--command={asked.words}")
+    return words
+
+
+def _next_command(result: PolicyResult, details: bool) -> str:
+    """Return what to type next; "" for nothing."""
+    options = (
+        ("--seconds", result.request.seconds, 10.0),
+        ("--keyframe", result.request.keyframe, None),
+    )
+    words = words_of_request(result)
+    if not result.holds:
+        return command([*words, "--faults"], *options)
+    if details:
+        return ""
+    return command([*words, "--details"], *options)

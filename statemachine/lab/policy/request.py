@@ -1,0 +1,196 @@
+"""A policy on each engine: what is asked, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ...backends.chosen import chosen_backends
+from ...errors import BadInputError, UnsupportedError
+from ...installed import DEFAULT
+from ...interface import Model
+from ...models import AnyPath
+from ..runs.drive import Progress, progress_of_stage
+from ..runs.each_backend import on_each_backend
+from ..runs.provenance import Provenance, provenance
+from ..runs.reporter import QUIET, Reporter
+from ..runs.robot import home_keyframe
+from .adapted import ContractChange, adapted
+from .binding import bind
+from .checks import ContractNote, check_network, notes_of
+from .contract import Contract
+from .contract_file import read_contract
+from .network import Network, NetworkFacts
+from .walk import Command, Walk, walked
+
+_SECONDS = 10.0
+# Where the contract names no limits: forward [m/s], turning [rad/s].
+_FORWARD, _TURN = 0.5, 0.5
+_PART = 0.6  # of a limit: what is asked by default
+_LONGEST = 600.0  # [s]
+
+
+@dataclass(frozen=True)
+class PolicyRequest:
+    """Question how a policy walks on engines.
+
+    Attributes:
+        policy: An ONNX file.
+        contract: What it expects of the simulator: a YAML file.
+        model: A name or a file of a robot, with the ground that it walks on.
+        backends: As `parse_backend` reads them; "all" for those that are installed.
+        commands: The speeds that it is asked for, one run each; empty for straight on and turning,
+            within what the contract allows.
+        seconds: Of each run [s].
+        keyframe: Where it starts; None for "home" if there is one.
+        menagerie: A menagerie folder to look the model's name up in.
+    """
+
+    policy: AnyPath
+    contract: AnyPath
+    model: AnyPath
+    backends: tuple[str, ...] = (DEFAULT,)
+    commands: tuple[Command, ...] = ()
+    seconds: float = _SECONDS
+    keyframe: str | None = None
+    menagerie: AnyPath | None = None
+
+    def __post_init__(self) -> None:
+        if not self.backends:
+            raise BadInputError("no backend is named: name one, or all")
+        chosen_backends(self.backends)
+        if not 0.0 < self.seconds <= _LONGEST:
+            raise BadInputError(
+                f"seconds are above 0 and at most {_LONGEST:g}; got {self.seconds:g}"
+            )
+
+
+@dataclass(frozen=True)
+class EngineWalks:
+    """How a policy walks on one engine.
+
+    Attributes:
+        backend: As it is typed behind --backend.
+        provenance: What it was computed with.
+        changes: What the contract says otherwise than the model's file, and what was run.
+        walks: One for each command; empty where it was refused.
+        refusal: Why it was refused; "" otherwise.
+    """
+
+    backend: str
+    provenance: Provenance
+    changes: tuple[ContractChange, ...]
+    walks: tuple[Walk, ...]
+    refusal: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Tell whether it does as it is asked, in each run."""
+        return not self.refusal and all(walk.verdict == "walks" for walk in self.walks)
+
+
+@dataclass(frozen=True)
+class PolicyResult:
+    """How a policy walks on engines.
+
+    Attributes:
+        request: What was asked.
+        contract: As it was read.
+        network: What the file of the policy says.
+        commands: The speeds that were asked for.
+        notes: What is odd about the contract and the model, and no fault.
+        engines: One for each engine.
+    """
+
+    request: PolicyRequest
+    contract: Contract = field(metadata={"json": False})
+    network: NetworkFacts
+    commands: tuple[Command, ...]
+    notes: tuple[ContractNote, ...]
+    engines: tuple[EngineWalks, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Tell whether it does as it is asked on each engine."""
+        return all(engine.holds for engine in self.engines)
+
+
+def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
+    """Run a policy on each engine, once for each command.
+
+    Raises:
+        BadInputError: The contract, the network and the model do not fit together.
+        MissingEngineError: An engine or the extra `policy` is not installed.
+        StateMachineError: The model cannot be loaded.
+    """
+    contract = read_contract(request.contract)
+    network = Network(request.policy)
+    check_network(contract, network.facts)
+    commands = request.commands or usual_commands(contract)
+    notes: list[ContractNote] = []
+
+    def compute(model: Model, backend: str, progress: Progress) -> EngineWalks:
+        binding = bind(contract, model)
+        if not notes:
+            start = _start_of(model, request.keyframe)
+            notes.extend(notes_of(contract, model, binding, start, commands))
+        source = provenance(model, onnxruntime=network.facts.version)
+        try:
+            driven = adapted(model, contract, binding)
+        except UnsupportedError as error:
+            return EngineWalks(backend, source, (), (), str(error))
+        walks: list[Walk] = []
+        for number, command in enumerate(commands):
+            share = 1.0 / len(commands)
+            stage = progress_of_stage(progress, number * share, share)
+            recorded = walked(
+                contract,
+                network,
+                binding,
+                driven,
+                command,
+                request.seconds,
+                request.keyframe,
+                stage,
+            )
+            walks.append(recorded.walk)
+        return EngineWalks(backend, source, driven.changes, tuple(walks))
+
+    engines = on_each_backend(
+        request.backends,
+        Path(request.policy).name,
+        request.model,
+        request.menagerie,
+        compute,
+        reporter,
+    )
+    return PolicyResult(
+        request=request,
+        contract=contract,
+        network=network.facts,
+        commands=commands,
+        notes=tuple(notes),
+        engines=tuple(engines.values()),
+    )
+
+
+def usual_commands(contract: Contract) -> tuple[Command, ...]:
+    """Return straight on and turning, within what a contract allows.
+
+    A gyroscope that is read in the axes of the world shows while the robot turns, and not before.
+    """
+    limits = contract.command_limits
+    forward, turn = _FORWARD, _TURN
+    if "vx" in limits:
+        forward = min(_FORWARD, _PART * limits["vx"][1])
+    if "wz" in limits:
+        turn = min(_TURN, _PART * limits["wz"][1])
+    return Command(forward), Command(forward, 0.0, turn)
+
+
+def _start_of(model: Model, keyframe: str | None) -> np.ndarray | None:
+    """Return the qpos (nq,) of the keyframe in which runs start; None for the default state."""
+    key = home_keyframe(model) if keyframe is None else keyframe
+    return None if key is None else model.keyframes[model.key_id(key)].qpos
