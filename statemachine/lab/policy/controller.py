@@ -8,11 +8,8 @@ import numpy as np
 
 from ...errors import BadInputError
 from ...interface import Array, Data, Model
-from .adapted import AdaptedModel
-from .binding import Binding
-from .contract import Contract
-from .network import Network
 from .observation import Observer, Stack
+from .on_model import PolicyOnModel
 
 
 @dataclass(frozen=True)
@@ -44,26 +41,17 @@ class PolicyController:
         work: That the servos have done [J]; what they took back does not count.
     """
 
-    def __init__(
-        self,
-        contract: Contract,
-        network: Network,
-        binding: Binding,
-        driven: AdaptedModel,
-        command: Array,
-    ) -> None:
+    def __init__(self, policy: PolicyOnModel, command: Array) -> None:
         """Make the controller of one run.
 
         Args:
-            contract: What the policy expects.
-            network: Reset here.
-            binding: Where the joints of the contract are in the model.
-            driven: The model that is run, and how its joints are driven.
+            policy: Its network is reset here.
             command: (3,) speeds that are asked for: vx, vy [m/s], wz [rad/s].
         """
+        contract, binding, driven = policy.contract, policy.binding, policy.driven
         n = len(contract.joints)
         self._contract = contract
-        self._network = network
+        self._network = policy.network
         self._binding = binding
         self._driven = driven
         self._command = command
@@ -82,7 +70,7 @@ class PolicyController:
         self.saturated = np.zeros(n, dtype=np.int64)
         self.steps = 0
         self.work = 0.0
-        network.reset()
+        self._network.reset()
 
     def __call__(self, _model: Model, data: Data) -> Array | None:
         """Return ctrl (nu,) at the beginning of a step.

@@ -12,18 +12,19 @@ from ...errors import BadInputError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Model
 from ...models import AnyPath
-from ..runs.drive import Progress, progress_of_stage
+from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.provenance import Provenance, provenance
 from ..runs.reporter import QUIET, Reporter
 from ..runs.robot import home_keyframe
-from .adapted import ContractChange, adapted
+from .adapted import ContractChange
 from .binding import bind
 from .checks import ContractNote, check_network, notes_of
 from .contract import Contract
 from .contract_file import read_contract
 from .network import Network, NetworkFacts
-from .walk import Command, Walk, walked
+from .on_model import PolicyOnModel
+from .walk import Command, Walk, all_walked
 
 _SECONDS = 10.0
 # Where the contract names no limits: forward [m/s], turning [rad/s].
@@ -132,31 +133,17 @@ def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
     notes: list[ContractNote] = []
 
     def compute(model: Model, backend: str, progress: Progress) -> EngineWalks:
-        binding = bind(contract, model)
+        source = provenance(model, onnxruntime=network.facts.version)
         if not notes:
             start = _start_of(model, request.keyframe)
-            notes.extend(notes_of(contract, model, binding, start, commands))
-        source = provenance(model, onnxruntime=network.facts.version)
+            notes.extend(notes_of(contract, model, bind(contract, model), start, commands))
         try:
-            driven = adapted(model, contract, binding)
+            policy = PolicyOnModel.of(contract, network, model)
         except UnsupportedError as error:
             return EngineWalks(backend, source, (), (), str(error))
-        walks: list[Walk] = []
-        for number, command in enumerate(commands):
-            share = 1.0 / len(commands)
-            stage = progress_of_stage(progress, number * share, share)
-            recorded = walked(
-                contract,
-                network,
-                binding,
-                driven,
-                command,
-                request.seconds,
-                request.keyframe,
-                stage,
-            )
-            walks.append(recorded.walk)
-        return EngineWalks(backend, source, driven.changes, tuple(walks))
+        recorded = all_walked(policy, commands, request.seconds, request.keyframe, progress)
+        walks = tuple(run.walk for run in recorded)
+        return EngineWalks(backend, source, policy.driven.changes, walks)
 
     engines = on_each_backend(
         request.backends,

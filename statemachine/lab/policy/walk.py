@@ -10,16 +10,14 @@ from typing import Final, Literal
 import numpy as np
 
 from ...errors import BadInputError, DivergedError
-from ...interface import Array, Data, Model, make_data, reset
+from ...interface import Array, Data, make_data, reset
 from ...rotations import matrix_from_quat
-from ..runs.drive import Progress, drive, no_progress, number_of_steps
+from ..runs.drive import Progress, drive, no_progress, number_of_steps, progress_of_stage
 from ..runs.floating import fallen_moments
 from ..runs.robot import home_keyframe
-from .adapted import AdaptedModel
-from .binding import Binding
 from .contract import AXES, Contract
 from .controller import PolicyCall, PolicyController
-from .network import Network
+from .on_model import PolicyOnModel
 
 Ending = Literal["walked", "fell", "diverged"]
 WalkVerdict = Literal["walks", "wrong speed", "falls", "diverges"]
@@ -135,10 +133,7 @@ class RecordedWalk:
 
 
 def walked(
-    contract: Contract,
-    network: Network,
-    binding: Binding,
-    driven: AdaptedModel,
+    policy: PolicyOnModel,
     command: Command,
     seconds: float,
     keyframe: str | None = None,
@@ -147,10 +142,7 @@ def walked(
     """Run a policy from a reset, until the time is over or the robot has fallen.
 
     Args:
-        contract: What the policy expects.
-        network: The policy.
-        binding: Where the joints of the contract are in the model.
-        driven: The model that is run.
+        policy: On the model that is run.
         command: The speeds that are asked for.
         seconds: How long [s].
         keyframe: Where it starts; None for "home" if there is one, else for the default state with
@@ -160,15 +152,15 @@ def walked(
     Raises:
         BadInputError: The network gives what is no action.
     """
-    model = driven.model
-    controller = PolicyController(contract, network, binding, driven, command.vector)
+    model, contract = policy.driven.model, policy.contract
+    controller = PolicyController(policy, command.vector)
     steps = number_of_steps(model, seconds)
     poses: list[Array] = []
     ending: Ending = "walked"
     each_call = round(contract.timing.policy_dt / model.timestep)
-    base = slice(binding.base_qpos, binding.base_qpos + 7)
+    base = slice(policy.binding.base_qpos, policy.binding.base_qpos + 7)
     with closing(make_data(model)) as data:
-        set_start(model, data, contract, binding, keyframe)
+        set_start(data, policy, keyframe)
         try:
             for number, _ in enumerate(drive(model, data, controller, steps)):
                 if number % each_call:
@@ -184,14 +176,29 @@ def walked(
     return RecordedWalk(walk, controller.calls)
 
 
-def set_start(
-    model: Model, data: Data, contract: Contract, binding: Binding, keyframe: str | None
-) -> None:
+def all_walked(
+    policy: PolicyOnModel,
+    commands: Sequence[Command],
+    seconds: float,
+    keyframe: str | None = None,
+    progress: Progress = no_progress,
+) -> list[RecordedWalk]:
+    """Run a policy once for each command; arguments and errors as of `walked`."""
+    share = 1.0 / len(commands)
+    runs: list[RecordedWalk] = []
+    for number, command in enumerate(commands):
+        stage = progress_of_stage(progress, number * share, share)
+        runs.append(walked(policy, command, seconds, keyframe, stage))
+    return runs
+
+
+def set_start(data: Data, policy: PolicyOnModel, keyframe: str | None) -> None:
     """Put a Data into the state in which a run starts; arguments as of `walked`."""
+    model = policy.driven.model
     key = home_keyframe(model) if keyframe is None else keyframe
     reset(model, data, key)
     if key is None:
-        data.qpos[binding.qpos] = contract.default_joint_pos
+        data.qpos[policy.binding.qpos] = policy.contract.default_joint_pos
 
 
 def _walk_of(
