@@ -85,7 +85,9 @@ def network_of(values: Floats, contract: Contract) -> Network:
         targets[row, columns["last_action"][row]] += (error + memory) * contract.action_scale[row]
         targets[row, columns["joint_pos_rel"][row]] -= error
         targets[row, columns["joint_vel_rel"][row]] -= speed
-    seen = np.concatenate([contract.term_scale, (first @ contract.term_scale) * (second @ contract.term_scale)])
+    seen = np.concatenate(
+        [contract.term_scale, (first @ contract.term_scale) * (second @ contract.term_scale)]
+    )
     weights = targets / seen / contract.action_scale[:, None]
     return Network(first, second, weights, bias / contract.action_scale)
 

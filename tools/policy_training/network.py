@@ -33,24 +33,7 @@ class Network:
         return features @ self.weights.T + self.bias
 
 
-def write_weights(network: Network, path: Path) -> None:
-    """Write the weights as float32, rounded to 6 significant digits, to an .npz file."""
-    np.savez(
-        path,
-        first=network.first.astype(np.float32),
-        second=network.second.astype(np.float32),
-        weights=network.weights.astype(np.float32),
-        bias=network.bias.astype(np.float32),
-    )
-
-
-def read_weights(path: Path) -> Network:
-    """Return the network of an .npz file."""
-    with np.load(path) as arrays:
-        return Network(arrays["first"], arrays["second"], arrays["weights"], arrays["bias"])
-
-
-def write_onnx(network: Network, joint_names: list[str], path: Path) -> None:
+def write_onnx(network: Network, joint_names: tuple[str, ...], path: Path) -> None:
     """Write the network as ONNX: input `obs` (1, n_obs), output `actions` (1, n_act), float32.
 
     Args:

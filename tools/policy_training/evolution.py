@@ -10,14 +10,16 @@ import numpy as np
 from .network import Floats
 
 
-class Search:
-    """The state of one search: ask for candidates, score them, tell the scores.
+class Evolution:
+    """The state of one evolution: ask for candidates, score them, tell the scores.
 
     `mean` (n,) is the best guess so far, in units of the caller; `step` (n,) how far the first
     generation looks.
     """
 
-    def __init__(self, mean: Floats, step: Floats, size: int, generator: np.random.Generator) -> None:
+    def __init__(
+        self, mean: Floats, step: Floats, size: int, generator: np.random.Generator
+    ) -> None:
         self.n, self.size, self.generator = len(mean), size, generator
         self.unit, self.origin = step, mean
         self.center = np.zeros(self.n)
@@ -58,12 +60,16 @@ class Search:
         self.center = self.center + self.sigma * move
         white = self.basis @ (self.basis.T @ move / self.spread)
         rate = self.step_rate
-        self.step_path = (1 - rate) * self.step_path + np.sqrt(rate * (2 - rate) * self.effective) * white
+        self.step_path = (1 - rate) * self.step_path + np.sqrt(
+            rate * (2 - rate) * self.effective
+        ) * white
         length = np.linalg.norm(self.step_path)
         fade = np.sqrt(1 - (1 - rate) ** (2 * self.generation))
         moving = float(length / fade < (1.4 + 2 / (self.n + 1)) * self.length)
         rate = self.path_rate
-        self.path = (1 - rate) * self.path + moving * np.sqrt(rate * (2 - rate) * self.effective) * move
+        self.path = (1 - rate) * self.path + moving * np.sqrt(
+            rate * (2 - rate) * self.effective
+        ) * move
         kept = 1 - self.rank_one - self.rank_many + (1 - moving) * self.rank_one * rate * (2 - rate)
         self.covariance = (
             kept * self.covariance
