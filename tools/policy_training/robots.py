@@ -1,4 +1,4 @@
-"""Where the policy walks: many robots on plain MuJoCo at once, or one on an engine of `statemachine`."""
+"""Where the policy walks: many robots on plain MuJoCo, or one on an engine of `statemachine`."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ SCENE = Path(__file__).parents[2] / "models" / "quadruped" / "scene.xml"
 class Course:
     """One walk: its command, and all in which it differs from a walk in the calm.
 
-    `command` [m/s, m/s, rad/s]; `start` (12,) [rad], added to the joints; `heading` [rad]; `pushes`,
-    rows of (time [s], x, y [m/s]), added to the trunk's velocity; `pull` [N, N, N m], along world x
-    and y and about z, all the time; `friction`, `mass` (of the trunk), `gain` (kp) and `softness` (of
-    the floor) are factors.
+    `command` [m/s, m/s, rad/s]; `start` (12,) [rad], added to the joints; `heading` [rad];
+    `pushes`, rows of (time [s], x, y [m/s]), added to the trunk's velocity; `pull` [N, N, N m],
+    along world x and y and about z, all the time; `friction`, `mass` (of the trunk), `gain` (kp)
+    and `softness` (of the floor) are factors.
     """
 
     command: tuple[float, float, float]
@@ -71,7 +71,7 @@ class MujocoRobots:
         return qpos, np.array([data.qvel for data in self._datas])
 
     def advance(self, ctrl: Floats, nstep: int, walking: np.ndarray) -> None:
-        """Advance those that walk, (n,) of bool, under ctrl (n, 12); push those whose time it is."""
+        """Advance those that walk, (n,) of bool, under ctrl (n, 12), and push them."""
         duration = nstep * self.timestep
         for number in np.flatnonzero(walking):
             data = self._datas[number]

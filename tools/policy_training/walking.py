@@ -20,8 +20,9 @@ class Walked:
     """What came of n walks.
 
     `speeds` (n, 3), the mean forwards, sideways [m/s] and about [rad/s]; `error` (n, 3), the mean
-    absolute error of the speeds over one period of the clock; `shaking` (n,) and `effort` (n,), means of
-    what neither tilts nor bounces and of how much the actions change; `upright` (n,) [s], until the fall.
+    absolute error of the speeds over one period of the clock; `shaking` (n,), how much the trunk
+    tilts, rocks and bounces; `effort` (n,), how much the actions change; `upright` (n,) [s], until
+    the fall.
     """
 
     speeds: Floats
@@ -38,12 +39,10 @@ class Policies:
     networks: list[Network]
 
     def actions(self, observations: Floats) -> Floats:
-        """Return the actions (n, 12) of n robots; each network has the same number of them, in turn."""
+        """Return the actions (n, 12) of n robots: as many of each network, network by network."""
         groups = observations.reshape(len(self.networks), -1, observations.shape[1])
-        rows = [
-            network.actions(group) for network, group in zip(self.networks, groups, strict=True)
-        ]
-        return np.concatenate(rows)
+        pairs = zip(self.networks, groups, strict=True)
+        return np.concatenate([network.actions(group) for network, group in pairs])
 
 
 def walk(
@@ -59,8 +58,8 @@ def walk(
     nstep = round(contract.decimation * fault.decimation)
     policy_dt = nstep * robots.timestep
     steps = round(seconds / policy_dt)
-    last = np.zeros((n, len(contract.joint_names)))
-    waiting = [last] * fault.delay
+    last: Floats = np.zeros((n, len(contract.joint_names)))
+    waiting: list[Floats] = [last] * fault.delay
     walking, upright = np.ones(n, dtype=bool), np.full(n, seconds)
     speeds, shaking, effort = np.full((steps, n, 3), np.nan), np.zeros(n), np.zeros(n)
     ctrl = np.zeros_like(last)
