@@ -10,12 +10,13 @@ import pytest
 from tools.policy_training.__main__ import CONTRACT, POLICY
 from tools.policy_training.contract import read_contract
 from tools.policy_training.evolution import Evolution
-from tools.policy_training.faults import STRAIGHT, TURNING, change, outcome
+from tools.policy_training.faults import STRAIGHT, TURNING, outcome
 from tools.policy_training.gait import GAINS, network_of
 from tools.policy_training.network import Network, write_onnx
 from tools.policy_training.observation import FAULTS, Fault
 from tools.policy_training.stored import read_gains, write_gains
 from tools.policy_training.training import search
+from tools.policy_training.walking import change
 
 from .support.requirements import need_engine
 
@@ -97,7 +98,7 @@ def test_each_fault_changes_the_walk_when_it_turns(
     need_engine(backend)
     sound = outcome(THE_CONTRACT, network, backend, TURNING)
     spoiled = outcome(THE_CONTRACT, network, backend, TURNING, fault)
-    assert spoiled.upright[0] < 10 or change(sound, spoiled, TURNING) > 0.1
+    assert spoiled.upright[0] < 10 or change(sound, spoiled, np.array([TURNING]))[0] > 0.1
 
 
 @pytest.mark.parametrize("name", ["gyro in world axes", "velocity in world axes"])
@@ -105,4 +106,4 @@ def test_wrong_axes_do_not_show_while_it_walks_straight_on(network: Network, nam
     sound = outcome(THE_CONTRACT, network, "mujoco", STRAIGHT)
     spoiled = outcome(THE_CONTRACT, network, "mujoco", STRAIGHT, BY_NAME[name])
     assert spoiled.upright[0] == 10
-    assert change(sound, spoiled, STRAIGHT) < 0.1
+    assert change(sound, spoiled, np.array([STRAIGHT]))[0] < 0.1

@@ -8,12 +8,10 @@ from .contract import Contract
 from .network import Network
 from .observation import FAULTS, SOUND, Fault
 from .robots import OneRobot
-from .walking import Policies, Walked, walk
+from .walking import Policies, Walked, change, walk
 
 SECONDS = 10.0
 STRAIGHT, TURNING = (0.4, 0.0, 0.0), (0.3, 0.0, 0.5)
-# A change of speed is seen where it is a tenth of what is asked, or of these [m/s, m/s, rad/s].
-LEAST = (0.3, 0.3, 0.5)
 
 
 def outcome(
@@ -28,12 +26,6 @@ def outcome(
     return walk(contract, Policies([network]), robot, np.array([command]), SECONDS, fault)
 
 
-def change(sound: Walked, spoiled: Walked, command: tuple[float, float, float]) -> float:
-    """Return the largest change of a speed, as a part of what is asked."""
-    scale = np.maximum(np.abs(command), LEAST)
-    return float((np.abs(spoiled.speeds - sound.speeds) / scale).max())
-
-
 def print_table(contract: Contract, network: Network, backends: list[str]) -> None:
     """Print a line for each engine, command and fault."""
     for backend in backends:
@@ -42,6 +34,6 @@ def print_table(contract: Contract, network: Network, backends: list[str]) -> No
             for fault in (SOUND, *FAULTS):
                 walked = outcome(contract, network, backend, command, fault)
                 speeds = " ".join(f"{value:6.2f}" for value in walked.speeds[0])
-                changed = f"{100 * change(sound, walked, command):5.0f} %"
+                changed = f"{100 * change(sound, walked, np.array([command]))[0]:5.0f} %"
                 upright = f"{walked.upright[0]:5.2f} s"
                 print(f"{backend:9}{command!s:17}{fault.name:28}{upright}  {speeds}  {changed}")

@@ -10,11 +10,12 @@ from .contract import Contract
 from .evolution import Evolution
 from .gait import GAINS, network_of
 from .network import Floats
+from .observation import FAULTS, SOUND, Fault
 from .robots import Course, MujocoRobots
-from .walking import Policies, Walked, walk
+from .walking import Policies, Walked, change, walk
 
-CANDIDATES = 16
-COURSES = 10
+CANDIDATES = 14
+COURSES = 8
 SECONDS = 4.0
 # Each generation walks these, and drawn ones beside them.
 COMMANDS = (
@@ -27,6 +28,10 @@ COMMANDS = (
 )
 CALM = 20  # Generations over which pushes and pulls grow to their full size.
 WORST = 0.3  # Weight of a candidate's worst walk beside its mean.
+# Each candidate also walks so, in the calm, soundly and under some faults of the contract.
+TOLD = Course((0.3, 0.0, 0.5), heading=2.5)
+HIDDEN = ("gyro", "gravity", "velocity", "angles")
+ENOUGH = 0.4  # The change of speed that a fault shall make; more is worth no more.
 
 
 def search(contract: Contract, generations: int, seed: int) -> Iterator[tuple[Floats, Floats]]:
@@ -42,6 +47,7 @@ def search(contract: Contract, generations: int, seed: int) -> Iterator[tuple[Fl
         command = np.array([course.command for course in courses] * CANDIDATES)
         scores = score(walk(contract, policies, robots, command, SECONDS)).reshape(CANDIDATES, -1)
         values = scores.mean(axis=1) + WORST * scores.min(axis=1)
+        values += told_apart(contract, policies)
         evolution.tell(values)
         yield evolution.mean, values
 
@@ -51,6 +57,28 @@ def score(walked: Walked) -> Floats:
     missed = (walked.error / [0.1, 0.1, 0.15]).sum(axis=1)
     fell = 1 - walked.upright / SECONDS
     return -missed - 0.6 * walked.shaking - walked.effort - 20 * fell
+
+
+def told_apart(contract: Contract, policies: Policies) -> Floats:
+    """Return for each network, (n,), how clearly its walk shows that a term is wrong: at most 2.
+
+    A policy that walks as well on a wrong term as on a right one does not use it, and nobody could
+    tell by such a walk what is wrong.
+    """
+    n = len(policies.networks)
+    command = np.array([TOLD.command] * n)
+
+    def walked(fault: Fault) -> Walked:
+        robots = MujocoRobots(contract, [TOLD] * n)
+        return walk(contract, policies, robots, command, SECONDS, fault)
+
+    sound = walked(SOUND)
+    worth = np.zeros(n)
+    for fault in FAULTS:
+        if fault.wrong in HIDDEN:
+            worth += np.minimum(change(sound, walked(fault), command), ENOUGH)
+    stands = sound.upright == SECONDS
+    return stands * worth * (2 / (ENOUGH * len(HIDDEN)))
 
 
 def _draw(generator: np.random.Generator, force: float) -> list[Course]:

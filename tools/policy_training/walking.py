@@ -12,6 +12,8 @@ from .observation import SOUND, Fault, Seen, observe, rotation
 from .robots import Robots
 
 FALLEN = 0.17  # Height of the trunk [m] below which it has fallen; it stands at 0.29 m.
+# A change of speed is a part of what is asked, or of these [m/s, m/s, rad/s], whichever is more.
+LEAST = (0.3, 0.3, 0.5)
 SETTLING = 2  # Periods of the clock that count for no speed.
 
 
@@ -90,6 +92,12 @@ def walk(
         effort=effort / steps,
         upright=upright,
     )
+
+
+def change(sound: Walked, spoiled: Walked, command: Floats) -> Floats:
+    """Return the largest change of a speed of n walks, (n,), as a part of what is asked, (n, 3)."""
+    scale = np.maximum(np.abs(command), LEAST)
+    return (np.abs(spoiled.speeds - sound.speeds) / scale).max(axis=1)
 
 
 def body_speeds(qpos: Floats, qvel: Floats) -> Floats:
