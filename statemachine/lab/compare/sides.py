@@ -27,7 +27,14 @@ from ...models import resolve
 from ..recordings import Trace, read
 from ..recordings.files import SUFFIXES
 from ..runs.call_period import CallPeriods, Every, call_periods, checked_every
-from ..runs.controllers import Function, file_and_name_of, function_scenario, is_function
+from ..policy.scenario import policy_scenario
+from ..runs.controllers import (
+    Function,
+    file_and_name_of,
+    function_scenario,
+    is_function,
+    is_policy,
+)
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
 from .matching import match_models
@@ -211,8 +218,8 @@ class Request:
     """What to compare.
 
     Attributes:
-        what: One experiment by name, one "FILE.py:FUNCTION" or function (model, data) itself, or
-            one or two traces or their files.
+        what: One experiment by name, one "FILE.py:FUNCTION" or function (model, data) itself, the
+            ONNX file of one policy, or one or two traces or their files.
         backends: The two backends, as `parse_backend` reads them; of one trace the one that is
             not its own is taken.
         model: Instead of the experiment's own, or a trace's.
@@ -224,7 +231,10 @@ class Request:
         names: Joints, bodies, sites and actuators of the left that go by other names on the
             right.
         every: Steps for which what a FUNCTION returns holds, or a time such as "5ms".
-        keyframe: Where it starts; None for the experiment's own, and a FUNCTION's default state.
+        keyframe: Where it starts; None for the experiment's own, a FUNCTION's default state, and
+            the keyframe "home" of a policy.
+        contract: What a policy expects of the simulator: a YAML file; None of anything else.
+        command: Speeds that a policy is asked for, vx, vy [m/s], wz [rad/s]; None for straight on.
     """
 
     what: Sequence[What]
@@ -238,16 +248,28 @@ class Request:
     names: Mapping[str, str] = field(default_factory=dict)
     every: Every = 1
     keyframe: str | None = None
+    contract: str | None = None
+    command: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         if len(self.backends) != 2:
             raise BadInputError(f"two backends are compared; got {shown(self.backends)}")
         checked_every(self.every)
+        check_contract(self.what, self.contract, self.command)
+        if self.is_policy and self.every != 1:
+            raise BadInputError(
+                f"every is of a function: how often {self.experiment} is called its contract says"
+            )
 
     @property
     def is_traces(self) -> bool:
         """Tell whether traces were named, not an experiment."""
         return any(isinstance(what, Trace) or is_trace(what) for what in self.what)
+
+    @property
+    def is_policy(self) -> bool:
+        """Tell whether a policy is run."""
+        return len(self.what) == 1 and is_policy(self.what[0])
 
     def traces(self) -> list[Trace]:
         """Return the traces, read from their files.
@@ -328,11 +350,13 @@ class Request:
         ]
 
     def scenario(self) -> Scenario:
-        """Return the experiment that is run: one of ours, or the function of the user's.
+        """Return the experiment that is run: one of ours, or the user's function or policy.
 
         Raises:
             UnknownNameError: There is no such experiment.
-            BadInputError: There is no such function, or its file fails; or two things are named.
+            BadInputError: There is no such function, or its file fails; a policy does not fit its
+                contract; or two things are named.
+            MissingEngineError: The extra of policies is not installed.
         """
         if len(self.what) != 1:
             raise BadInputError(
@@ -341,10 +365,35 @@ class Request:
         (what,) = self.what
         if isinstance(what, Trace):
             raise BadInputError("a trace is a run that was made: name an experiment or a function")
+        if isinstance(what, str) and is_policy(what) and self.contract is not None:
+            return policy_scenario(what, self.contract, self.command, self.keyframe, self.names)
         if not isinstance(what, str) or is_function(what):
             return function_scenario(what, self.every, self.keyframe)
         known = scenario(what)
         return replace(known, keyframe=self.keyframe or known.keyframe)
+
+
+def check_contract(
+    what: Sequence[What], contract: str | None, command: tuple[float, float, float] | None
+) -> None:
+    """Check that a policy has a contract, and nothing else has one.
+
+    Raises:
+        BadInputError: It is not so.
+    """
+    runs_policy = any(is_policy(one) for one in what)
+    if runs_policy and contract is None:
+        raise BadInputError(
+            f"{word_of(what[0])} needs a contract, a file that says what the policy expects of the "
+            "simulator: --contract FILE"
+        )
+    if runs_policy:
+        return
+    for name, value in (("contract", contract), ("command", command)):
+        if value is not None:
+            raise BadInputError(
+                f"--{name} goes with POLICY.onnx, and {word_of(what[0])} is no policy"
+            )
 
 
 def without_folders(model: str) -> str:

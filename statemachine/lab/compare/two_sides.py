@@ -20,7 +20,7 @@ from ..recordings import (
     rerun_of,
     rerun_of_trace,
 )
-from ..runs.controllers import is_function
+from ..runs.controllers import is_controller
 from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.floating import Bases
 from ..runs.scenarios import SCENARIOS
@@ -134,7 +134,7 @@ def run_sides(request: Request | str, progress: Progress = no_progress) -> Sides
     try:
         prepared = prepare_sides(request)
     except MissingEngineError:
-        if request != Request(request.what, request.backends):
+        if request.is_policy or request != Request(request.what, request.backends):
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
     run = _run_both(request, prepared.reruns, prepared.matched, progress)
@@ -151,8 +151,8 @@ def _check_what(request: Request) -> None:
 
 
 def _is_other_file(word: str) -> bool:
-    """Tell whether a word names a file that is neither an experiment nor a function."""
-    return word not in SCENARIOS and not is_function(word) and Path(word).is_file()
+    """Tell whether a word names a file that is neither an experiment nor a controller."""
+    return word not in SCENARIOS and not is_controller(word) and Path(word).is_file()
 
 
 def _run_both(
@@ -259,7 +259,7 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
 
 def _command(request: Request, backend: BackendChoice) -> str:
     """Return the command that records one side of an experiment; "" where none can."""
-    if request.sides or request.every != 1 or not request.is_typed:
+    if request.sides or request.every != 1 or request.is_policy or not request.is_typed:
         return ""
     if {*request.options} - {"timestep"}:
         return ""

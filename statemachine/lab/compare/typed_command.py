@@ -115,6 +115,12 @@ def _words_of_run(run: Request, folders: bool) -> list[str]:
         words += ["--seed", str(run.seed)]
     if run.every != 1:
         words += [_EVERY, str(run.every)]
+    if run.contract is not None:
+        words += ["--contract", run.contract if folders else without_folders(run.contract)]
+    if run.command is not None:
+        speeds = ",".join(f"{speed:g}" for speed in run.command)
+        # A word that begins with a minus would be taken for an option.
+        words += [f"--command={speeds}"] if speeds.startswith("-") else ["--command", speeds]
     if run.keyframe is not None:
         words += ["--keyframe", run.keyframe]
     for left, right in run.names.items():

@@ -120,7 +120,8 @@ class Setup:
             if settings:
                 rows += settings.differences(side)
         rows += by_option
-        if self.scenario.is_user_function and not self._recordings:
+        is_by_number = self.scenario.is_user_function and not self.scenario.is_policy
+        if is_by_number and not self._recordings:
             rows += orders_of(self.matched)
         all_causes = causes(rows, finer)
         self._causes = {cause.name: cause for cause in all_causes}
@@ -235,7 +236,8 @@ class Setup:
 
     def _is_in_ctrl(self, cause: Cause) -> bool:
         """Tell whether a cause moves the numbers of ctrl that a function of the user's writes."""
-        return self.scenario.is_user_function and _has_extra_actuator(cause)
+        is_by_number = self.scenario.is_user_function and not self.scenario.is_policy
+        return is_by_number and _has_extra_actuator(cause)
 
     def model(self, run: RunKey) -> Model:
         """Return the Model of a run.
@@ -319,6 +321,8 @@ class Setup:
         An actuator that only one side has is put back, or taken out, in its place of ctrl: the
         numbers of the others are then those of the left.
         """
+        if self.scenario.is_policy:  # it finds what it reads and commands by names
+            return self._from_start(self.scenario.controller(model, self.seed))
         matched = self.matched
         completed = any(_has_extra_actuator(self._causes[name]) for name in equalized)
         ordered = ORDER in equalized
