@@ -55,8 +55,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "what",
         nargs="*",
         metavar="WHAT",
-        help="what is run: an experiment, FILE.py:FUNCTION, POLICY.onnx or a recorded TRACE; then nothing, a "
-        "model for all engines, two sides or more, or a second trace",
+        help="what is run: an experiment, FILE.py:FUNCTION, POLICY.onnx or a recorded TRACE; then "
+        "nothing, a model for all engines, two sides or more, or a second trace",
     )
     add_backend(
         parser,

@@ -53,8 +53,8 @@ def request_of(options: argparse.Namespace) -> Question:
         return _models_request_of(options)
     if not options.what:
         raise BadInputError(
-            f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION, POLICY.onnx or traces: "
-            f"{PROGRAM} compare hold"
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION, "
+            f"POLICY.onnx or traces: {PROGRAM} compare hold"
         )
     what, sides = split_words(options.what, options.menagerie)
     if len(sides) > len(PAIR) or _names_several_backends(options):
@@ -226,7 +226,7 @@ def _backends(options: argparse.Namespace, what: Sequence[str]) -> tuple[str, st
     """
     from ...backends.chosen import chosen_backends
     from ...backends.installed_backends import installed_backends
-    from ...lab.compare.sides import is_trace
+    from ...lab.compare.what import is_trace
 
     if not options.backend:
         return PAIR
@@ -285,7 +285,7 @@ def _check_words_of_models(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: Something is.
     """
-    from ...lab.compare.sides import is_trace
+    from ...lab.compare.what import is_trace
     from ...lab.runs.controllers import is_controller
     from ...lab.runs.scenarios import SCENARIOS
 

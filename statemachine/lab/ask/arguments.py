@@ -15,8 +15,9 @@ from ...interface.options import OptionValue
 from ...measures import parse_tolerances
 from ...models import AnyPath
 from ..compare.perturbed import Uncertainty, parse_uncertainty
-from ..compare.sides import Request, Side, What
+from ..compare.sides import Request, Side
 from ..compare.typed_sides import parse_sides
+from ..compare.what import What
 from ..policy.command import speeds_of
 from ..recordings import Trace
 from ..runs.call_period import Every

@@ -66,7 +66,8 @@ def compare(
         backends: Where no sides are given: "mujoco", "pybullet", "pybullet:engine" or a release,
             "mujoco==3.3.7".
         menagerie: A menagerie folder to look names up in; None for $MENAGERIE.
-        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function, 4 of a policy.
+        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function, 4 of a
+            policy.
         timestep: Length of a step on both sides [s]; None for each file's own.
         seed: Of what an experiment draws.
         names: Joints, bodies, sites and actuators of the left by the names that the right has.

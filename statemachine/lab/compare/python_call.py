@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from ...installed import DEFAULT, PAIR
 from ..recordings import Trace
 from .labels import typed_option
-from .sides import Request, Side, What, without_folders, word_of
+from .sides import Request, Side
+from .what import What, without_folders, word_of
 
 # The function of `statemachine.lab` that asks what an option of the command asks.
 _DETAILS = "--details"

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...backends import BackendChoice, load_to_run, parse_backend
 from ...engines import raw_engine_of
-from ...errors import BadInputError, TraceError, shown
+from ...errors import BadInputError, shown
 from ...installed import DEFAULT, PAIR
 from ...interface import Model
 from ...interface.free_base import FreeBase
@@ -24,22 +24,14 @@ from ...interface.read_options import non_default_options
 from ...interface.records import READ_OPTIONS
 from ...measures.text import listed
 from ...models import resolve
-from ..recordings import Trace, read
-from ..recordings.files import SUFFIXES
-from ..runs.call_period import CallPeriods, Every, call_periods, checked_every
 from ..policy.scenario import policy_scenario
-from ..runs.controllers import (
-    Function,
-    file_and_name_of,
-    function_scenario,
-    is_function,
-    is_policy,
-)
+from ..recordings import Trace
+from ..runs.call_period import CallPeriods, Every, call_periods, checked_every
+from ..runs.controllers import function_scenario, is_function, is_policy
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
 from .matching import match_models
-
-What = str | Function | Trace  # that is run on two sides, or played again
+from .what import What, check_contract, is_trace, trace_of, without_folders, word_of
 
 
 @dataclass(frozen=True)
@@ -277,7 +269,7 @@ class Request:
         Raises:
             TraceError: A file is not a trace.
         """
-        return [_trace_of(what) for what in self.what]
+        return [trace_of(what) for what in self.what]
 
     def trace_file(self, place: int) -> str | None:
         """Return the file of a trace, by its place; None of one that was handed over itself."""
@@ -371,58 +363,3 @@ class Request:
             return function_scenario(what, self.every, self.keyframe)
         known = scenario(what)
         return replace(known, keyframe=self.keyframe or known.keyframe)
-
-
-def check_contract(
-    what: Sequence[What], contract: str | None, command: tuple[float, float, float] | None
-) -> None:
-    """Check that a policy has a contract, and nothing else has one.
-
-    Raises:
-        BadInputError: It is not so.
-    """
-    runs_policy = any(is_policy(one) for one in what)
-    if runs_policy and contract is None:
-        raise BadInputError(
-            f"{word_of(what[0])} needs a contract, a file that says what the policy expects of the "
-            "simulator: --contract FILE"
-        )
-    if runs_policy:
-        return
-    for name, value in (("contract", contract), ("command", command)):
-        if value is not None:
-            raise BadInputError(
-                f"--{name} goes with POLICY.onnx, and {word_of(what[0])} is no policy"
-            )
-
-
-def without_folders(model: str) -> str:
-    """Return a model as one types it, without folders."""
-    return Path(model).name if Path(model).is_file() else model
-
-
-def is_trace(what: str | Function) -> bool:
-    """Tell whether a word names a trace, by its suffix; a function does not."""
-    return isinstance(what, str) and Path(what).suffix.lower() in SUFFIXES
-
-
-def word_of(what: What) -> str:
-    """Return what is run, in a word: as one types it without folders; else its name."""
-    if isinstance(what, str):
-        return Path(what).name
-    if isinstance(what, Trace):
-        return what.header.experiment or "a trace"
-    return file_and_name_of(what)[1]
-
-
-def _trace_of(what: What) -> Trace:
-    """Return a trace, read from its file if that is named.
-
-    Raises:
-        TraceError: The file is not a trace, or it is a function.
-    """
-    if isinstance(what, Trace):
-        return Trace(replace(what.header, recorded=True), what.columns)
-    if isinstance(what, str):
-        return read(what)
-    raise TraceError(f"{word_of(what)} is a function, and the other is a trace: two traces, or one")

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from ...installed import DEFAULT, PAIR
 from .labels import typed_option
 from .python_call import python_call
-from .sides import Request, Side, without_folders
+from .sides import Request, Side
+from .what import without_folders
 
 _WIDTH = 74  # of a line of a command, which is set in
 _SOME_FOLDER = "DIR"

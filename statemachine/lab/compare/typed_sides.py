@@ -21,7 +21,8 @@ from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float
 from ..runs.controllers import is_controller
 from ..runs.scenarios import SCENARIOS
-from .sides import Side, is_trace
+from .sides import Side
+from .what import is_trace
 
 _OPTION = re.compile(r"[A-Za-z_]+=\S*")
 _LAST_OPTION = re.compile(rf"\s+({_OPTION.pattern})\s*$")
@@ -183,7 +184,8 @@ def _refuse_sides_alone(words: Sequence[str], sides: Sequence[Side]) -> NoReturn
     named = command(word for word in models if not _OPTION.fullmatch(word))
     raise BadInputError(
         f"compare what? {typed} runs an experiment ({', '.join(SCENARIOS)}) or "
-        f"FILE.py:FUNCTION or POLICY.onnx; statemachine compare --models {named} lists what the files differ in"
+        f"FILE.py:FUNCTION or POLICY.onnx; statemachine compare --models {named} lists what the "
+        "files differ in"
     )
 
 

@@ -96,7 +96,6 @@ class DifferVerdict(_Verdict, PageContent):
             return None
         return _short(at.body), _short(at.ground)
 
-
     @property
     def falls(self) -> Falls:
         """Return which sides fell; "none" of a policy, whose verdict begins with that."""

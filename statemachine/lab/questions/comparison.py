@@ -192,7 +192,9 @@ def _with_rows(
     call_periods_note = call_periods_blocks(periods)
     state = written_state_blocks(comparison.left.trace, comparison.right.trace)
     outcomes = policy_outcomes_blocks(comparison)
-    blocks = [*outcomes, *state, *call_periods_note, *frame, *_known_changes(result), *render_blocks(content)]
+    changes = _known_changes(result)
+    notes = [*state, *call_periods_note, *frame, *changes]
+    blocks = [*outcomes, *notes, *render_blocks(content)]
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
 
 
