@@ -14,13 +14,13 @@ from ..common import (
     add_jobs,
     add_json,
     add_menagerie,
+    add_policy,
     add_seconds,
     add_seed,
     add_timestep,
     file_name,
     flag_of,
     is_given,
-    number_list,
 )
 from ..experiments import experiments
 from ..help_all import shorten_help
@@ -142,15 +142,7 @@ def _add_sides(group: argparse._ArgumentGroup) -> None:
         help="for how long what FUNCTION(model, data) returned holds: steps (1), or 5ms",
     )
     group.add_argument("--keyframe", metavar="NAME", help="where it starts, on both sides")
-    group.add_argument(
-        "--contract", metavar="FILE", help="what POLICY.onnx expects, as of `statemachine policy`"
-    )
-    group.add_argument(
-        "--command",
-        type=number_list,
-        metavar="VX,VY,WZ",
-        help="speeds that POLICY.onnx is asked for [m/s, m/s, rad/s] (straight on)",
-    )
+    add_policy(group)
 
 
 def _add_why(group: argparse._ArgumentGroup) -> None:

@@ -24,14 +24,14 @@ from ...interface.read_options import non_default_options
 from ...interface.records import READ_OPTIONS
 from ...measures.text import listed
 from ...models import resolve
-from ..policy.scenario import policy_scenario
+from ..policy.scenario import check_contract, policy_scenario
 from ..recordings import Trace
 from ..runs.call_period import CallPeriods, Every, call_periods, checked_every
 from ..runs.controllers import function_scenario, is_function, is_policy
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
 from .matching import match_models
-from .what import What, check_contract, is_trace, trace_of, without_folders, word_of
+from .what import What, is_trace, trace_of, without_folders, word_of
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ class Request:
         if len(self.backends) != 2:
             raise BadInputError(f"two backends are compared; got {shown(self.backends)}")
         checked_every(self.every)
-        check_contract(self.what, self.contract, self.command)
+        check_contract([word_of(what) for what in self.what], self.contract, self.command)
         if self.is_policy and self.every != 1:
             raise BadInputError(
                 f"every is of a function: how often {self.experiment} is called its contract says"

@@ -12,6 +12,7 @@ from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import DEFAULT
 from ...measures import RobotScale, robot_points
 from ...measures.text import command
+from ..policy.scenario import options_of_policy
 from ..recordings import (
     Rerun,
     Trace,
@@ -259,7 +260,7 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
 
 def _command(request: Request, backend: BackendChoice) -> str:
     """Return the command that records one side of an experiment; "" where none can."""
-    if request.sides or request.every != 1 or request.is_policy or not request.is_typed:
+    if request.sides or request.every != 1 or not request.is_typed:
         return ""
     if {*request.options} - {"timestep"}:
         return ""
@@ -272,4 +273,5 @@ def _command(request: Request, backend: BackendChoice) -> str:
         ("--seed", request.seed, 0),
         ("--timestep", request.options.get("timestep"), None),
         ("--keyframe", request.keyframe, None),
+        *options_of_policy(request.contract, request.command),
     )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...installed import DEFAULT, PAIR
+from ..policy.command import typed_speeds
 from .labels import typed_option
 from .python_call import python_call
 from .sides import Request, Side
@@ -119,9 +120,7 @@ def _words_of_run(run: Request, folders: bool) -> list[str]:
     if run.contract is not None:
         words += ["--contract", run.contract if folders else without_folders(run.contract)]
     if run.command is not None:
-        speeds = ",".join(f"{speed:g}" for speed in run.command)
-        # A word that begins with a minus would be taken for an option.
-        words += [f"--command={speeds}"] if speeds.startswith("-") else ["--command", speeds]
+        words.append(f"--command={typed_speeds(run.command)}")
     if run.keyframe is not None:
         words += ["--keyframe", run.keyframe]
     for left, right in run.names.items():

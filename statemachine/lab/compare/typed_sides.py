@@ -19,7 +19,7 @@ from ...interface.records import READ_OPTIONS
 from ...measures.text import command
 from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float
-from ..runs.controllers import is_controller
+from ..runs.controllers import is_controller, is_policy
 from ..runs.scenarios import SCENARIOS
 from .sides import Side
 from .what import is_trace
@@ -210,7 +210,8 @@ def _check_number_of_sides(
         raise BadInputError(f"one side only: name the other, as in: {typed}")
     if not sides and is_controller(what[0]):
         typed = command(["statemachine", "compare", what[0], *words])
-        raise BadInputError(f"{what[0]} runs on a model, as in: {typed} so101")
+        model = "ROBOT.xml" if is_policy(what[0]) else "so101"
+        raise BadInputError(f"{what[0]} runs on a model, as in: {typed} {model}")
 
 
 def _is_model_alone(words: Sequence[str], sides: Sequence[Side]) -> bool:

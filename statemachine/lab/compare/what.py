@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ...errors import BadInputError, TraceError
+from ...errors import TraceError
 from ..recordings import Trace, read
 from ..recordings.files import SUFFIXES
-from ..runs.controllers import Function, file_and_name_of, is_policy
+from ..runs.controllers import Function, file_and_name_of
 
 What = str | Function | Trace  # that is run on two sides, or played again
 
@@ -44,26 +43,3 @@ def trace_of(what: What) -> Trace:
     if isinstance(what, str):
         return read(what)
     raise TraceError(f"{word_of(what)} is a function, and the other is a trace: two traces, or one")
-
-
-def check_contract(
-    what: Sequence[What], contract: str | None, command: tuple[float, float, float] | None
-) -> None:
-    """Check that a policy has a contract, and nothing else has one.
-
-    Raises:
-        BadInputError: It is not so.
-    """
-    runs_policy = any(is_policy(one) for one in what)
-    if runs_policy and contract is None:
-        raise BadInputError(
-            f"{word_of(what[0])} needs a contract, a file that says what the policy expects of the "
-            "simulator: --contract FILE"
-        )
-    if runs_policy:
-        return
-    for name, value in (("contract", contract), ("command", command)):
-        if value is not None:
-            raise BadInputError(
-                f"--{name} goes with POLICY.onnx, and {word_of(what[0])} is no policy"
-            )

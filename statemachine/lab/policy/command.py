@@ -46,7 +46,7 @@ class Command:
     @property
     def words(self) -> str:
         """Return it as it is typed: "0.5,0,0.8"."""
-        return ",".join(f"{speed:g}" for speed in (self.vx, self.vy, self.wz))
+        return typed_speeds((self.vx, self.vy, self.wz))
 
     @property
     def tolerance(self) -> float:
@@ -66,6 +66,11 @@ def speeds_of(command: Sequence[float]) -> tuple[float, float, float]:
     if not np.isfinite(speeds).all():
         raise BadInputError(f"a command is finite; got {shown(speeds)}")
     return speeds
+
+
+def typed_speeds(command: Sequence[float]) -> str:
+    """Return the speeds of a command (3,) as they are typed: "0.5,0,0.8"."""
+    return ",".join(f"{speed:g}" for speed in command)
 
 
 def usual_commands(contract: Contract) -> tuple[Command, ...]:

@@ -10,13 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from ...errors import BadInputError
 from ...interface import Model
 from ...measures.text import milliseconds
 from ...models import AnyPath
+from ..runs.controllers import is_policy
 from ..runs.drive import Controller
 from ..runs.scenarios import Scenario
 from .checks import check_network
-from .command import Command, speeds_of, usual_commands
+from .command import Command, speeds_of, typed_speeds, usual_commands
 from .contract import Contract, Term
 from .contract_file import read_contract
 from .controller import PolicyController
@@ -80,6 +82,42 @@ def policy_scenario(
         is_user_function=True,
         is_policy=True,
     )
+
+
+def check_contract(
+    words: Sequence[str], contract: AnyPath | None, command: Sequence[float] | None
+) -> None:
+    """Check that a policy has a contract, and nothing else has one.
+
+    Args:
+        words: What is run, as it is typed.
+        contract: The file; None without.
+        command: (3,) speeds that are asked for; None for the usual ones.
+
+    Raises:
+        BadInputError: It is not so.
+    """
+    policies = [Path(word).name for word in words if is_policy(word)]
+    if policies and contract is None:
+        raise BadInputError(
+            f"{policies[0]} needs a contract, a file that says what the policy expects of the "
+            "simulator: --contract FILE"
+        )
+    for name, value in (("contract", contract), ("command", command)):
+        if value is not None and not policies:
+            raise BadInputError(f"{name} goes with POLICY.onnx, and {words[0]} is no policy")
+
+
+def options_of_policy(
+    contract: AnyPath | None, command: Sequence[float] | None
+) -> list[tuple[str, object, object]]:
+    """Return the options of a command that runs a policy, as `measures.text.command` takes them."""
+    options: list[tuple[str, object, object]] = []
+    if contract is not None:
+        options.append(("--contract", Path(contract).name, None))
+    if command is not None:  # in one word: speeds that begin with a minus would be an option
+        options.append((f"--command={typed_speeds(command)}", True, False))
+    return options
 
 
 def _by_names_of(contract: Contract, model: Model, names: Mapping[str, str]) -> Contract:
