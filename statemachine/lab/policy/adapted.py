@@ -112,8 +112,8 @@ def unchanged(model: Model, contract: Contract, binding: Binding) -> AdaptedMode
     if round(steps) < 1 or abs(steps - round(steps)) > _SAME * steps:
         raise BadInputError(
             f"{contract.file} calls its policy every {milliseconds(policy_dt)}, which is "
-            f"{steps:.6g} steps of {milliseconds(model.timestep)} on {model.backend}: give that "
-            "side a timestep of which it is a whole multiple"
+            f"{steps:.6g} steps of {milliseconds(model.timestep)} on {model.backend}: write "
+            f"timestep={policy_dt / np.ceil(steps):.6g} behind that side"
         )
     has_servos = _has_servos(model, binding)
     kind: ActuatorKind = "implicit_pd" if has_servos else "explicit_pd"

@@ -10,13 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from ...errors import BadInputError
-from ...interface import Model
+from ...interface import Array, Model, make_data, reset
 from ...measures.text import milliseconds
 from ...models import AnyPath
 from ..runs.controllers import is_policy
 from ..runs.drive import Controller
 from ..runs.scenarios import Scenario
+from .binding import bind
 from .checks import check_network
 from .command import Command, speeds_of, typed_speeds, usual_commands
 from .contract import Contract, Term
@@ -43,7 +46,8 @@ def policy_scenario(
         file: An ONNX file.
         contract: What it expects of the simulator: a YAML file.
         command: (3,) speeds that it is asked for, vx, vy [m/s], wz [rad/s]; None for straight on.
-        keyframe: Where it starts; None for "home" if there is one, else for the default state.
+        keyframe: Where it starts; None for "home" if there is one, else for the default state with
+            the joints in the pose of the contract.
         names: Joints and sites of the contract that have other names in some models.
 
     Raises:
@@ -64,6 +68,14 @@ def policy_scenario(
         policy = PolicyOnModel.as_filed(contract_there, network.with_own_memory(), model)
         return PolicyController(policy, speeds.vector)
 
+    def start_of(model: Model) -> Array:
+        binding = bind(_by_names_of(expected, model, renamed), model)
+        with make_data(model) as data:
+            reset(model, data)
+            qpos = np.array(data.qpos)
+        qpos[binding.qpos] = expected.default_joint_pos
+        return qpos
+
     called = Path(file).name
     every = milliseconds(expected.timing.policy_dt)
     says = (
@@ -81,6 +93,7 @@ def policy_scenario(
         keyframe=keyframe,
         is_user_function=True,
         is_policy=True,
+        start=start_of,
     )
 
 

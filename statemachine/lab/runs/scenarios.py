@@ -42,6 +42,8 @@ class Scenario:
             every robot, and may look at the state.
         is_policy: Whether that function is a policy: it finds joints by their names, and starts
             where the robot stands.
+        start: Gives qpos (nq,) [rad or m] where it starts on a Model that has no keyframe for it;
+            None for the Model's default state.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Scenario:
     seeded: bool = False
     is_user_function: bool = False
     is_policy: bool = False
+    start: Callable[[Model], Array] | None = None
 
     def on(self, model: Model) -> Scenario:
         """Return this scenario adapted to a Model: its start, and a description that is true of it.
@@ -85,8 +88,14 @@ class Scenario:
     def _at_home(self, model: Model) -> Scenario:
         """Return this scenario with its start on a Model, which its description tells."""
         key = self.keyframe or home_keyframe(model)
-        begins = "" if key is None else f" It starts in the keyframe {key!r}."
+        begins = "" if self.start is None else " Its joints start in the pose of its contract."
+        if key is not None:
+            begins = f" It starts in the keyframe {key!r}."
         return replace(self, description=self.general_description + begins, keyframe=key)
+
+    def qpos_at_start(self, model: Model) -> Array | None:
+        """Return qpos (nq,) [rad or m] where it starts; None for its keyframe or default state."""
+        return None if self.keyframe is not None or self.start is None else self.start(model)
 
 
 def suitable_scenarios(model: Model) -> tuple[str, ...]:

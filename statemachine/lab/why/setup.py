@@ -12,7 +12,15 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.alike import commands_alike, controller_for_right, translated
 from ..compare.matching import Matched
-from ..recordings import Rerun, SideStart, Trace, controller_of_trace, start_of, with_first_ctrl
+from ..recordings import (
+    Rerun,
+    SideStart,
+    Trace,
+    controller_of_trace,
+    start_of,
+    start_of_scenario,
+    with_first_ctrl,
+)
 from ..runs.scenarios import Controller
 from .causes import EXTRA_ACTUATOR, Cause, built, causes, differences_of
 from .imported import with_imported_figures
@@ -85,6 +93,8 @@ class Setup:
         self._recordings = self._recorded(request.recordings, right_start)
         if self._recordings:
             left_start, right_start = (_start_of_trace(trace) for trace in self._recordings)
+        elif (start := start_of_scenario(self.scenario, left)) is not None:
+            left_start, right_start = start, matched.start(start, right_start)
         elif self._keyframes[0] != self._keyframes[1]:
             right_start = matched.start(left_start, right_start)
         self._starts = left_start, right_start
