@@ -32,7 +32,7 @@ from statemachine.lab.compare.outcomes import (
 from statemachine.lab.compare.sides import Request, Side
 from statemachine.lab.compare.typed_command import typed_command
 from statemachine.lab.policy.scenario import policy_scenario
-from statemachine.lab.questions.requests.gap import CompareResult
+from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult
 from statemachine.lab.recordings import Trace, record_scenario
 from statemachine.lab.recordings.request import RecordRequest, answer_record
 from statemachine.lab.runs.walking import headings, lateral_way, mean_speeds
@@ -262,6 +262,7 @@ def test_the_command_that_is_printed_asks_the_same() -> None:
     run = Request((POLICY,), sides=sides, contract=CONTRACT, command=(-0.2, 0.0, 0.1))
     words = typed_command(run).words[1:]
     asked = request_of(parser_of(["compare"]).parse_args(words))
+    assert isinstance(asked, CompareRequest)
     assert asked.run == run
 
 
@@ -357,6 +358,33 @@ def test_a_policy_has_an_open_loop_beside_the_closed_one(compared: CompareResult
     assert closed is not None
     assert opened is not None
     assert opened.right != closed.right
+
+
+def test_of_three_sides_each_has_its_outcomes(compared: CompareResult) -> None:
+    sides = [SCENE, f"{SCENE} kp=30", f"{SCENE} kp=31"]
+    result = lab.engines(
+        sides, what=POLICY, contract=CONTRACT, command=AHEAD, seconds=1.0, chaos=False
+    )
+    (speeds,) = (each.values for each in result.outcomes if each.name == FORWARD)
+    forward = compared.comparison.outcome_named(FORWARD)
+    assert forward is not None
+    assert speeds[:2] == (forward.left, forward.right)
+    assert speeds[2] not in speeds[:2]
+
+
+@pytest.mark.slow
+def test_a_speed_that_differs_has_causes() -> None:
+    result = lab.why(
+        SCENE,
+        f"{SCENE} kp=30",
+        what=POLICY,
+        contract=CONTRACT,
+        command=AHEAD,
+        seconds=1.0,
+        quantity=FORWARD,
+        chaos=False,
+    )
+    assert result.to_dict()["unit"] == ["m/s"]
 
 
 @pytest.mark.slow
