@@ -173,9 +173,10 @@ def _term(section: Section, joints: Sequence[str], default: Array, imu: _Imu) ->
         raise parameters.error("lag", "the last action alone (1) can be observed")
     if parameters.has("index"):
         raise parameters.error("index", "terms are taken whole")
-    frame, site = imu.frame, imu.site
-    if term_id == "base_lin_vel":
-        frame, site = "body", ""
+    frame: Frame = "body"
+    site = ""
+    if term_id == "base_ang_vel":
+        frame, site = imu.frame, imu.site
     if term_id in ("base_lin_vel", "base_ang_vel"):
         frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
         site = parameters.text("site", (), "") if parameters.has("site") else site
