@@ -34,7 +34,11 @@ exclude_patterns = ["_build"]
 
 
 # Files beside this folder that are pages, too.
-PAGES = {"../CONTRIBUTING.md": "contributing", "../models/so101/README.md": "so101"}
+PAGES = {
+    "../CONTRIBUTING.md": "contributing",
+    "../models/so101/README.md": "so101",
+    "../models/quadruped/README.md": "quadruped",
+}
 
 
 def _make_pages(_app) -> None:

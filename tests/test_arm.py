@@ -32,7 +32,7 @@ def test_models_that_come_with_the_library() -> None:
     assert model_names() == [
         *("so101/scene", "so101/so101", "so101/scene_box"),
         *("balancer/here", "balancer/there"),
-        "tumbling/tumbling",
+        *("quadruped/scene", "tumbling/tumbling", "quadruped/quadruped"),
     ]
 
 
