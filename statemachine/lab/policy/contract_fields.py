@@ -215,6 +215,8 @@ class Section:
         if not self.has(key):
             self.value(key)
             return None
+        if not _is_list(self.value(key)):
+            raise self.error(key, "a lower and an upper limit are expected")
         low, high = self.numbers(key, 2)
         if low > high:
             raise self.error(key, "the lower limit comes first")

@@ -235,8 +235,10 @@ def _dim(term_id: TermId, parameters: Section, n: int) -> int:
     if term_id in _OF_CLOCK:
         return _OF_CLOCK[term_id]
     if term_id == "constant":
-        value = parameters.value("value")
-        return len(value) if isinstance(value, list) else 1
+        size = parameters.size("value")
+        if not size:
+            raise parameters.error("value", "at least one number is expected")
+        return size
     return n
 
 
@@ -312,8 +314,9 @@ def _servos(actuators: Section, model: Section, joints: Sequence[str]) -> Servos
         damping=model.from_zero("joint_damping", joints),
         friction=model.from_zero("joint_friction", joints),
     )
-    if kind == "explicit_pd" and (servos.kp is None or servos.kd is None):
-        raise actuators.error("kp", "torques that are computed outside need kp and kd")
+    for key, gains in (("kp", servos.kp), ("kd", servos.kd)):
+        if kind == "explicit_pd" and gains is None:
+            raise actuators.error(key, "torques that are computed outside need kp and kd")
     return servos
 
 
@@ -349,9 +352,8 @@ def _command_limits(section: Section) -> dict[str, tuple[float, float]]:
     limit = section.section("limit")
     for axis in limit.fields():
         if axis not in AXES:
-            raise BadInputError(
-                f"{limit.name_of(axis)} is no axis of a command{did_you_mean(axis, AXES)}; "
-                f"known: {', '.join(AXES)}"
+            raise limit.error(
+                axis, f"an axis is one of {', '.join(AXES)}{did_you_mean(axis, AXES)}"
             )
         pair = limit.pair(axis)
         if pair is not None:
