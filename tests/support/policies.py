@@ -142,19 +142,24 @@ def linear_network(folder: Path, weights: Array, offset: Sequence[float]) -> Pat
         weights: (inputs, outputs).
         offset: (outputs,).
     """
-    onnx = pytest.importorskip("onnx")
-    helper = onnx.helper
     size, outputs = weights.shape
     return saved(
         folder / "policy.onnx",
-        [helper.make_node("Gemm", ["obs", "w", "b"], ["actions"])],
+        [node("Gemm", "obs w b", "actions")],
         [tensor("obs", [1, size])],
         [tensor("actions", [1, outputs])],
         {"w": weights, "b": np.array(offset)},
     )
 
 
+def node(operation: str, inputs: str, output: str) -> Any:
+    """Return a node of a network; the names of its inputs are parted by spaces."""
+    onnx = pytest.importorskip("onnx")
+    return onnx.helper.make_node(operation, inputs.split(), [output])
+
+
 def tensor(name: str, shape: Sequence[int | str], kind: str = "FLOAT") -> Any:
+    """Return an input or output of a network."""
     onnx = pytest.importorskip("onnx")
     return onnx.helper.make_tensor_value_info(name, getattr(onnx.TensorProto, kind), list(shape))
 
@@ -164,13 +169,13 @@ def saved(
     nodes: Sequence[Any],
     inputs: Sequence[Any],
     outputs: Sequence[Any],
-    numbers: dict[str, Array],
+    numbers: dict[str, Array] | None = None,
 ) -> Path:
-    """Write a network of nodes, and return its file."""
+    """Write a network of nodes, with the numbers that it stores by their names."""
     onnx = pytest.importorskip("onnx")
     stored = [
         onnx.numpy_helper.from_array(value.astype(np.float32), name)
-        for name, value in numbers.items()
+        for name, value in (numbers or {}).items()
     ]
     graph = onnx.helper.make_graph(list(nodes), "policy", list(inputs), list(outputs), stored)
     opset = [onnx.helper.make_opsetid("", 17)]
