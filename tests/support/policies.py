@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from statemachine.interface import Array, Model, make_data, reset
+from statemachine.interface import Array, Data, Model, make_data, reset, step
 from statemachine.lab.policy.contract import Contract
 from statemachine.lab.policy.contract_file import read_contract
+from statemachine.lab.policy.controller import PolicyController
 from statemachine.lab.policy.network import Network
 from statemachine.lab.policy.on_model import PolicyOnModel
 
@@ -193,8 +195,43 @@ def on_model(
     return PolicyOnModel.of(contract(folder, changes), Network(network), model)
 
 
-def started(model: Model) -> Any:
+def started(model: Model) -> Data:
     """Return a Data of the model after a reset."""
     data = make_data(model)
     reset(model, data)
     return data
+
+
+@dataclass(frozen=True)
+class PolicyRun:
+    """A run of a policy, step by step.
+
+    Attributes:
+        controller: That drove it.
+        ctrl: (k, nu) in the model's order.
+        qpos: (k, nq) before each step.
+        qvel: (k, nv) before each step.
+        end: (nq,) positions at the end.
+    """
+
+    controller: PolicyController
+    ctrl: Array
+    qpos: Array
+    qvel: Array
+    end: Array
+
+
+def run(policy: PolicyOnModel, steps: int, command: Sequence[float] = (0.0, 0.0, 0.0)) -> PolicyRun:
+    """Run a policy from a reset."""
+    model = policy.driven.model
+    controller = PolicyController(policy, np.array(command))
+    rows: list[tuple[Array, Array, Array]] = []
+    with started(model) as data:
+        for _ in range(steps):
+            ctrl = controller(model, data)
+            assert ctrl is not None
+            rows.append((ctrl, np.array(data.qpos), np.array(data.qvel)))
+            data.ctrl = ctrl
+            step(model, data)
+        end = np.array(data.qpos)
+    return PolicyRun(controller, *(np.array(column) for column in zip(*rows, strict=True)), end)
