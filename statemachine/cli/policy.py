@@ -18,8 +18,8 @@ from .common import (
 )
 
 if TYPE_CHECKING:
+    from ..lab.policy.command import Command
     from ..lab.policy.request import PolicyRequest
-    from ..lab.policy.walk import Command
 
 _SECONDS = 10.0
 
@@ -59,8 +59,19 @@ def add(parser: argparse.ArgumentParser) -> None:
         help=f"length of each run ({_SECONDS:g})",
     )
     parser.add_argument("--keyframe", metavar="NAME", help="where it starts (home)")
+    asked = parser.add_mutually_exclusive_group()
+    asked.add_argument(
+        "--faults",
+        action="store_true",
+        help="try named changes of the contract, and say which makes it walk",
+    )
+    asked.add_argument(
+        "--against",
+        metavar="FILE",
+        help="another contract: what both make of the same states, and what comes of each",
+    )
     parser.add_argument(
-        "--details", action="store_true", help="way to the left, height and power of each run"
+        "--details", action="store_true", help="all changes; way, height and power of each run"
     )
     add_menagerie(parser)
     add_json(parser)
@@ -90,7 +101,7 @@ def request_of(options: argparse.Namespace) -> PolicyRequest:
 def _command_of(numbers: list[float]) -> Command:
     """Return the speeds of one run."""
     from ..errors import BadInputError
-    from ..lab.policy.walk import Command
+    from ..lab.policy.command import Command
 
     if len(numbers) != 3:
         raise BadInputError(f"a command is vx,vy,wz, three numbers; got {len(numbers)}")
@@ -99,8 +110,31 @@ def _command_of(numbers: list[float]) -> Command:
 
 def run(options: argparse.Namespace) -> int:
     """Run it, and show."""
+    request = request_of(options)
+    if options.faults:
+        return _show_faults(request, options)
+    if options.against is not None:
+        return _show_contracts(request, options)
     from ..lab.policy.page import page
     from ..lab.policy.request import answer
 
-    result = answer(request_of(options), TerminalReporter())
+    result = answer(request, TerminalReporter())
     return show(page(result, options.details), result, options.json)
+
+
+def _show_faults(request: PolicyRequest, options: argparse.Namespace) -> int:
+    """Try changes of the contract, and show."""
+    from ..lab.policy.diagnosis import diagnose
+    from ..lab.policy.diagnosis_page import page
+
+    result = diagnose(request, TerminalReporter())
+    return show(page(result, options.details), result, options.json)
+
+
+def _show_contracts(request: PolicyRequest, options: argparse.Namespace) -> int:
+    """Compare two contracts, and show."""
+    from ..lab.policy.contracts_page import page
+    from ..lab.policy.two_contracts import compare_contracts
+
+    result = compare_contracts(request, options.against, TerminalReporter())
+    return show(page(result), result, options.json)

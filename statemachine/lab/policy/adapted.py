@@ -194,7 +194,7 @@ def _drives(
             if not _are_equal(of_file, wanted):
                 changes.append(_joint_change(name, unit, of_file, wanted))
     names = {change.name for change in changes}
-    if names & {"servos", "force limit"}:
+    if names & {"servos", "force limit"} or _says_more(model, binding, kind):
         compiled = _edited(model, binding, kind, kp, kd, limit)
         return _Drives(kind, kp, kd, limit, compiled, {})
     options: dict[str, Array] = {}
@@ -214,6 +214,21 @@ def _has_servos(model: Model, binding: Binding) -> bool:
             f"the joints of the policy are driven by servos and by others in {model.path.name}"
         )
     return bool(are_servos.all())
+
+
+def _joints(model: Model, binding: Binding) -> Ints:
+    """Return the joints (n,) of the policy."""
+    return model.actuator_jntid[binding.ctrl]
+
+
+def _says_more(model: Model, binding: Binding, kind: ActuatorKind) -> bool:
+    """Tell whether more than kp, kd and a force limit makes a torque of a command in the file.
+
+    That is the gain of a motor, which is commanded a torque here, and a limit that stands at the
+    joint instead of its actuator.
+    """
+    has_gain = kind == "explicit_pd" and not np.all(model.actuator_gain[binding.ctrl] == 1.0)
+    return has_gain or bool(model.compiled.jnt_actfrclimited[_joints(model, binding)].any())
 
 
 def _gains(
@@ -242,12 +257,14 @@ def _force_limit(model: Model, binding: Binding, has_servos: bool) -> Array:
 
     What a motor is commanded is its force, so the range of its command limits it, too.
     """
-    at = binding.ctrl
+    at, joints, compiled = binding.ctrl, _joints(model, binding), model.compiled
     limit = np.abs(model.actuator_forcerange[at]).min(axis=1)
+    of_joints = np.abs(compiled.jnt_actfrcrange[joints]).min(axis=1)
+    limit = np.where(compiled.jnt_actfrclimited[joints], np.minimum(limit, of_joints), limit)
     if has_servos:
         return limit
-    commands = np.abs(model.actuator_ctrlrange[at]).min(axis=1) * model.actuator_gain[at]
-    return np.minimum(limit, commands)
+    commands = np.abs(model.actuator_ctrlrange[at]).min(axis=1)
+    return np.minimum(limit, commands * np.abs(model.actuator_gain[at]))
 
 
 def _edited(
@@ -268,9 +285,10 @@ def _edited(
             compiled.actuator_gainprm[actuator, 0] = 1.0
             compiled.actuator_biastype[actuator] = _NO_BIAS
         was_servo = bool(np.isfinite(model.actuator_kp[actuator]))
-        if was_servo is not (kind == "implicit_pd"):
-            # The range was of another kind of command: of a torque, or of an angle.
+        if not was_servo or kind == "explicit_pd":
+            # The range is of a torque, which the force limit has, or of an angle before.
             compiled.actuator_ctrllimited[actuator] = 0
+        compiled.jnt_actfrclimited[model.actuator_jntid[actuator]] = 0
         finite = bool(np.isfinite(limit[number]))
         compiled.actuator_forcelimited[actuator] = finite
         if finite:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -27,6 +27,8 @@ QuatOrder = Literal["wxyz", "xyzw"]
 Layout = Literal["term_major", "time_major"]
 Order = Literal["oldest_first", "newest_first"]
 Init = Literal["repeat_first", "zeros"]
+# Format of the files of the package gaitkeeper 0.5 (Apache-2.0).
+SCHEMA: Final = "gaitkeeper/contract/v3"
 AXES = ("vx", "vy", "wz")  # of a command of speed
 
 

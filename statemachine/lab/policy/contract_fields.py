@@ -150,10 +150,42 @@ class Section:
         entries = self.value(key)
         if not _is_list(entries) or not len(entries):
             raise self.error(key, "a list of names is expected")
-        names = [str(entry) for entry in entries]
+        names: list[str] = []
+        for entry in entries:
+            if not isinstance(entry, str):
+                raise self.error(key, "a list of names is expected")
+            names.append(entry)
         if len(set(names)) != len(names):
             raise self.error(key, "each name once is expected")
         return tuple(names)
+
+    def ids(self, key: str) -> list[int]:
+        """Return whole numbers from 0 on, each once.
+
+        Raises:
+            BadInputError: It is no such list.
+        """
+        entries = self.value(key)
+        expected = "a list of whole numbers from 0 on, each once, is expected"
+        if not _is_list(entries) or not len(entries):
+            raise self.error(key, expected)
+        ids: list[int] = []
+        for entry in entries:
+            if not isinstance(entry, int) or isinstance(entry, bool) or entry < 0 or entry in ids:
+                raise self.error(key, expected)
+            ids.append(entry)
+        return ids
+
+    def size(self, key: str) -> int:
+        """Return the length of a list.
+
+        Raises:
+            BadInputError: It is no list.
+        """
+        entries = self.value(key)
+        if not _is_list(entries):
+            raise self.error(key, "a list is expected")
+        return len(entries)
 
     def numbers(self, key: str, size: int, default: float | None = None) -> Array:
         """Return `size` numbers, given as a list, or as one number for all.
@@ -183,10 +215,37 @@ class Section:
         if not self.has(key):
             self.value(key)
             return None
+        if not _is_list(self.value(key)):
+            raise self.error(key, "a lower and an upper limit are expected")
         low, high = self.numbers(key, 2)
         if low > high:
             raise self.error(key, "the lower limit comes first")
         return float(low), float(high)
+
+    def pairs(self, key: str, size: int) -> Array:
+        """Return lower and upper limits (size, 2), given as one pair, or as one for each.
+
+        Raises:
+            BadInputError: It is neither.
+        """
+        entries = self.value(key)
+        if not _is_list(entries) or not len(entries) or not _is_list(entries[0]):
+            pair = self.pair(key)
+            if pair is None:
+                raise self.error(key, "a lower and an upper limit are expected")
+            return np.tile(pair, (size, 1))
+        expected = f"a lower and an upper limit, or {size} of such pairs, are expected"
+        if len(entries) != size:
+            raise self.error(key, expected)
+        pairs: list[Sequence[float]] = []
+        for entry in entries:
+            if not _is_list(entry) or len(entry) != 2:
+                raise self.error(key, expected)
+            low, high = entry
+            if not _is_number(low) or not _is_number(high) or low > high:
+                raise self.error(key, expected)
+            pairs.append((low, high))
+        return np.array(pairs, dtype=np.float64)
 
     def per_joint(self, key: str, joints: Sequence[str], null: float | None = None) -> Array | None:
         """Return a number for each joint, (n,); None where the field is missing.
@@ -197,7 +256,7 @@ class Section:
             null: What stands for a joint whose number is null; None where that is an error.
 
         Raises:
-            BadInputError: A joint has no number.
+            BadInputError: A joint has no finite number.
         """
         value = self.value(key)
         if value is None:
@@ -209,14 +268,27 @@ class Section:
         for joint in joints:
             number = table.get(joint)
             if joint in table and number is None and null is not None:
-                number = null
-            if not isinstance(number, int | float) or isinstance(number, bool):
+                numbers.append(null)
+                continue
+            if not _is_number(number):
                 hint = did_you_mean(joint, [str(name) for name in table])
                 raise BadInputError(
-                    f"{self._file}: {self.name_of(key)} has no number for the joint {joint!r}{hint}"
+                    f"{self._file}: {self.name_of(key)} has no finite number for the joint "
+                    f"{joint!r}{hint}"
                 )
             numbers.append(float(number))
         return np.array(numbers)
+
+    def from_zero(self, key: str, joints: Sequence[str], null: float | None = None) -> Array | None:
+        """Return a number from 0 on for each joint, (n,); arguments as of `per_joint`.
+
+        Raises:
+            BadInputError: A joint has no such number.
+        """
+        numbers = self.per_joint(key, joints, null)
+        if numbers is not None and (numbers < 0.0).any():
+            raise self.error(key, "numbers from 0 on are expected")
+        return numbers
 
     def unread(self) -> Iterator[str]:
         """Yield the fields that nothing has read, and that are not null."""

@@ -15,6 +15,7 @@ from ...interface import Array
 from ...models import AnyPath, check_is_file
 from .contract import (
     AXES,
+    SCHEMA,
     Action,
     ActuatorKind,
     Clock,
@@ -31,9 +32,8 @@ from .contract import (
     Timing,
 )
 from .contract_fields import Section
+from .unitree_deploy import contract_of_deploy
 
-# The format of the package gaitkeeper 0.5 (Apache-2.0).
-SCHEMA: Final = "gaitkeeper/contract/v3"
 EXTRA: Final = "policy"
 _TERMS: tuple[TermId, ...] = get_args(TermId)
 _FRAMES: tuple[Frame, ...] = get_args(Frame)
@@ -44,6 +44,7 @@ _OF_CLOCK = {"gait_phase": 2, "gait_phase_legs": 4}
 # Sections that say where the figures come from: nothing is computed from them.
 _SOURCES = ("schema", "source", "provenance", "evidence")
 _LARGEST_FILE = 2_000_000  # bytes; a contract has a few thousand
+_MOST_ENTRIES = 200_000  # with those that an alias repeats
 _WHOLE = 1e-6  # of a step: a number of steps that is nearer to a whole one is that one
 
 
@@ -60,8 +61,6 @@ def read_contract(file: AnyPath) -> Contract:
     path = Path(file)
     content = _yaml_of(path)
     if "joint_ids_map" in content:
-        from .unitree_deploy import contract_of_deploy
-
         return contract_of_deploy(content, path.name)
     schema = content.get("schema")
     if schema != SCHEMA:
@@ -88,7 +87,23 @@ def _yaml_of(path: Path) -> Mapping[str, object]:
         raise BadInputError(f"{path.name} is no YAML: {one_line(error)}") from error
     if not isinstance(content, Mapping):
         raise BadInputError(f"{path.name} is no contract: a table is expected")
+    if _has_too_many_entries(content):
+        raise BadInputError(f"{path.name} is too large for a contract: its aliases repeat too much")
     return cast("Mapping[str, object]", content)
+
+
+def _has_too_many_entries(content: object) -> bool:
+    """Tell whether a file holds more than a contract can, each alias counted as what it repeats."""
+    pending = [content]
+    entries = 0
+    while pending and entries <= _MOST_ENTRIES:
+        value = pending.pop()
+        if isinstance(value, Mapping):
+            pending.extend(cast("Mapping[object, object]", value).values())
+        elif isinstance(value, list):
+            pending.extend(cast("list[object]", value))
+        entries += 1
+    return bool(pending)
 
 
 def _contract_of(root: Section, file: str) -> Contract:
@@ -173,9 +188,10 @@ def _term(section: Section, joints: Sequence[str], default: Array, imu: _Imu) ->
         raise parameters.error("lag", "the last action alone (1) can be observed")
     if parameters.has("index"):
         raise parameters.error("index", "terms are taken whole")
-    frame, site = imu.frame, imu.site
-    if term_id == "base_lin_vel":
-        frame, site = "body", ""
+    frame: Frame = "body"
+    site = ""
+    if term_id == "base_ang_vel":
+        frame, site = imu.frame, imu.site
     if term_id in ("base_lin_vel", "base_ang_vel"):
         frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
         site = parameters.text("site", (), "") if parameters.has("site") else site
@@ -220,8 +236,10 @@ def _dim(term_id: TermId, parameters: Section, n: int) -> int:
     if term_id in _OF_CLOCK:
         return _OF_CLOCK[term_id]
     if term_id == "constant":
-        value = parameters.value("value")
-        return len(value) if isinstance(value, list) else 1
+        size = parameters.size("value")
+        if not size:
+            raise parameters.error("value", "at least one number is expected")
+        return size
     return n
 
 
@@ -266,7 +284,7 @@ def _action(section: Section, joints: Sequence[str], default: Array) -> Action:
     offset = section.per_joint("offset", joints)
     clip: Array | None = None
     if section.has("clip") and stage == "processed":
-        clip = _clip(section, len(joints))
+        clip = section.pairs("clip", len(joints))
     else:
         section.value("clip")
     return Action(
@@ -275,19 +293,6 @@ def _action(section: Section, joints: Sequence[str], default: Array) -> Action:
         clip=clip,
         delay_steps=section.count("delay_steps", 0),
     )
-
-
-def _clip(section: Section, n: int) -> Array:
-    """Return the limits (n, 2) of the targets, given as one pair or as one for each joint."""
-    value = section.value("clip")
-    if isinstance(value, list) and len(value) == n and isinstance(value[0], list):
-        clip = np.array(value, dtype=np.float64)
-        if clip.shape == (n, 2):
-            return clip
-    pair = section.pair("clip")
-    if pair is None:
-        raise section.error("clip", "a lower and an upper limit are expected")
-    return np.tile(pair, (n, 1))
 
 
 def _servos(actuators: Section, model: Section, joints: Sequence[str]) -> Servos:
@@ -303,15 +308,16 @@ def _servos(actuators: Section, model: Section, joints: Sequence[str]) -> Servos
         model.value(key)
     servos = Servos(
         kind=kind,
-        kp=actuators.per_joint("kp", joints),
-        kd=actuators.per_joint("kd", joints),
-        effort_limit=model.per_joint("effort_limit", joints, np.inf),
-        armature=model.per_joint("armature", joints),
-        damping=model.per_joint("joint_damping", joints),
-        friction=model.per_joint("joint_friction", joints),
+        kp=actuators.from_zero("kp", joints),
+        kd=actuators.from_zero("kd", joints),
+        effort_limit=model.from_zero("effort_limit", joints, np.inf),
+        armature=model.from_zero("armature", joints),
+        damping=model.from_zero("joint_damping", joints),
+        friction=model.from_zero("joint_friction", joints),
     )
-    if kind == "explicit_pd" and (servos.kp is None or servos.kd is None):
-        raise actuators.error("kp", "torques that are computed outside need kp and kd")
+    for key, gains in (("kp", servos.kp), ("kd", servos.kd)):
+        if kind == "explicit_pd" and gains is None:
+            raise actuators.error(key, "torques that are computed outside need kp and kd")
     return servos
 
 
@@ -347,9 +353,8 @@ def _command_limits(section: Section) -> dict[str, tuple[float, float]]:
     limit = section.section("limit")
     for axis in limit.fields():
         if axis not in AXES:
-            raise BadInputError(
-                f"{limit.name_of(axis)} is no axis of a command{did_you_mean(axis, AXES)}; "
-                f"known: {', '.join(AXES)}"
+            raise limit.error(
+                axis, f"an axis is one of {', '.join(AXES)}{did_you_mean(axis, AXES)}"
             )
         pair = limit.pair(axis)
         if pair is not None:

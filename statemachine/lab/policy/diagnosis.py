@@ -15,19 +15,20 @@ from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
 from .checks import check_network
+from .command import Command, usual_commands
 from .contract import Contract
 from .contract_file import read_contract
 from .hypotheses import Hypothesis, HypothesisKind, hypotheses_of
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
-from .request import PolicyRequest, usual_commands
+from .request import PolicyRequest
 from .term_gaps import TermGap, term_gaps
-from .walk import Command, RecordedWalk, Walk, all_walked
+from .walk import RecordedWalk, Walk, all_walked
 
 # By how much the outcome must get better: a part of it, and at least so much. `cost_of` says in
 # what; a sound contract that tracks within a third of the tolerance cannot get better by that.
-_PART: Final = 0.4
-_LEAST: Final = 0.08
+PART_OF_COST: Final = 0.4
+LEAST_GAIN: Final = 0.08
 # Two changes whose costs are nearer are equally good.
 _TIE: Final = 0.04
 _PER_TOLERANCE: Final = 0.25  # cost of a speed that is off by all that is tolerated
@@ -257,6 +258,6 @@ def named_of(tried: Sequence[TriedHypothesis], cost: float) -> tuple[TriedHypoth
         cost: Of the contract as it is.
     """
     best = _sorting_cost(tried[0])
-    if cost - best < max(_LEAST, _PART * cost):
+    if cost - best < max(LEAST_GAIN, PART_OF_COST * cost):
         return ()
     return tuple(each for each in tried if _sorting_cost(each) <= best + _TIE)

@@ -73,8 +73,9 @@ class Network:
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         try:
+            # By its path, for its weights may stand in a file beside it.
             self._session = runtime.InferenceSession(
-                content, options, providers=["CPUExecutionProvider"]
+                str(path), options, providers=["CPUExecutionProvider"]
             )
         except Exception as error:  # onnxruntime has an exception for each of its codes
             raise BadInputError(f"{path} is no ONNX network: {one_line(error)}") from error

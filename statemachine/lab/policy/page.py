@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...measures.text import command, percent, significant
-from ...program import NAME
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
 from .adapted import ContractChange
 from .checks import ContractNote
-from .request import EngineWalks, PolicyResult
+from .request import EngineWalks, PolicyResult, words_of_request
 from .walk import Walk
 
 _NO_NUMBER = "–"
@@ -238,27 +237,9 @@ def _range(values: tuple[float, float] | None, unit: str) -> str:
     return f"{text} {unit}"
 
 
-def words_of_request(result: PolicyResult) -> list[str]:
-    """Return how the question is typed."""
-    request = result.request
-    words = [NAME, "policy", str(request.policy), str(request.model)]
-    words += ["--contract", str(request.contract)]
-    for backend in request.backends:
-        words += ["--backend", backend]
-    for asked in request.commands:
-        words.append(f"--command={asked.words}")
-    return words
-
-
 def _next_command(result: PolicyResult, details: bool) -> str:
     """Return what to type next; "" for nothing."""
-    options = (
-        ("--seconds", result.request.seconds, 10.0),
-        ("--keyframe", result.request.keyframe, None),
-    )
-    words = words_of_request(result)
+    words = words_of_request(result.request)
     if not result.holds:
-        return command([*words, "--faults"], *options)
-    if details:
-        return ""
-    return command([*words, "--details"], *options)
+        return command([*words, "--faults"])
+    return "" if details else command([*words, "--details"])

@@ -12,6 +12,7 @@ from ...errors import BadInputError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Model
 from ...models import AnyPath
+from ...program import NAME
 from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.provenance import Provenance, provenance
@@ -27,7 +28,7 @@ from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
 from .walk import Walk, all_walked
 
-_SECONDS = 10.0
+SECONDS = 10.0  # of a run
 _LONGEST = 600.0  # [s]
 
 
@@ -52,7 +53,7 @@ class PolicyRequest:
     model: AnyPath
     backends: tuple[str, ...] = (DEFAULT,)
     commands: tuple[Command, ...] = ()
-    seconds: float = _SECONDS
+    seconds: float = SECONDS
     keyframe: str | None = None
     menagerie: AnyPath | None = None
 
@@ -165,3 +166,18 @@ def _start_of(model: Model, keyframe: str | None) -> np.ndarray | None:
     """Return the qpos (nq,) of the keyframe in which runs start; None for the default state."""
     key = home_keyframe(model) if keyframe is None else keyframe
     return None if key is None else model.keyframes[model.key_id(key)].qpos
+
+
+def words_of_request(request: PolicyRequest) -> list[str]:
+    """Return how a question is typed."""
+    words = [NAME, "policy", str(request.policy), str(request.model)]
+    words += ["--contract", str(request.contract)]
+    for backend in request.backends if request.backends != (DEFAULT,) else ():
+        words += ["--backend", backend]
+    for asked in request.commands:
+        words.append(f"--command={asked.words}")
+    if request.seconds != SECONDS:
+        words += ["--seconds", f"{request.seconds:g}"]
+    if request.keyframe is not None:
+        words += ["--keyframe", request.keyframe]
+    return words
