@@ -21,12 +21,14 @@ class PolicyOutcomes(PageContent):
     Attributes:
         policy: Its file.
         until: The last moment that counts [s].
+        description: What was asked of it, in sentences.
         outcomes: A row for each.
     """
 
     template = "policy_outcomes.md.j2"
     policy: str
     until: float
+    description: str
     outcomes: Table
 
 
@@ -34,8 +36,9 @@ def policy_outcomes_blocks(comparison: Comparison) -> list[Block]:
     """Return what came of two runs of a policy; nothing of runs of anything else."""
     if not comparison.is_of_policy():
         return []
-    policy = comparison.left.trace.header.experiment
-    return render_blocks(PolicyOutcomes(policy, comparison.until, outcomes_table(comparison)))
+    header, table = comparison.left.trace.header, outcomes_table(comparison)
+    content = PolicyOutcomes(header.experiment, comparison.until, header.description, table)
+    return render_blocks(content)
 
 
 def outcomes_table(comparison: Comparison) -> Table:
