@@ -69,9 +69,9 @@ def test_the_same_seed_searches_the_same() -> None:
 
 @pytest.mark.parametrize("command", [STRAIGHT, (0.5, 0.0, 0.0), (0.0, 0.0, 0.6), TURNING])
 def test_it_walks_as_it_is_asked(network: Network, command: tuple[float, float, float]) -> None:
-    """Within a fifth, and within a twentieth of the highest speed where none is asked."""
+    """Within a fifth, and within a tenth of the highest speed where none is asked."""
     walked = outcome(THE_CONTRACT, network, "mujoco", command)
-    allowed = np.maximum(0.2 * np.abs(command), [0.025, 0.025, 0.03])
+    allowed = np.maximum(0.2 * np.abs(command), [0.05, 0.05, 0.06])
     assert walked.upright[0] == 10
     assert (np.abs(walked.speeds[0] - command) <= allowed).all()
 
