@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,18 @@ def test_it_walks_as_it_is_asked(network: Network, command: tuple[float, float, 
     allowed = np.maximum(0.2 * np.abs(command), [0.05, 0.05, 0.06])
     assert walked.upright[0] == 10
     assert (np.abs(walked.speeds[0] - command) <= allowed).all()
+
+
+@pytest.mark.slow
+def test_the_speeds_of_the_readme_are_reached(network: Network) -> None:
+    text = CONTRACT.with_name("README.md").read_text("utf-8")
+    rows = re.findall(r"^\| ([-\d., ]+) \| ([-\d., ]+) \|", text, re.MULTILINE)
+    assert len(rows) == 7
+    for row in rows:
+        asked, reached = ([float(word) for word in cell.split(",")] for cell in row)
+        x, y, turn = asked
+        walked = outcome(THE_CONTRACT, network, "mujoco", (x, y, turn))
+        assert walked.speeds[0] == pytest.approx(reached, abs=0.02)
 
 
 @pytest.mark.slow
