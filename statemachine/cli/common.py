@@ -113,6 +113,19 @@ def add_seed(parser: argparse._ActionsContainer, what: str) -> None:
     parser.add_argument("--seed", type=typed_int, default=0, metavar="N", help=help_text)
 
 
+def add_policy(parser: argparse._ActionsContainer) -> None:
+    """Add --contract and --command, of a policy that is run like a function."""
+    parser.add_argument(
+        "--contract", metavar="FILE", help="what POLICY.onnx expects, as of `statemachine policy`"
+    )
+    parser.add_argument(
+        "--command",
+        type=number_list,
+        metavar="VX,VY,WZ",
+        help="speeds that POLICY.onnx is asked for [m/s, m/s, rad/s] (straight on)",
+    )
+
+
 def add_seconds(parser: argparse._ActionsContainer) -> None:
     """Add --seconds, the simulated time."""
     parser.add_argument("--seconds", type=typed_float, metavar="S", help="simulated time")

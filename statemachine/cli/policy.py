@@ -18,8 +18,8 @@ from .common import (
 )
 
 if TYPE_CHECKING:
+    from ..lab.policy.command import Command
     from ..lab.policy.request import PolicyRequest
-    from ..lab.policy.walk import Command
 
 _SECONDS = 10.0
 
@@ -101,7 +101,7 @@ def request_of(options: argparse.Namespace) -> PolicyRequest:
 def _command_of(numbers: list[float]) -> Command:
     """Return the speeds of one run."""
     from ..errors import BadInputError
-    from ..lab.policy.walk import Command
+    from ..lab.policy.command import Command
 
     if len(numbers) != 3:
         raise BadInputError(f"a command is vx,vy,wz, three numbers; got {len(numbers)}")

@@ -17,6 +17,7 @@ from .common import (
     add_json,
     add_menagerie,
     add_model,
+    add_policy,
     add_seconds,
     add_seed,
     add_timestep,
@@ -105,7 +106,8 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
         "what",
         nargs="?",
         metavar="WHAT",
-        help="an experiment; or FILE.py:FUNCTION, which gets (model, data) and returns a command",
+        help="an experiment; FILE.py:FUNCTION, which gets (model, data) and returns a command; or "
+        "POLICY.onnx",
     )
     add_model(parser, "the model, instead of the experiment's own")
     parser.add_argument("--keyframe", metavar="NAME", help="where it starts")
@@ -114,6 +116,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     add_seconds(parser)
     add_timestep(parser)
     add_seed(parser, "what is drawn")
+    add_policy(parser)
     _add_output(parser, "WHAT.BACKEND.npz")
     parser.set_defaults(run=run_record)
 
@@ -153,8 +156,10 @@ def record_request_of(options: argparse.Namespace) -> RecordRequest:
     """
     if options.what is None:
         raise BadInputError(
-            f"record what? An experiment ({', '.join(EXPERIMENTS)}) or FILE.py:FUNCTION"
+            f"record what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or "
+            "POLICY.onnx"
         )
+    from ..lab.policy.command import speeds_of
     from ..lab.recordings.request import RecordRequest
 
     return RecordRequest(
@@ -166,6 +171,8 @@ def record_request_of(options: argparse.Namespace) -> RecordRequest:
         seconds=options.seconds,
         timestep=options.timestep,
         seed=options.seed,
+        contract=options.contract,
+        command=None if options.command is None else speeds_of(options.command),
     )
 
 

@@ -96,7 +96,7 @@ def request_of(options: argparse.Namespace) -> SimulationRequest | RecordingRequ
         BadInputError: Too much is named, or an option is for a simulation and a trace is named.
         UnknownNameError: There is no such backend.
     """
-    from ..lab.compare.sides import is_trace
+    from ..lab.compare.what import is_trace
     from ..view.request import RecordingRequest, SimulationRequest
 
     traces = [word for word in options.words if is_trace(word)]

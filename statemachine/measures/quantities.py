@@ -19,6 +19,7 @@ ENCODER_COUNT = 2 * np.pi / 4096
 _ENCODER_COUNT_REASON = "1/4096 turn, one count of a 12-bit encoder as small servos have"
 _MIN_LEVER_ARM = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
 _ENERGY_SHARE = 0.01  # of what the energy changes by in the run
+_WORK_SHARE, _MIN_WORK = 0.01, 1e-3  # of the larger work; J, what is less is nothing
 _FORCE_SHARE = 0.05  # of its mean while it acts
 _DISTANCE_SHARE, _MIN_DISTANCE = (
     0.01,
@@ -130,6 +131,23 @@ _KINDS = (
     ),
     Quantity("distance", "m", "distances travelled", is_outcome=True),
     Quantity(
+        "speed",
+        "m/s",
+        "forward speeds",
+        is_outcome=True,
+        tolerance=0.01,
+        reason="1 cm/s: what a tape on the floor and a stopwatch can tell",
+    ),
+    Quantity(
+        "lateral way",
+        "m",
+        "lateral ways",
+        is_outcome=True,
+        tolerance=0.01,
+        reason="a centimetre: what a tape on the floor can tell",
+    ),
+    Quantity("work", "J", "work of actuators", is_outcome=True),
+    Quantity(
         "tracking",
         "rad",
         "tracking errors",
@@ -203,6 +221,11 @@ def tolerance_of(
         if share >= _MIN_DISTANCE:
             return Tolerance(share, f"1 % of {rounded(farthest, 'm')}, which the base travels")
         return Tolerance(_MIN_DISTANCE, "a millimetre")
+    if kind == "work":
+        most = float(np.max([left, right], initial=0.0))
+        if _WORK_SHARE * most < _MIN_WORK:
+            return Tolerance(_MIN_WORK, "a millijoule")
+        return Tolerance(_WORK_SHARE * most, f"1 % of {rounded(most, 'J')}, the larger work")
     if kind == "energy":
         return _energy_tolerance(max(_change(left), _change(right)), scale)
     if kind == "force":
@@ -267,6 +290,7 @@ _DEGREE = np.pi / 180
 _SUFFIXES = (
     ("deg", _DEGREE, "rad"),
     ("rad", 1.0, "rad"),
+    ("m/s", 1.0, "m/s"),  # before "s", which it ends in
     ("mm", 1e-3, "m"),
     ("cm", 1e-2, "m"),
     ("ms", 1e-3, "s"),

@@ -14,6 +14,7 @@ from ..common import (
     add_jobs,
     add_json,
     add_menagerie,
+    add_policy,
     add_seconds,
     add_seed,
     add_timestep,
@@ -41,6 +42,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         f"  {PROGRAM} compare hold A.xml --backend all\n"
         f"  {PROGRAM} compare hold so101 timestep=0.002 so101 timestep=0.001\n"
         f"  {PROGRAM} compare walk.py:policy A.xml B.xml --every 5 --keyframe home\n"
+        f"  {PROGRAM} compare walk.onnx A.xml A.xml@pybullet --contract C.yaml\n"
         f"  {PROGRAM} compare run.npz A.xml B.xml"
     )
     parser.epilog = (
@@ -53,8 +55,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "what",
         nargs="*",
         metavar="WHAT",
-        help="what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, a "
-        "model for all engines, two sides or more, or a second trace",
+        help="what is run: an experiment, FILE.py:FUNCTION, POLICY.onnx or a recorded TRACE; then "
+        "nothing, a model for all engines, two sides or more, or a second trace",
     )
     add_backend(
         parser,
@@ -140,6 +142,7 @@ def _add_sides(group: argparse._ArgumentGroup) -> None:
         help="for how long what FUNCTION(model, data) returned holds: steps (1), or 5ms",
     )
     group.add_argument("--keyframe", metavar="NAME", help="where it starts, on both sides")
+    add_policy(group)
 
 
 def _add_why(group: argparse._ArgumentGroup) -> None:
@@ -254,7 +257,7 @@ def check_options(options: argparse.Namespace) -> None:
     _exclude(options, "versions", ("one_step", "converge"))
     of_a_run = (
         *("why", "quantity", "html", "plot", "film", "seconds", "timestep", "tolerance"),
-        *("uncertainty", "every", "keyframe", *PARTS),
+        *("uncertainty", "every", "keyframe", "contract", "command", *PARTS),
     )
     if options.why and options.html is None:
         _check_why_alone(options)

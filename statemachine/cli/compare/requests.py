@@ -53,8 +53,8 @@ def request_of(options: argparse.Namespace) -> Question:
         return _models_request_of(options)
     if not options.what:
         raise BadInputError(
-            f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
-            f"{PROGRAM} compare hold"
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION, "
+            f"POLICY.onnx or traces: {PROGRAM} compare hold"
         )
     what, sides = split_words(options.what, options.menagerie)
     if len(sides) > len(PAIR) or _names_several_backends(options):
@@ -151,6 +151,7 @@ def _run_of(
         backends: Where no sides are named.
     """
     from ...lab.compare import Request
+    from ...lab.policy.command import speeds_of
     from ...lab.runs.call_period import every_of_word
 
     common: dict[str, OptionValue] = {}
@@ -178,6 +179,8 @@ def _run_of(
         names=names,
         every=every,
         keyframe=options.keyframe,
+        contract=options.contract,
+        command=None if options.command is None else speeds_of(options.command),
     )
 
 
@@ -223,7 +226,7 @@ def _backends(options: argparse.Namespace, what: Sequence[str]) -> tuple[str, st
     """
     from ...backends.chosen import chosen_backends
     from ...backends.installed_backends import installed_backends
-    from ...lab.compare.sides import is_trace
+    from ...lab.compare.what import is_trace
 
     if not options.backend:
         return PAIR
@@ -282,12 +285,12 @@ def _check_words_of_models(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: Something is.
     """
-    from ...lab.compare.sides import is_trace
-    from ...lab.runs.controllers import is_function
+    from ...lab.compare.what import is_trace
+    from ...lab.runs.controllers import is_controller
     from ...lab.runs.scenarios import SCENARIOS
 
     for word in options.what:
-        if word in SCENARIOS or is_trace(word) or is_function(word):
+        if word in SCENARIOS or is_trace(word) or is_controller(word):
             others = " ".join(options.what[1:]) or "LEFT RIGHT"
             run = " ".join([*options.what, *options.models])
             raise BadInputError(

@@ -15,8 +15,10 @@ from ...interface.options import OptionValue
 from ...measures import parse_tolerances
 from ...models import AnyPath
 from ..compare.perturbed import Uncertainty, parse_uncertainty
-from ..compare.sides import Request, Side, What
+from ..compare.sides import Request, Side
 from ..compare.typed_sides import parse_sides
+from ..compare.what import What
+from ..policy.command import speeds_of
 from ..recordings import Trace
 from ..runs.call_period import Every
 from ..runs.scenarios import SCENARIOS
@@ -25,7 +27,7 @@ from ..shown_result import ShownResult
 AnySide = AnyPath | Model | Side
 AnyWhat = What | os.PathLike[str]
 Which = Literal["left", "right"]
-_RUNS = f"an experiment ({', '.join(SCENARIOS)}), a function (model, data), or traces"
+_RUNS = f"an experiment ({', '.join(SCENARIOS)}), a function (model, data), a policy, or traces"
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class RunArguments:
         floor: The side whose floor both have.
         every: Steps for which what a function returned holds, or a time such as "5ms".
         keyframe: Where it starts, on both sides.
+        contract: What a policy expects of the simulator: a file.
+        command: (3,) speeds that a policy is asked for.
     """
 
     left: AnySide | Request | None = None
@@ -62,6 +66,8 @@ class RunArguments:
     floor: Which | None = None
     every: Every = 1
     keyframe: str | None = None
+    contract: AnyPath | None = None
+    command: Sequence[float] | None = None
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> RunArguments:
@@ -146,6 +152,8 @@ class RunArguments:
             names=self.pairs_of_names,
             every=self.every,
             keyframe=self.keyframe,
+            contract=_text(self.contract),
+            command=None if self.command is None else speeds_of(self.command),
         )
 
     def _what(self) -> tuple[What, ...]:

@@ -35,6 +35,8 @@ def engines(
     seed: int = 0,
     every: Every = 1,
     keyframe: str | None = None,
+    contract: AnyPath | None = None,
+    command: Sequence[float] | None = None,
     tolerances: Mapping[str, float | str] | None = None,
     uncertainty: Uncertainty | str | Sequence[str] = (),
     chaos: bool = True,
@@ -59,6 +61,8 @@ def engines(
         seed: As of `compare`.
         every: As of `compare`.
         keyframe: As of `compare`.
+        contract: As of `compare`.
+        command: As of `compare`.
         tolerances: As of `compare`.
         uncertainty: As of `compare`.
         chaos: As of `compare`.

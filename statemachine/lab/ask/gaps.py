@@ -40,6 +40,8 @@ def compare(
     floor: Which | None = None,
     every: Every = 1,
     keyframe: str | None = None,
+    contract: AnyPath | None = None,
+    command: Sequence[float] | None = None,
     tolerances: Mapping[str, float | str] | None = None,
     uncertainty: Uncertainty | str | Sequence[str] = (),
     chaos: bool = True,
@@ -59,19 +61,23 @@ def compare(
             CompareRequest, which says all of it.
         right: The right side.
         what: The name of an experiment; a function f(model, data) that returns ctrl (nu,) or None
-            to leave it, or "FILE.py:FUNCTION"; or one or two traces, or their files.
+            to leave it, or "FILE.py:FUNCTION"; "POLICY.onnx", a network; or one or two traces, or
+            their files.
         backends: Where no sides are given: "mujoco", "pybullet", "pybullet:engine" or a release,
             "mujoco==3.3.7".
         menagerie: A menagerie folder to look names up in; None for $MENAGERIE.
-        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function.
+        seconds: Simulated time [s]; None for the experiment's own, or 2 of a function, 4 of a
+            policy.
         timestep: Length of a step on both sides [s]; None for each file's own.
         seed: Of what an experiment draws.
         names: Joints, bodies, sites and actuators of the left by the names that the right has.
         actuators: "left" or "right": both sides have the actuators of that one.
         floor: "left" or "right": both sides have the floor of that one.
         every: Steps for which what a function returned holds, or a time such as "5ms".
-        keyframe: Where it starts, on both sides; None for the experiment's own, and for the default
-            state of a function.
+        keyframe: Where it starts, on both sides; None for the experiment's own, for the default
+            state of a function, and for "home" of a policy.
+        contract: What a policy expects of the simulator: a YAML file.
+        command: Speeds that a policy is asked for, vx, vy [m/s], wz [rad/s]; None for straight on.
         tolerances: By kind of quantity, over the usual ones: SI, or words as in
             {"joint": "0.5deg", "tip": 0.002}.
         uncertainty: How uncertain the start of the robot is, as ("0.1mm", "0.1deg"), for the chaos
@@ -110,6 +116,8 @@ def why(
     floor: Which | None = None,
     every: Every = 1,
     keyframe: str | None = None,
+    contract: AnyPath | None = None,
+    command: Sequence[float] | None = None,
     quantity: str | None = None,
     measure: Measure = "worst",
     finer: bool = False,
@@ -138,6 +146,8 @@ def why(
         floor: As of `compare`.
         every: As of `compare`.
         keyframe: As of `compare`.
+        contract: As of `compare`.
+        command: As of `compare`.
         quantity: What the gap is measured in: "joints", one joint, a body, a site; None for what
             fits the run.
         measure: Which figure of the gap is explained: "worst" at any moment, at the "end", or the

@@ -31,6 +31,8 @@ def one_step(
     floor: Which | None = None,
     every: Every = 1,
     keyframe: str | None = None,
+    contract: AnyPath | None = None,
+    command: Sequence[float] | None = None,
     reporter: Reporter = QUIET,
 ) -> OneStepResult:
     """Return which stage of a step differs first, from each state of the left side.
@@ -51,6 +53,8 @@ def one_step(
         floor: As of `compare`.
         every: As of `compare`.
         keyframe: As of `compare`.
+        contract: As of `compare`.
+        command: As of `compare`.
         reporter: Told how it gets on; by default no one, and notes are warnings.
 
     Raises:
@@ -81,6 +85,8 @@ def converge(
     floor: Which | None = None,
     every: Every = 1,
     keyframe: str | None = None,
+    contract: AnyPath | None = None,
+    command: Sequence[float] | None = None,
     reporter: Reporter = QUIET,
 ) -> ConvergeResult:
     """Return what of a gap vanishes with the timestep h: runs at h, h/2, h/4, and at most h/16.
@@ -101,6 +107,8 @@ def converge(
         floor: As of `compare`.
         every: As of `compare`.
         keyframe: As of `compare`.
+        contract: As of `compare`.
+        command: As of `compare`.
         reporter: Told how it gets on; by default no one, and notes are warnings.
 
     Raises:

@@ -22,7 +22,7 @@ from ..runs.floating import Bases, base_of
 from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
 from .motion import LeastMotion, MotionExtent, least_motions, motion_of, with_efforts
-from .outcomes import RunOutcome, outcomes_of
+from .outcomes import RunOutcome, is_of_policy, outcomes_of
 from .quantity_agreement import Agreement, Verdict, first_touch, missed_touch, of_outcome
 from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
 
@@ -107,7 +107,7 @@ class Comparison:
         bases: Whether the base of the robot floats, on each side. Where one floats and the other is
             fixed, the sides differ, whatever else agrees.
         outcomes: What came of both runs of a robot that floats: did it fall, how far did it get,
-            how well did its servos track. Each is one of the agreements, too.
+            how well did its servos track; of a policy how fast, too. Each is one of the agreements.
         touches: One for each pair of bodies that touches on either side.
         curves: The quantities over time; first touches have none.
     """
@@ -124,6 +124,15 @@ class Comparison:
     outcomes: tuple[RunOutcome, ...]
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
+
+    @property
+    def is_of_policy(self) -> bool:
+        """Tell whether a policy commanded a robot that floats."""
+        return bool(self.outcomes) and is_of_policy(self.left.trace)
+
+    def outcome_named(self, name: str) -> RunOutcome | None:
+        """Return what came of both runs by its name; None where they have no such outcome."""
+        return next((outcome for outcome in self.outcomes if outcome.name == name), None)
 
     @property
     def gap_of_moments(self) -> float | None:

@@ -2,7 +2,8 @@
 
 Of each side one number, whatever happened on the way. A base has fallen where it is below a third
 of its height at the start, or where the direction of its own that pointed up at the start points
-down: it has turned over by more than 90°.
+down: it has turned over by more than 90°. Of a policy it is told, too, how fast it goes, how far to
+one side, and what that takes: whether it fell is too little to know of it.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from typing import Literal
 
 import numpy as np
 
-from ...interface import JointType
+from ...interface import Array, JointType
 from ...measures import QUANTITIES, SAME_MOMENT, tolerance_of
 from ..recordings import Trace
+from ..runs.controllers import is_policy
 from ..runs.floating import fallen_moments, free_joint_of_robot
+from ..runs.walking import lateral_way, mean_speeds
 from .series import base_label
 
 FELL, DISTANCE, TRACKING, SLIDE_TRACKING = (
@@ -25,9 +28,13 @@ FELL, DISTANCE, TRACKING, SLIDE_TRACKING = (
     "tracking error",
     "tracking error of slides",
 )
+FORWARD, LATERAL, WORK = "forward speed", "lateral way", "work of the actuators"  # of a policy
 # The kind of each, which says unit and tolerance.
 OUTCOMES: Mapping[str, str] = {
     FELL: "fall",
+    FORWARD: "speed",
+    LATERAL: "lateral way",
+    WORK: "work",
     DISTANCE: "distance",
     TRACKING: "tracking",
     SLIDE_TRACKING: "slide tracking",
@@ -44,7 +51,8 @@ class RunOutcome:
         unit: Its SI unit.
         left: Of the left: when it fell [s from the start], None if it did not; the distance [m]
             from start to end, level; the root mean square of the gap of servos and their targets
-            [rad or m].
+            [rad or m]; of a policy the mean speed in the axes of its heading [m/s], how far to the
+            left of the straight line ahead it ended [m], the work of the actuators [J].
         right: Of the right.
         difference: How far apart they are [unit]; where one side alone fell, from then to the end.
         tolerance: What does not matter [unit].
@@ -114,11 +122,56 @@ def outcomes_of_run(trace: Trace, until: float) -> dict[str, float | None]:
         fallen = fallen_moments(poses)
         outcomes[FELL] = float(time[rows[fallen.argmax()]]) if fallen.any() else None
         outcomes[DISTANCE] = float(np.linalg.norm(poses[-1, :2] - poses[0, :2]))
+        if is_of_policy(trace):
+            outcomes |= _of_walk(poses, float(time[rows[-1]]))
+            work = _work(trace, len(rows))
+            if work is not None:
+                outcomes[WORK] = work
     for name, kind in ((TRACKING, JointType.HINGE), (SLIDE_TRACKING, JointType.SLIDE)):
         error = _tracking_error(trace, len(rows), kind)
         if error is not None:
             outcomes[name] = error
     return outcomes
+
+
+def is_of_policy(trace: Trace) -> bool:
+    """Tell whether a policy commanded a run."""
+    return is_policy(trace.header.experiment)
+
+
+def _of_walk(poses: Array, seconds: float) -> dict[str, float]:
+    """Return how fast a base goes ahead, and how far it gets to one side.
+
+    Args:
+        poses: (n, 7) of the base, one each step.
+        seconds: From the first to the last [s].
+    """
+    speeds = mean_speeds(poses, seconds)
+    outcomes = {} if speeds is None else {FORWARD: speeds.forward}
+    return outcomes | {LATERAL: lateral_way(poses)}
+
+
+def _work(trace: Trace, count: int) -> float | None:
+    """Return the work that the actuators of hinges and slides do; what they take back is no loss.
+
+    Args:
+        trace: The run.
+        count: How many rows of it count.
+
+    Returns:
+        The sum over steps and joints of force times speed, where both have one sign [J]; None where
+        no forces were recorded.
+    """
+    header = trace.header
+    scalars = JointType.HINGE, JointType.SLIDE
+    joints = sorted({joint for joint in header.actuator_jntid if joint >= 0})
+    dofs = [header.jnt_dofadr[joint] for joint in joints if header.jnt_type[joint] in scalars]
+    if "qfrc_actuator" not in trace or not dofs or count < 2:
+        return None
+    forces = trace["qfrc_actuator"][: count - 1, dofs]
+    powers = np.maximum(forces * trace.qvel[: count - 1, dofs], 0.0)
+    work = float(powers.sum() * header.timestep)
+    return work if np.isfinite(work) else None
 
 
 def _tracking_error(trace: Trace, count: int, kind: JointType) -> float | None:

@@ -17,6 +17,7 @@ from ..recordings import (
     Rerun,
     SideStart,
     start_of,
+    start_of_scenario,
     with_first_ctrl,
 )
 from ..runs.drive import check_length, number_of_steps
@@ -94,6 +95,7 @@ def prepare_sides(request: Request) -> PreparedSides:
     else:
         scenario = on_left(scenario, left, right)
         seed = request.seed if scenario.seeded else None
+        left_start = start_of_scenario(scenario, left)
     right_start = _start_of_right(scenario.keyframe, left_start, left, right, matched)
     notes += right_start.notes
 

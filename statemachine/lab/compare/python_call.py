@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from ...installed import DEFAULT, PAIR
 from ..recordings import Trace
 from .labels import typed_option
-from .sides import Request, Side, What, without_folders, word_of
+from .sides import Request, Side
+from .what import What, without_folders, word_of
 
 # The function of `statemachine.lab` that asks what an option of the command asks.
 _DETAILS = "--details"
@@ -83,14 +84,16 @@ def _name_of(what: What) -> str:
 
 def _options_of(run: Request, folders: bool) -> list[str]:
     """Return the arguments that say how it is run, but for those that are as by default."""
-    usual = Request(run.what)
+    usual = Request(run.what, contract=run.contract)
     arguments: list[str] = []
-    for name in ("seconds", "seed", "every", "keyframe", "names", "menagerie"):
+    for name in ("seconds", "seed", "every", "keyframe", "command", "names", "menagerie"):
         value = getattr(run, name)
         if name == "menagerie" and value is not None and not folders:
             value = "DIR"
         if value != getattr(usual, name):
             arguments.append(f"{name}={value!r}")
+    if run.contract is not None:
+        arguments.append(f"contract={run.contract if folders else without_folders(run.contract)!r}")
     for side, source in zip(run.sides, ("right", "left"), strict=False):
         if side.replaced_parts is not None:
             arguments += [f"{part}={source!r}" for part in side.replaced_parts.parts]

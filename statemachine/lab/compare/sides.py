@@ -15,7 +15,7 @@ import numpy as np
 
 from ...backends import BackendChoice, load_to_run, parse_backend
 from ...engines import raw_engine_of
-from ...errors import BadInputError, TraceError, shown
+from ...errors import BadInputError, shown
 from ...installed import DEFAULT, PAIR
 from ...interface import Model
 from ...interface.free_base import FreeBase
@@ -24,15 +24,14 @@ from ...interface.read_options import non_default_options
 from ...interface.records import READ_OPTIONS
 from ...measures.text import listed
 from ...models import resolve
-from ..recordings import Trace, read
-from ..recordings.files import SUFFIXES
+from ..policy.scenario import check_contract, policy_scenario
+from ..recordings import Trace
 from ..runs.call_period import CallPeriods, Every, call_periods, checked_every
-from ..runs.controllers import Function, file_and_name_of, function_scenario, is_function
+from ..runs.controllers import function_scenario, is_function, is_policy
 from ..runs.scenarios import Scenario, scenario
 from .labels import numbered, typed_option
 from .matching import match_models
-
-What = str | Function | Trace  # that is run on two sides, or played again
+from .what import What, is_trace, trace_of, without_folders, word_of
 
 
 @dataclass(frozen=True)
@@ -211,8 +210,8 @@ class Request:
     """What to compare.
 
     Attributes:
-        what: One experiment by name, one "FILE.py:FUNCTION" or function (model, data) itself, or
-            one or two traces or their files.
+        what: One experiment by name, one "FILE.py:FUNCTION" or function (model, data) itself, the
+            ONNX file of one policy, or one or two traces or their files.
         backends: The two backends, as `parse_backend` reads them; of one trace the one that is
             not its own is taken.
         model: Instead of the experiment's own, or a trace's.
@@ -224,7 +223,10 @@ class Request:
         names: Joints, bodies, sites and actuators of the left that go by other names on the
             right.
         every: Steps for which what a FUNCTION returns holds, or a time such as "5ms".
-        keyframe: Where it starts; None for the experiment's own, and a FUNCTION's default state.
+        keyframe: Where it starts; None for the experiment's own, a FUNCTION's default state, and
+            the keyframe "home" of a policy.
+        contract: What a policy expects of the simulator: a YAML file; None of anything else.
+        command: Speeds that a policy is asked for, vx, vy [m/s], wz [rad/s]; None for straight on.
     """
 
     what: Sequence[What]
@@ -238,16 +240,28 @@ class Request:
     names: Mapping[str, str] = field(default_factory=dict)
     every: Every = 1
     keyframe: str | None = None
+    contract: str | None = None
+    command: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         if len(self.backends) != 2:
             raise BadInputError(f"two backends are compared; got {shown(self.backends)}")
         checked_every(self.every)
+        check_contract([word_of(what) for what in self.what], self.contract, self.command)
+        if self.is_policy and self.every != 1:
+            raise BadInputError(
+                f"every is of a function: how often {self.experiment} is called its contract says"
+            )
 
     @property
     def is_traces(self) -> bool:
         """Tell whether traces were named, not an experiment."""
         return any(isinstance(what, Trace) or is_trace(what) for what in self.what)
+
+    @property
+    def is_policy(self) -> bool:
+        """Tell whether a policy is run."""
+        return len(self.what) == 1 and is_policy(self.what[0])
 
     def traces(self) -> list[Trace]:
         """Return the traces, read from their files.
@@ -255,7 +269,7 @@ class Request:
         Raises:
             TraceError: A file is not a trace.
         """
-        return [_trace_of(what) for what in self.what]
+        return [trace_of(what) for what in self.what]
 
     def trace_file(self, place: int) -> str | None:
         """Return the file of a trace, by its place; None of one that was handed over itself."""
@@ -328,11 +342,13 @@ class Request:
         ]
 
     def scenario(self) -> Scenario:
-        """Return the experiment that is run: one of ours, or the function of the user's.
+        """Return the experiment that is run: one of ours, or the user's function or policy.
 
         Raises:
             UnknownNameError: There is no such experiment.
-            BadInputError: There is no such function, or its file fails; or two things are named.
+            BadInputError: There is no such function, or its file fails; a policy does not fit its
+                contract; or two things are named.
+            MissingEngineError: The extra of policies is not installed.
         """
         if len(self.what) != 1:
             raise BadInputError(
@@ -341,39 +357,9 @@ class Request:
         (what,) = self.what
         if isinstance(what, Trace):
             raise BadInputError("a trace is a run that was made: name an experiment or a function")
+        if isinstance(what, str) and is_policy(what) and self.contract is not None:
+            return policy_scenario(what, self.contract, self.command, self.keyframe, self.names)
         if not isinstance(what, str) or is_function(what):
             return function_scenario(what, self.every, self.keyframe)
         known = scenario(what)
         return replace(known, keyframe=self.keyframe or known.keyframe)
-
-
-def without_folders(model: str) -> str:
-    """Return a model as one types it, without folders."""
-    return Path(model).name if Path(model).is_file() else model
-
-
-def is_trace(what: str | Function) -> bool:
-    """Tell whether a word names a trace, by its suffix; a function does not."""
-    return isinstance(what, str) and Path(what).suffix.lower() in SUFFIXES
-
-
-def word_of(what: What) -> str:
-    """Return what is run, in a word: as one types it without folders; else its name."""
-    if isinstance(what, str):
-        return Path(what).name
-    if isinstance(what, Trace):
-        return what.header.experiment or "a trace"
-    return file_and_name_of(what)[1]
-
-
-def _trace_of(what: What) -> Trace:
-    """Return a trace, read from its file if that is named.
-
-    Raises:
-        TraceError: The file is not a trace, or it is a function.
-    """
-    if isinstance(what, Trace):
-        return Trace(replace(what.header, recorded=True), what.columns)
-    if isinstance(what, str):
-        return read(what)
-    raise TraceError(f"{word_of(what)} is a function, and the other is a trace: two traces, or one")

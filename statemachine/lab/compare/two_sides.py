@@ -12,6 +12,7 @@ from ...errors import BadInputError, MissingEngineError, StateMachineError
 from ...installed import DEFAULT
 from ...measures import RobotScale, robot_points
 from ...measures.text import command
+from ..policy.scenario import options_of_policy
 from ..recordings import (
     Rerun,
     Trace,
@@ -20,7 +21,7 @@ from ..recordings import (
     rerun_of,
     rerun_of_trace,
 )
-from ..runs.controllers import is_function
+from ..runs.controllers import is_controller
 from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.floating import Bases
 from ..runs.scenarios import SCENARIOS
@@ -134,7 +135,7 @@ def run_sides(request: Request | str, progress: Progress = no_progress) -> Sides
     try:
         prepared = prepare_sides(request)
     except MissingEngineError:
-        if request != Request(request.what, request.backends):
+        if request.is_policy or request != Request(request.what, request.backends):
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
     run = _run_both(request, prepared.reruns, prepared.matched, progress)
@@ -151,8 +152,8 @@ def _check_what(request: Request) -> None:
 
 
 def _is_other_file(word: str) -> bool:
-    """Tell whether a word names a file that is neither an experiment nor a function."""
-    return word not in SCENARIOS and not is_function(word) and Path(word).is_file()
+    """Tell whether a word names a file that is neither an experiment nor a controller."""
+    return word not in SCENARIOS and not is_controller(word) and Path(word).is_file()
 
 
 def _run_both(
@@ -272,4 +273,5 @@ def _command(request: Request, backend: BackendChoice) -> str:
         ("--seed", request.seed, 0),
         ("--timestep", request.options.get("timestep"), None),
         ("--keyframe", request.keyframe, None),
+        *options_of_policy(request.contract, request.command),
     )

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...installed import DEFAULT, PAIR
+from ..policy.command import typed_speeds
 from .labels import typed_option
 from .python_call import python_call
-from .sides import Request, Side, without_folders
+from .sides import Request, Side
+from .what import without_folders
 
 _WIDTH = 74  # of a line of a command, which is set in
 _SOME_FOLDER = "DIR"
@@ -115,6 +117,10 @@ def _words_of_run(run: Request, folders: bool) -> list[str]:
         words += ["--seed", str(run.seed)]
     if run.every != 1:
         words += [_EVERY, str(run.every)]
+    if run.contract is not None:
+        words += ["--contract", run.contract if folders else without_folders(run.contract)]
+    if run.command is not None:
+        words.append(f"--command={typed_speeds(run.command)}")
     if run.keyframe is not None:
         words += ["--keyframe", run.keyframe]
     for left, right in run.names.items():

@@ -19,9 +19,10 @@ from ...interface.records import READ_OPTIONS
 from ...measures.text import command
 from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float
-from ..runs.controllers import is_function
+from ..runs.controllers import is_controller, is_policy
 from ..runs.scenarios import SCENARIOS
-from .sides import Side, is_trace
+from .sides import Side
+from .what import is_trace
 
 _OPTION = re.compile(r"[A-Za-z_]+=\S*")
 _LAST_OPTION = re.compile(rf"\s+({_OPTION.pattern})\s*$")
@@ -152,7 +153,7 @@ def split_words(
     if size == 0:
         size = 1
     what, rest = tuple(words[:size]), words[size:]
-    is_run = what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0])
+    is_run = what[0] in SCENARIOS or is_trace(what[0]) or is_controller(what[0])
     is_side = not is_run and _is_side(what[0], menagerie)
     for word in rest:
         if is_trace(word):
@@ -183,7 +184,8 @@ def _refuse_sides_alone(words: Sequence[str], sides: Sequence[Side]) -> NoReturn
     named = command(word for word in models if not _OPTION.fullmatch(word))
     raise BadInputError(
         f"compare what? {typed} runs an experiment ({', '.join(SCENARIOS)}) or "
-        f"FILE.py:FUNCTION; statemachine compare --models {named} lists what the files differ in"
+        f"FILE.py:FUNCTION or POLICY.onnx; statemachine compare --models {named} lists what the "
+        "files differ in"
     )
 
 
@@ -206,9 +208,10 @@ def _check_number_of_sides(
     if len(sides) == 1 and not is_model_alone:
         typed = command(["statemachine", "compare", what[0], *words, _on_other_engine(sides[0])])
         raise BadInputError(f"one side only: name the other, as in: {typed}")
-    if not sides and is_function(what[0]):
+    if not sides and is_controller(what[0]):
         typed = command(["statemachine", "compare", what[0], *words])
-        raise BadInputError(f"{what[0]} runs on a model, as in: {typed} so101")
+        model = "ROBOT.xml" if is_policy(what[0]) else "so101"
+        raise BadInputError(f"{what[0]} runs on a model, as in: {typed} {model}")
 
 
 def _is_model_alone(words: Sequence[str], sides: Sequence[Side]) -> bool:

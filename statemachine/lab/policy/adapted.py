@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import BadInputError
 from ...interface import Array, Ints, Model
+from ...measures.text import milliseconds
 from .binding import Binding
 from .contract import ActuatorKind, Contract
 
@@ -73,12 +74,7 @@ def adapted(model: Model, contract: Contract, binding: Binding) -> AdaptedModel:
         UnsupportedError: The backend cannot change what the contract says otherwise.
     """
     changes: list[ContractChange] = []
-    gears = model.actuator_gear[binding.ctrl]
-    if not np.all(gears == 1.0):
-        raise BadInputError(
-            f"{model.path.name} has gears before the joints of the policy, and a contract tells "
-            "angles and torques at the joints"
-        )
+    _check_has_no_gears(model, binding)
     timestep = _timestep(model, contract)
     if timestep != model.timestep:
         pair = (model.timestep, timestep)
@@ -94,6 +90,48 @@ def adapted(model: Model, contract: Contract, binding: Binding) -> AdaptedModel:
     if options:
         result = result.replace(**options)
     return AdaptedModel(result, drives.kind, drives.kp, drives.kd, drives.limit, tuple(changes))
+
+
+def unchanged(model: Model, contract: Contract, binding: Binding) -> AdaptedModel:
+    """Return how the joints of a model are driven with the servos that it has.
+
+    Where it has motors, torques are computed before each step, with the gains of the contract.
+
+    Args:
+        model: It stays as it is, whatever the contract says of servos, limits and timestep.
+        contract: How often the policy is called, and the gains of motors.
+        binding: Where the joints of the contract are in the model.
+
+    Raises:
+        BadInputError: The model has motors and the contract no gains, or the time between two
+            calls of the policy is no whole number of timesteps.
+    """
+    _check_has_no_gears(model, binding)
+    policy_dt = contract.timing.policy_dt
+    steps = policy_dt / model.timestep
+    if round(steps) < 1 or abs(steps - round(steps)) > _SAME * steps:
+        raise BadInputError(
+            f"{contract.file} calls its policy every {milliseconds(policy_dt)}, which is "
+            f"{steps:.6g} steps of {milliseconds(model.timestep)} on {model.backend}: write "
+            f"timestep={policy_dt / np.ceil(steps):.6g} behind that side"
+        )
+    has_servos = _has_servos(model, binding)
+    kind: ActuatorKind = "implicit_pd" if has_servos else "explicit_pd"
+    kp, kd = contract.servos.kp, contract.servos.kd
+    if has_servos:
+        kp, kd = model.actuator_kp[binding.ctrl], model.actuator_kv[binding.ctrl]
+    if kp is None or kd is None:
+        raise _no_gains(model, contract)
+    return AdaptedModel(model, kind, kp, kd, _force_limit(model, binding, has_servos), ())
+
+
+def _check_has_no_gears(model: Model, binding: Binding) -> None:
+    """Check that commands are angles or torques at the joints of a policy."""
+    if not np.all(model.actuator_gear[binding.ctrl] == 1.0):
+        raise BadInputError(
+            f"{model.path.name} has gears before the joints of the policy, and a contract tells "
+            "angles and torques at the joints"
+        )
 
 
 def _timestep(model: Model, contract: Contract) -> float:
@@ -202,11 +240,16 @@ def _gains(
         kp = model.actuator_kp[binding.ctrl] if kp is None else kp
         kd = model.actuator_kv[binding.ctrl] if kd is None else kd
     if kp is None or kd is None:
-        raise BadInputError(
-            f"{model.path.name} has motors, and {contract.file} has no gains: write "
-            "control.actuators.kp and kd"
-        )
+        raise _no_gains(model, contract)
     return kp, kd
+
+
+def _no_gains(model: Model, contract: Contract) -> BadInputError:
+    """Return the error that nobody says how stiff the joints are."""
+    return BadInputError(
+        f"{model.path.name} has motors, and {contract.file} has no gains: write "
+        "control.actuators.kp and kd"
+    )
 
 
 def _force_limit(model: Model, binding: Binding, has_servos: bool) -> Array:

@@ -12,9 +12,9 @@ from ...errors import BadInputError
 from ...interface import Array, Model
 from ...measures.text import few
 from .binding import Binding
+from .command import Command
 from .contract import AXES, Contract
 from .network import NetworkFacts
-from .walk import Command
 
 NoteKind = Literal["unread", "start elsewhere", "outside limits", "command outside limits"]
 _SAME: Final = 0.01  # [rad] of a joint: poses that are nearer are one

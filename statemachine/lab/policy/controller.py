@@ -66,6 +66,9 @@ class PolicyController:
         if driven.kind == "explicit_pd":
             low, high = np.full(n, -np.inf), np.full(n, np.inf)
         self._low, self._high = low, high
+        self._gain = np.ones(n)
+        if driven.kind == "explicit_pd":
+            self._gain = driven.model.actuator_gain[binding.ctrl]
         self.calls: list[PolicyCall] = []
         self.saturated = np.zeros(n, dtype=np.int64)
         self.steps = 0
@@ -90,7 +93,7 @@ class PolicyController:
         power = float(np.maximum(torque * joint_vel, 0.0).sum())
         self.work += power * driven.model.timestep
         ctrl = np.array(data.ctrl)
-        ctrl[self._binding.ctrl] = torque if driven.kind == "explicit_pd" else targets
+        ctrl[self._binding.ctrl] = torque / self._gain if driven.kind == "explicit_pd" else targets
         return ctrl
 
     def _call(self, data: Data) -> None:

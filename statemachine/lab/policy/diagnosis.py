@@ -15,14 +15,15 @@ from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
 from .checks import check_network
+from .command import Command, usual_commands
 from .contract import Contract
 from .contract_file import read_contract
 from .hypotheses import Hypothesis, HypothesisKind, hypotheses_of
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
-from .request import PolicyRequest, usual_commands
+from .request import PolicyRequest
 from .term_gaps import TermGap, term_gaps
-from .walk import Command, RecordedWalk, Walk, all_walked
+from .walk import RecordedWalk, Walk, all_walked
 
 # By how much the outcome must get better: a part of it, and at least so much. `cost_of` says in
 # what; a sound contract that tracks within a third of the tolerance cannot get better by that.

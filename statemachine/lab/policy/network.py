@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,6 +94,13 @@ class Network:
             version=runtime.__version__,
         )
         self.reset()
+
+    def with_own_memory(self) -> Network:
+        """Return the same network, which remembers what this one does not: for another run."""
+        network = copy.copy(self)
+        network._memory = {}
+        network.reset()
+        return network
 
     def reset(self) -> None:
         """Set the memory to zeros."""

@@ -21,16 +21,14 @@ from ..runs.robot import home_keyframe
 from .adapted import ContractChange
 from .binding import bind
 from .checks import ContractNote, check_network, notes_of
+from .command import Command, usual_commands
 from .contract import Contract
 from .contract_file import read_contract
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
-from .walk import Command, Walk, all_walked
+from .walk import Walk, all_walked
 
 SECONDS = 10.0  # of a run
-# Where the contract names no limits: forward [m/s], turning [rad/s].
-_FORWARD, _TURN = 0.5, 0.5
-_PART = 0.6  # of a limit: what is asked by default
 _LONGEST = 600.0  # [s]
 
 
@@ -162,20 +160,6 @@ def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
         notes=tuple(notes),
         engines=tuple(engines.values()),
     )
-
-
-def usual_commands(contract: Contract) -> tuple[Command, ...]:
-    """Return straight on and turning, within what a contract allows.
-
-    A gyroscope that is read in the axes of the world shows while the robot turns, and not before.
-    """
-    limits = contract.command_limits
-    forward, turn = _FORWARD, _TURN
-    if "vx" in limits:
-        forward = min(_FORWARD, _PART * limits["vx"][1])
-    if "wz" in limits:
-        turn = min(_TURN, _PART * limits["wz"][1])
-    return Command(forward), Command(forward, 0.0, turn)
 
 
 def _start_of(model: Model, keyframe: str | None) -> np.ndarray | None:

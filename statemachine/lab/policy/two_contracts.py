@@ -12,15 +12,16 @@ from ..runs.drive import Progress, progress_of_stage
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
 from .checks import check_network
+from .command import Command, usual_commands
 from .contract import Contract
 from .contract_differences import FieldDifference, field_differences
 from .contract_file import read_contract
 from .hypotheses import HypothesisKind, hypotheses_of
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
-from .request import PolicyRequest, usual_commands
+from .request import PolicyRequest
 from .term_gaps import TermGap, term_gaps
-from .walk import Command, RecordedWalk, Walk, all_walked
+from .walk import RecordedWalk, Walk, all_walked
 
 
 @dataclass(frozen=True)

@@ -5,60 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
-from ...errors import BadInputError, DivergedError
+from ...errors import DivergedError
 from ...interface import Array, Data, make_data, reset
-from ...rotations import matrix_from_quat
 from ..runs.drive import Progress, drive, no_progress, number_of_steps, progress_of_stage
 from ..runs.floating import fallen_moments
 from ..runs.robot import home_keyframe
+from ..runs.walking import START, headings, lateral_way, mean_speeds
+from .command import Command
 from .contract import AXES, Contract
 from .controller import PolicyCall, PolicyController
 from .on_model import PolicyOnModel
 
 Ending = Literal["walked", "fell", "diverged"]
 WalkVerdict = Literal["walks", "wrong speed", "falls", "diverges"]
-# How far a speed may be from the one asked for: the larger of both.
-TOLERANCE: Final = 0.1  # [m/s, rad/s]
-RELATIVE_TOLERANCE: Final = 0.25  # of the size of the command
-_START: Final = 0.2  # of a run: until then it gets going, and no speed is measured
-
-
-@dataclass(frozen=True)
-class Command:
-    """Speeds that a policy is asked for, in the axes of its heading.
-
-    Attributes:
-        vx: Forward [m/s].
-        vy: To the left [m/s].
-        wz: Turning to the left [rad/s].
-    """
-
-    vx: float
-    vy: float = 0.0
-    wz: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not np.isfinite(self.vector).all():
-            raise BadInputError(f"a command is finite; got {self.words}")
-
-    @property
-    def vector(self) -> Array:
-        """Return the three speeds (3,) [m/s, m/s, rad/s]."""
-        return np.array((self.vx, self.vy, self.wz))
-
-    @property
-    def words(self) -> str:
-        """Return it as it is typed: "0.5,0,0.8"."""
-        return ",".join(f"{speed:g}" for speed in (self.vx, self.vy, self.wz))
-
-    @property
-    def tolerance(self) -> float:
-        """Return how far each speed may be from the one asked for [m/s, rad/s]."""
-        return max(TOLERANCE, RELATIVE_TOLERANCE * float(np.linalg.norm(self.vector)))
 
 
 @dataclass(frozen=True)
@@ -218,16 +181,14 @@ def _walk_of(
         ending: Whether it still stood at the end.
     """
     dt = contract.timing.policy_dt
-    headings = np.unwrap(_headings(poses[:, 3:]))
     seconds = dt * (len(poses) - 1)
-    first = int(_START * len(poses)) if ending == "walked" else len(poses)
+    angles = headings(poses[:, 3:])
+    speeds = mean_speeds(poses, seconds) if ending == "walked" else None
     reached: tuple[float, float, float] | None = None
     height: float | None = None
-    if first < len(poses) - 1:
-        reached = _mean_speeds(poses[first:], headings[first:], dt)
-        height = float(poses[first:, 2].mean())
-    way = poses[-1, :2] - poses[0, :2]
-    ahead = headings[0]
+    if speeds is not None:
+        reached = speeds.forward, speeds.left, speeds.turn
+        height = float(poses[int(START * len(poses)) :, 2].mean())
     shares = controller.saturated / max(1, controller.steps)
     joint = int(shares.argmax())
     return Walk(
@@ -235,34 +196,11 @@ def _walk_of(
         seconds=seconds,
         ending=ending,
         reached=reached,
-        lateral=float(np.cos(ahead) * way[1] - np.sin(ahead) * way[0]),
-        distance=float(np.linalg.norm(way)),
-        turned=float(headings[-1] - headings[0]),
+        lateral=lateral_way(poses),
+        distance=float(np.linalg.norm(poses[-1, :2] - poses[0, :2])),
+        turned=float(angles[-1] - angles[0]),
         height=height,
         at_limit=float(shares[joint]),
         at_limit_joint=contract.joints[joint] if shares[joint] else "",
         power=controller.work / max(dt, seconds),
     )
-
-
-def _headings(quats: Array) -> Array:
-    """Return the headings (k,) [rad] of orientations (k, 4) wxyz: where their x axis points."""
-    ahead = matrix_from_quat(quats)[:, :2, 0]
-    return np.arctan2(ahead[:, 1], ahead[:, 0])
-
-
-def _mean_speeds(poses: Array, headings: Array, dt: float) -> tuple[float, float, float]:
-    """Return the mean speeds in the axes of the heading [m/s, m/s, rad/s].
-
-    Args:
-        poses: (k, 7) of the base, one each dt.
-        headings: (k,) [rad], turns counted.
-        dt: [s].
-    """
-    seconds = dt * (len(poses) - 1)
-    steps = np.diff(poses[:, :2], axis=0)
-    middle = 0.5 * (headings[:-1] + headings[1:])
-    forward = np.cos(middle) * steps[:, 0] + np.sin(middle) * steps[:, 1]
-    left = np.cos(middle) * steps[:, 1] - np.sin(middle) * steps[:, 0]
-    turn = headings[-1] - headings[0]
-    return float(forward.sum() / seconds), float(left.sum() / seconds), float(turn / seconds)

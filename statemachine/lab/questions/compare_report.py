@@ -28,6 +28,7 @@ from .compared_names import traces_of
 from .comparison import origin_of, title_of
 from .events import events_of
 from .finding import Finding, finding_about, leading
+from .policy_outcomes import policy_outcomes_blocks
 from .requests import causes
 from .requests.causes import ExplainRequest
 from .requests.gap import CompareResult
@@ -71,6 +72,7 @@ class CompareReport(PageContent):
         details: Everything else, in sections.
         steps: What to change so that both sides agree.
         parts: What it was asked to show besides.
+        outcomes: What came of a policy on both sides; empty of anything else.
     """
 
     template = "compare_report.md.j2"
@@ -81,6 +83,7 @@ class CompareReport(PageContent):
     details: Sequence[Block]
     steps: Sequence[Block]
     parts: ReportParts
+    outcomes: Sequence[Block]
 
     @property
     def total(self) -> int:
@@ -141,6 +144,7 @@ def report_page(result: CompareResult, parts: ReportParts) -> Page:
         details=details_of(result),
         steps=steps,
         parts=parts,
+        outcomes=policy_outcomes_blocks(comparison),
     )
     headline = headline_of(finding, comparison, result.instead, headline_causes)
     blocks = render_blocks(content)

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import quantity
+from ...measures.text import on_label, quantity
 from ...show.blocks import Headline, Text
 from ...show.markdown import plain_text
 from ...show.templates import PageContent, render_blocks
 from ..compare import Agreement, Comparison
 from ..compare.instead import Instead
 from ..compare.motion import MotionExtent
+from ..compare.outcomes import FORWARD
 from ..compare.series import SETTLED
 from ..runs.floating import Bases
 from .compared_names import name_of, noun_phrase, short_labels, shortened
-from .finding import Divergence, EarlyEnd, Finding
+from .finding import Divergence, EarlyEnd, Falls, Finding
 
 _NAME = 30  # characters of a name within a sentence
 _LABEL = 24  # of what a side is called within one
@@ -94,6 +95,40 @@ class DifferVerdict(_Verdict, PageContent):
         if at is None or not at.body:
             return None
         return _short(at.body), _short(at.ground)
+
+    @property
+    def falls(self) -> Falls:
+        """Return which sides fell; "none" of a policy, whose verdict begins with that."""
+        return "none" if self.comparison.is_of_policy else self.finding.falls
+
+
+@dataclass(frozen=True)
+class PolicyVerdict(_Verdict, PageContent):
+    """What came of a policy on both sides, which is said before how far apart they are."""
+
+    template = "compare_policy.md.j2"
+
+    @property
+    def on_left(self) -> str:
+        """Return where the left is, as a sentence has it."""
+        return on_label(self.left)
+
+    @property
+    def on_right(self) -> str:
+        """Return where the right is, as a sentence has it."""
+        return on_label(self.right)
+
+    @property
+    def left_speed(self) -> float | None:
+        """Return the mean speed forward of the left [m/s]; None where the run is too short."""
+        speed = self.comparison.outcome_named(FORWARD)
+        return None if speed is None else speed.left
+
+    @property
+    def right_speed(self) -> float | None:
+        """Return the mean speed forward of the right [m/s]; None where the run is too short."""
+        speed = self.comparison.outcome_named(FORWARD)
+        return None if speed is None else speed.right
 
 
 @dataclass(frozen=True)
@@ -203,7 +238,10 @@ def headline_of(
             content = EndedVerdict(finding, comparison, *sides)
         case "nothing moved":
             content = StillVerdict(finding, comparison, *sides, instead)
-    texts = [plain_text(b.text) for b in render_blocks(content) if isinstance(b, Text)]
+    blocks = render_blocks(content)
+    if comparison.is_of_policy:
+        blocks = [*render_blocks(PolicyVerdict(finding, comparison, *sides)), *blocks]
+    texts = [plain_text(block.text) for block in blocks if isinstance(block, Text)]
     lead, *rest = texts
     return Headline(lead.removesuffix("."), tuple(causes), " ".join(rest), finding.holds)
 

@@ -23,6 +23,7 @@ from .compare_verdict import headline_of, sentence_labels
 from .compared_names import long_labels, shortened, traces_of
 from .finding import VerdictCounts
 from .next_command import Purpose, next_command
+from .policy_outcomes import policy_outcomes_blocks
 from .requests.gap import CompareResult
 from .worst import WORST, worst_of
 
@@ -190,7 +191,10 @@ def _with_rows(
     frame = base_frame_blocks(content.bases.frame)
     call_periods_note = call_periods_blocks(periods)
     state = written_state_blocks(comparison.left.trace, comparison.right.trace)
-    blocks = [*state, *call_periods_note, *frame, *_known_changes(result), *render_blocks(content)]
+    outcomes = policy_outcomes_blocks(comparison)
+    changes = _known_changes(result)
+    notes = [*state, *call_periods_note, *frame, *changes]
+    blocks = [*outcomes, *notes, *render_blocks(content)]
     return Page(title_of(comparison), origin_of(comparison), blocks, headline)
 
 

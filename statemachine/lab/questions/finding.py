@@ -217,7 +217,7 @@ def finding_of(
     noticed = _noticed(comparison.agreements, lead)
     divergence, rounding = _divergence(comparison), _rounding(lead, floor)
     ended = tuple(_early_ends(comparison))
-    fall = next((outcome for outcome in comparison.outcomes if outcome.name == FELL), None)
+    fall = comparison.outcome_named(FELL)
     missing_parts = tuple(MissingPart(side, part) for side, part in missing)
     return Finding(
         outcome=comparison.outcome,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         rerun_of,
         rerun_of_trace,
         start_of,
+        start_of_scenario,
         with_first_ctrl,
     )
     from .trace import Trace
@@ -52,6 +53,7 @@ _MODULES = {
     "read_shipped_trace": "files",
     "shipped_trace_names": "files",
     "start_of": "rerun",
+    "start_of_scenario": "rerun",
     "write": "files",
 }
 
@@ -76,6 +78,7 @@ __all__ = [
     "rerun_of_trace",
     "shipped_trace_names",
     "start_of",
+    "start_of_scenario",
     "with_first_ctrl",
     "write",
 ]

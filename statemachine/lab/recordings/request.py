@@ -12,12 +12,15 @@ from ...installed import DEFAULT
 from ...interface.records import READ_OPTIONS
 from ...measures.text import command
 from ...models import AnyPath
+from ..policy.scenario import check_contract, options_of_policy, policy_scenario
 from ..runs.controllers import (
     Function,
     file_and_name_of,
     function_file,
     function_scenario,
+    is_controller,
     is_function,
+    is_policy,
 )
 from ..runs.reporter import QUIET, Reporter
 from ..runs.scenarios import SCENARIOS, Scenario, scenario
@@ -32,15 +35,18 @@ class RecordRequest:
 
     Attributes:
         what: Name of an experiment; "FILE.py:FUNCTION", or a function itself, which is called
-            with (model, data) and returns ctrl (nu,), or None to leave it.
+            with (model, data) and returns ctrl (nu,), or None to leave it; or the ONNX file of a
+            policy.
         model: A name or a file of a model; None for the experiment's own.
         backend: As `parse_backend` reads it.
         menagerie: A menagerie folder to look the model's name up in.
-        keyframe: Name of the keyframe where it starts; None for the experiment's own, and for a
-            function's default state.
+        keyframe: Name of the keyframe where it starts; None for the experiment's own, for a
+            function's default state, and for "home" of a policy.
         seconds: Simulated time [s]; None for the experiment's own.
         timestep: Length of a step [s]; None for the model's own.
         seed: Of what an experiment draws.
+        contract: What a policy expects of the simulator: a YAML file; None of anything else.
+        command: Speeds that a policy is asked for, vx, vy [m/s], wz [rad/s]; None for straight on.
     """
 
     what: str | Function
@@ -51,9 +57,12 @@ class RecordRequest:
     seconds: float | None = None
     timestep: float | None = None
     seed: int = 0
+    contract: AnyPath | None = None
+    command: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
-        if not is_function(self.what):
+        check_contract([str(self.what)], self.contract, self.command)
+        if not is_controller(self.what):
             check_name("experiment", self.what, SCENARIOS)
         self.chosen_backend()
 
@@ -62,8 +71,12 @@ class RecordRequest:
 
         Raises:
             UnknownNameError: There is no such experiment.
-            BadInputError: There is no such function, or its file fails.
+            BadInputError: There is no such function, or its file fails; or a policy does not fit
+                its contract.
+            MissingEngineError: The extra of policies is not installed.
         """
+        if isinstance(self.what, str) and is_policy(self.what) and self.contract is not None:
+            return policy_scenario(self.what, self.contract, self.command, self.keyframe)
         if not isinstance(self.what, str) or is_function(self.what):
             return function_scenario(self.what, keyframe=self.keyframe)
         known = scenario(self.what)
@@ -105,6 +118,7 @@ class RecordRequest:
             ("--seconds", self.seconds, None),
             ("--timestep", self.timestep, None),
             ("--seed", self.seed, 0),
+            *options_of_policy(self.contract, self.command),
         )
         return printable(typed)
 

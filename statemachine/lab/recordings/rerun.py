@@ -34,6 +34,12 @@ def start_of(model: Model, keyframe: int | str | None) -> SideStart:
         return SideStart(data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
 
 
+def start_of_scenario(scenario: Scenario, model: Model) -> SideStart | None:
+    """Return the start of a scenario on a Model; None where a keyframe or the default state is."""
+    qpos = scenario.qpos_at_start(model)
+    return None if qpos is None else start_of(model, None)._replace(qpos=qpos)
+
+
 @dataclass(frozen=True, eq=False)
 class Rerun:
     """The run of a side, so that it can be run again.
@@ -135,6 +141,7 @@ def rerun_of(
         controller=lambda replaced: scenario.controller(replaced, seed),
         seconds=scenario.seconds if seconds is None else seconds,
         keyframe=scenario.keyframe,
+        qpos=scenario.qpos_at_start(model),
         defaults=defaults,
         options=chosen,
         experiment=scenario.name,

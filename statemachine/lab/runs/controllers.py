@@ -22,6 +22,7 @@ from .user_files import error_text, last_user_line, load_module, signature_misma
 
 Function = Callable[..., Any]
 _POSITIONAL = ("model", "data")  # by position
+_POLICY = ".onnx"
 
 
 def is_function(spec: object) -> bool:
@@ -29,6 +30,16 @@ def is_function(spec: object) -> bool:
     if isinstance(spec, str):
         return Path(_file_and_name(spec)[0]).suffix == ".py"
     return callable(spec)
+
+
+def is_policy(spec: object) -> bool:
+    """Tell whether something is a word that names the network of a policy, by its suffix."""
+    return isinstance(spec, str) and Path(spec).suffix.lower() == _POLICY
+
+
+def is_controller(spec: object) -> bool:
+    """Tell whether something commands by the user's own: a function, or a policy."""
+    return is_function(spec) or is_policy(spec)
 
 
 def function_scenario(

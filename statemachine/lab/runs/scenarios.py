@@ -40,6 +40,10 @@ class Scenario:
         seeded: Whether the seed changes anything.
         is_user_function: Whether its controller is a function of the user's, which is the same on
             every robot, and may look at the state.
+        is_policy: Whether that function is a policy: it finds joints by their names, and starts
+            where the robot stands.
+        start: Gives qpos (nq,) [rad or m] where it starts on a Model that has no keyframe for it;
+            None for the Model's default state.
     """
 
     name: str
@@ -53,16 +57,20 @@ class Scenario:
     options: Mapping[str, OptionValue] = field(default_factory=dict)
     seeded: bool = False
     is_user_function: bool = False
+    is_policy: bool = False
+    start: Callable[[Model], Array] | None = None
 
     def on(self, model: Model) -> Scenario:
         """Return this scenario adapted to a Model: its start, and a description that is true of it.
 
         It starts where the scenario says; where it says nothing, a robot that is not the arm
-        starts at its keyframe "home" if it has one, else in its default state.
+        starts at its keyframe "home" if it has one, else in its default state; so does a policy.
 
         Raises:
             BadInputError: It makes no sense on the Model; with the names of those that do.
         """
+        if self.is_policy:
+            return self._at_home(model)
         if self.is_user_function or (
             is_so101(model) and (has_floor(model) or not self.description.count("floor"))
         ):
@@ -75,9 +83,19 @@ class Scenario:
             raise BadInputError(f"{error}{known}") from None
         if is_so101(model):
             return replace(self, description=self.general_description)
+        return self._at_home(model)
+
+    def _at_home(self, model: Model) -> Scenario:
+        """Return this scenario with its start on a Model, which its description tells."""
         key = self.keyframe or home_keyframe(model)
-        begins = "" if key is None else f" It starts in the keyframe {key!r}."
+        begins = "" if self.start is None else " Its joints start in the pose of its contract."
+        if key is not None:
+            begins = f" It starts in the keyframe {key!r}."
         return replace(self, description=self.general_description + begins, keyframe=key)
+
+    def qpos_at_start(self, model: Model) -> Array | None:
+        """Return qpos (nq,) [rad or m] where it starts; None for its keyframe or default state."""
+        return None if self.keyframe is not None or self.start is None else self.start(model)
 
 
 def suitable_scenarios(model: Model) -> tuple[str, ...]:

@@ -7,14 +7,16 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ...interface import Array
-from ..compare.outcomes import OUTCOMES, outcomes_of_run
+from ..compare.outcomes import OUTCOMES, WORK, outcomes_of_run
 from ..recordings import Trace
 
 # One run, as the quantities that runs are compared by: for each moment k numbers (n, k), in the
 # unit of the quantity.
 Curves = dict[str, Array]
 AXES = ("base x", "base y", "base z")  # the place of a floating base in world axes
-ASKED = (*AXES, *OUTCOMES)
+# What runs tell without forces, which those of a search for causes do not record.
+ASKED_OUTCOMES = tuple(name for name in OUTCOMES if name != WORK)
+ASKED = (*AXES, *ASKED_OUTCOMES)
 
 
 def kinds_asked(
@@ -32,7 +34,7 @@ def kinds_asked(
         return {}
     if words in AXES and floats:
         return {words: "base"}
-    if words in OUTCOMES and all(words in outcomes_of_run(run, until) for run in runs):
+    if words in ASKED_OUTCOMES and all(words in outcomes_of_run(run, until) for run in runs):
         return {words: OUTCOMES[words]}
     return {}
 
@@ -53,7 +55,7 @@ def curves_asked(
     for axis, name in enumerate(AXES):
         if name in names and base is not None:
             curves[name] = qpos[:, [base + axis]]
-    asked = [name for name in OUTCOMES if name in names]
+    asked = [name for name in ASKED_OUTCOMES if name in names]
     outcomes = outcomes_of_run(run, until) if asked else {}
     for name in asked:
         value = outcomes.get(name)

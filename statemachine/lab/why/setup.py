@@ -12,7 +12,15 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.alike import commands_alike, controller_for_right, translated
 from ..compare.matching import Matched
-from ..recordings import Rerun, SideStart, Trace, controller_of_trace, start_of, with_first_ctrl
+from ..recordings import (
+    Rerun,
+    SideStart,
+    Trace,
+    controller_of_trace,
+    start_of,
+    start_of_scenario,
+    with_first_ctrl,
+)
 from ..runs.scenarios import Controller
 from .causes import EXTRA_ACTUATOR, Cause, built, causes, differences_of
 from .imported import with_imported_figures
@@ -85,6 +93,8 @@ class Setup:
         self._recordings = self._recorded(request.recordings, right_start)
         if self._recordings:
             left_start, right_start = (_start_of_trace(trace) for trace in self._recordings)
+        elif (start := start_of_scenario(self.scenario, left)) is not None:
+            left_start, right_start = start, matched.start(start, right_start)
         elif self._keyframes[0] != self._keyframes[1]:
             right_start = matched.start(left_start, right_start)
         self._starts = left_start, right_start
@@ -120,7 +130,8 @@ class Setup:
             if settings:
                 rows += settings.differences(side)
         rows += by_option
-        if self.scenario.is_user_function and not self._recordings:
+        is_by_number = self.scenario.is_user_function and not self.scenario.is_policy
+        if is_by_number and not self._recordings:
             rows += orders_of(self.matched)
         all_causes = causes(rows, finer)
         self._causes = {cause.name: cause for cause in all_causes}
@@ -235,7 +246,8 @@ class Setup:
 
     def _is_in_ctrl(self, cause: Cause) -> bool:
         """Tell whether a cause moves the numbers of ctrl that a function of the user's writes."""
-        return self.scenario.is_user_function and _has_extra_actuator(cause)
+        is_by_number = self.scenario.is_user_function and not self.scenario.is_policy
+        return is_by_number and _has_extra_actuator(cause)
 
     def model(self, run: RunKey) -> Model:
         """Return the Model of a run.
@@ -319,6 +331,8 @@ class Setup:
         An actuator that only one side has is put back, or taken out, in its place of ctrl: the
         numbers of the others are then those of the left.
         """
+        if self.scenario.is_policy:  # it finds what it reads and commands by names
+            return self._from_start(self.scenario.controller(model, self.seed))
         matched = self.matched
         completed = any(_has_extra_actuator(self._causes[name]) for name in equalized)
         ordered = ORDER in equalized

@@ -22,7 +22,7 @@ from ...compare.sides import Request
 from ...compare.two_sides import SidesRun, run_sides
 from ...compare.witnessed import WitnessResult, witness
 from ...runs.call_period import CallPeriods
-from ...runs.controllers import is_function
+from ...runs.controllers import is_controller
 from ...runs.reporter import QUIET, Reporter
 from ...runs.scenarios import SCENARIOS
 from ...shown_result import Column, ShownResult, columns_of
@@ -54,9 +54,9 @@ class CompareRequest:
     def names_sides(self) -> bool:
         """Tell whether an answer says what its sides are.
 
-        It does where sides are named, or where a function of the user's commands them.
+        It does where sides are named, or where a function or a policy of the user's commands them.
         """
-        return bool(self.run.sides) or is_function(self.run.what[0])
+        return bool(self.run.sides) or is_controller(self.run.what[0])
 
 
 # Of `Agreement`, as columns of a table.

@@ -1,0 +1,71 @@
+"""What came of two runs of a policy, side by side: a policy is judged by it before any curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...measures.text import NO_NUMBER, quantity, short_time
+from ...show.blocks import Block, Table, TableCell
+from ...show.templates import PageContent, render_blocks
+from ..compare import Comparison
+from ..compare.outcomes import FELL, RunOutcome
+from .compared_names import short_labels
+
+_COLUMN = 20  # characters of what a side is called above a column
+
+
+@dataclass(frozen=True)
+class PolicyOutcomes(PageContent):
+    """What came of two runs of a policy.
+
+    Attributes:
+        policy: Its file.
+        until: The last moment that counts [s].
+        outcomes: A row for each.
+    """
+
+    template = "policy_outcomes.md.j2"
+    policy: str
+    until: float
+    outcomes: Table
+
+
+def policy_outcomes_blocks(comparison: Comparison) -> list[Block]:
+    """Return what came of two runs of a policy; nothing of runs of anything else."""
+    if not comparison.is_of_policy:
+        return []
+    policy = comparison.left.trace.header.experiment
+    return render_blocks(PolicyOutcomes(policy, comparison.until, outcomes_table(comparison)))
+
+
+def outcomes_table(comparison: Comparison) -> Table:
+    """Return a row for each outcome: of both sides, how far apart, and whether that matters."""
+    left, right = short_labels(comparison)
+    if max(len(left), len(right)) > _COLUMN:
+        left, right = "left", "right"
+    return Table.of(
+        comparison.outcomes,
+        {
+            "what came of it": lambda outcome: outcome.name,
+            left: lambda outcome: _value(outcome, outcome.left),
+            right: lambda outcome: _value(outcome, outcome.right),
+            "apart": _apart,
+            "verdict": lambda outcome: TableCell(outcome.verdict, verdict=outcome.verdict),
+        },
+        words={"verdict"},
+        emphasis=lambda outcome: outcome.verdict == "differs",
+    )
+
+
+def _apart(outcome: RunOutcome) -> str:
+    """Return how far apart an outcome is; a fall that no side has is at no time."""
+    if outcome.left is None and outcome.right is None:
+        return NO_NUMBER
+    return quantity(outcome.difference, outcome.unit)
+
+
+def _value(outcome: RunOutcome, value: float | None) -> str:
+    """Return an outcome of one side."""
+    if outcome.name == FELL:
+        return "no" if value is None else f"at {short_time(value)}"
+    return quantity(value, outcome.unit)
