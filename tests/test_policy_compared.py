@@ -32,7 +32,8 @@ from statemachine.lab.compare.outcomes import (
 from statemachine.lab.compare.sides import Request, Side
 from statemachine.lab.compare.typed_command import typed_command
 from statemachine.lab.policy.scenario import policy_scenario
-from statemachine.lab.questions.requests.gap import CompareResult
+from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult
+from statemachine.lab.questions.sides_outcomes import sides_outcomes
 from statemachine.lab.recordings import Trace, record_scenario
 from statemachine.lab.recordings.request import RecordRequest, answer_record
 from statemachine.lab.runs.walking import headings, lateral_way, mean_speeds
@@ -63,6 +64,11 @@ def _recorded(
     return answer_record(
         RecordRequest(POLICY, model, backend, seconds=seconds, contract=CONTRACT, command=command)
     )
+
+
+def _recorded_with(kp: float) -> Trace:
+    scenario = policy_scenario(POLICY, CONTRACT, AHEAD)
+    return record_scenario(scenario, sm.load(SCENE, kp=kp), seconds=1.0)
 
 
 # The same run by plain MuJoCo and onnxruntime, from what contract.yaml says.
@@ -262,6 +268,7 @@ def test_the_command_that_is_printed_asks_the_same() -> None:
     run = Request((POLICY,), sides=sides, contract=CONTRACT, command=(-0.2, 0.0, 0.1))
     words = typed_command(run).words[1:]
     asked = request_of(parser_of(["compare"]).parse_args(words))
+    assert isinstance(asked, CompareRequest)
     assert asked.run == run
 
 
@@ -357,6 +364,32 @@ def test_a_policy_has_an_open_loop_beside_the_closed_one(compared: CompareResult
     assert closed is not None
     assert opened is not None
     assert opened.right != closed.right
+
+
+def test_of_several_sides_each_has_its_outcomes(compared: CompareResult) -> None:
+    comparison = compared.comparison
+    (speeds,) = (
+        each.values for each in sides_outcomes({(0, 2): comparison}, 3) if each.name == FORWARD
+    )
+    forward = comparison.outcome_named(FORWARD)
+    assert forward is not None
+    assert speeds == (forward.left, None, forward.right)
+
+
+@pytest.mark.slow
+def test_a_speed_that_differs_has_causes() -> None:
+    result = lab.why(
+        SCENE,
+        f"{SCENE} kp=30",
+        what=POLICY,
+        contract=CONTRACT,
+        command=AHEAD,
+        seconds=1.0,
+        quantity=FORWARD,
+        chaos=False,
+    )
+    speeds = [outcomes_of_run(_recorded_with(kp), 1.0)[FORWARD] for kp in (60.0, 30.0)]
+    assert result.gap == pytest.approx(abs(speeds[0] - speeds[1]))
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ STEP_SHARE = 1e-9  # of g, of a size, of an inertia, of a radian
 GRAVITY = 9.81  # m/s², whatever that of the model is: a robot in orbit is as heavy to move
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
-RUN_FLOORS = {"rad": 1e-8, "m": 1e-9, "s": 1e-9}
+RUN_FLOORS = {"rad": 1e-8, "m": 1e-9, "s": 1e-9, "m/s": 1e-9}
 _UNKNOWN_SIZE = 1.0  # m; of one point that moves
 # J, N; of a robot whose weight is not known, as of a recorded run whose file is not here
 _ENERGY_FLOOR, _FORCE_FLOOR = 1e-9, 1e-6

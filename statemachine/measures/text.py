@@ -187,8 +187,9 @@ def few(words: Sequence[str], most: int = 3, between: str = ", ") -> str:
 
 
 def on_label(label: str) -> str:
-    """Return where something is seen: "on " an engine or a file, with an option."""
-    return f"{'with' if '=' in label else 'on'} {label}"
+    """Return where something is seen: "on " an engine or a file, "with " an option."""
+    is_option = "=" in label or label.endswith(" of the file")
+    return f"{'with' if is_option else 'on'} {label}"
 
 
 def capital(text: str) -> str:

@@ -26,6 +26,8 @@ def versions(
     seed: int = 0,
     every: Every = 1,
     keyframe: str | None = None,
+    contract: AnyPath | None = None,
+    command: Sequence[float] | None = None,
     tolerances: Mapping[str, float | str] | None = None,
     reporter: Reporter = QUIET,
 ) -> VersionsResult:
@@ -41,7 +43,8 @@ def versions(
         releases: Versions, "3.1.6,3.3.7" or one by one; the one that is installed is compared, too.
         bisect: Whether releases since `releases`, which is the oldest, are added until it is known
             which of them changed it.
-        what: The name of an experiment, a function f(model, data), or "FILE.py:FUNCTION".
+        what: The name of an experiment, a function f(model, data), "FILE.py:FUNCTION",
+            or "POLICY.onnx".
         menagerie: A menagerie folder to look the name up in; None for $MENAGERIE.
         seconds: Simulated time [s]; None for the experiment's own, or 2 of a function.
         timestep: Length of a step [s]; None for the file's own.
@@ -49,6 +52,8 @@ def versions(
         every: Steps for which what a function returned holds, or a time such as "5ms".
         keyframe: Where it starts; None for the experiment's own, and for the default state of a
             function.
+        contract: What a policy expects of the simulator: a YAML file.
+        command: Speeds that a policy is asked for, vx, vy [m/s], wz [rad/s]; None for straight on.
         tolerances: By kind of quantity, over the usual ones: SI, or words such as "0.5deg".
         reporter: Told how it gets on; by default no one, and notes are warnings.
 

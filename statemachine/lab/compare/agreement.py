@@ -125,7 +125,6 @@ class Comparison:
     touches: tuple[Touch, ...] = field(metadata={"json": False})
     curves: list[Series] = field(repr=False, metadata={"json": False})
 
-    @property
     def is_of_policy(self) -> bool:
         """Tell whether a policy commanded a robot that floats."""
         return bool(self.outcomes) and is_of_policy(self.left.trace)

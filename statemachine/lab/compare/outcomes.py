@@ -29,6 +29,7 @@ FELL, DISTANCE, TRACKING, SLIDE_TRACKING = (
     "tracking error of slides",
 )
 FORWARD, LATERAL, WORK = "forward speed", "lateral way", "work of the actuators"  # of a policy
+OF_POLICY = (FORWARD, LATERAL, WORK)
 # The kind of each, which says unit and tolerance.
 OUTCOMES: Mapping[str, str] = {
     FELL: "fall",

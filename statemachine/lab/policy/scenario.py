@@ -79,8 +79,8 @@ def policy_scenario(
     called = Path(file).name
     every = milliseconds(expected.timing.policy_dt)
     says = (
-        f"{called} is asked for ctrl every {every}, as {expected.file} says; the speeds asked for "
-        f"are {speeds.vx:g} m/s forward, {speeds.vy:g} m/s to the left, {speeds.wz:g} rad/s."
+        f"{called} is called every {every}, as {expected.file} says, and asked for {speeds.vx:g} "
+        f"m/s forward, {speeds.vy:g} m/s to the left and {speeds.wz:g} rad/s."
     )
     return Scenario(
         name=called,

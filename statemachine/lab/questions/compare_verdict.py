@@ -99,7 +99,7 @@ class DifferVerdict(_Verdict, PageContent):
     @property
     def falls(self) -> Falls:
         """Return which sides fell; "none" of a policy, whose verdict begins with that."""
-        return "none" if self.comparison.is_of_policy else self.finding.falls
+        return "none" if self.comparison.is_of_policy() else self.finding.falls
 
 
 @dataclass(frozen=True)
@@ -239,7 +239,7 @@ def headline_of(
         case "nothing moved":
             content = StillVerdict(finding, comparison, *sides, instead)
     blocks = render_blocks(content)
-    if comparison.is_of_policy:
+    if comparison.is_of_policy():
         blocks = [*render_blocks(PolicyVerdict(finding, comparison, *sides)), *blocks]
     texts = [plain_text(block.text) for block in blocks if isinstance(block, Text)]
     lead, *rest = texts

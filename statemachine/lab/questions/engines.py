@@ -18,6 +18,7 @@ from .compared_names import name_of
 from .finer_sides import FinerGap, FinerSides
 from .requests.engines import SEARCH_SECONDS, EnginesResult, EnginesState, sides_of
 from .several_sides import OddOne, SidesGap, Span
+from .sides_outcomes import sides_outcomes_table
 
 _NOBODY = "none"
 _SPANS: dict[Span, str] = {"run": "over the run", "end": "at the end"}
@@ -135,6 +136,11 @@ class EnginesPage(PageContent):
             f"{side.side} ended at {short_time(side.time)}: {side.reason}"
             for side in self.result.ended
         ]
+
+    @property
+    def outcomes(self) -> Table:
+        """Return what came of a policy on each side; no rows where anything else is run."""
+        return sides_outcomes_table(self.result.outcomes, self.labels)
 
     @property
     def groups(self) -> list[str]:

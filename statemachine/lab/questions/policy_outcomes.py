@@ -21,21 +21,24 @@ class PolicyOutcomes(PageContent):
     Attributes:
         policy: Its file.
         until: The last moment that counts [s].
+        description: What was asked of it, in sentences.
         outcomes: A row for each.
     """
 
     template = "policy_outcomes.md.j2"
     policy: str
     until: float
+    description: str
     outcomes: Table
 
 
 def policy_outcomes_blocks(comparison: Comparison) -> list[Block]:
     """Return what came of two runs of a policy; nothing of runs of anything else."""
-    if not comparison.is_of_policy:
+    if not comparison.is_of_policy():
         return []
-    policy = comparison.left.trace.header.experiment
-    return render_blocks(PolicyOutcomes(policy, comparison.until, outcomes_table(comparison)))
+    header, table = comparison.left.trace.header, outcomes_table(comparison)
+    content = PolicyOutcomes(header.experiment, comparison.until, header.description, table)
+    return render_blocks(content)
 
 
 def outcomes_table(comparison: Comparison) -> Table:
@@ -64,8 +67,19 @@ def _apart(outcome: RunOutcome) -> str:
     return quantity(outcome.difference, outcome.unit)
 
 
+def outcome_text(name: str, unit: str, value: float | None) -> str:
+    """Return an outcome of one side as it stands in a table.
+
+    Args:
+        name: As in `compare.outcomes.OUTCOMES`.
+        unit: SI.
+        value: [unit]; None where it did not fall, or has no such outcome.
+    """
+    if name == FELL:
+        return "no" if value is None else f"at {short_time(value)}"
+    return quantity(value, unit)
+
+
 def _value(outcome: RunOutcome, value: float | None) -> str:
     """Return an outcome of one side."""
-    if outcome.name == FELL:
-        return "no" if value is None else f"at {short_time(value)}"
-    return quantity(value, outcome.unit)
+    return outcome_text(outcome.name, outcome.unit, value)

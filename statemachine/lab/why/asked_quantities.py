@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ...interface import Array
-from ..compare.outcomes import OUTCOMES, WORK, outcomes_of_run
+from ..compare.outcomes import OF_POLICY, OUTCOMES, WORK, is_of_policy, outcomes_of_run
 from ..recordings import Trace
 
 # One run, as the quantities that runs are compared by: for each moment k numbers (n, k), in the
@@ -17,6 +17,12 @@ AXES = ("base x", "base y", "base z")  # the place of a floating base in world a
 # What runs tell without forces, which those of a search for causes do not record.
 ASKED_OUTCOMES = tuple(name for name in OUTCOMES if name != WORK)
 ASKED = (*AXES, *ASKED_OUTCOMES)
+
+
+def further_asked(run: Trace) -> tuple[str, ...]:
+    """Return what the runs of a robot that floats may be asked for."""
+    of_policy = is_of_policy(run)
+    return tuple(name for name in ASKED if of_policy or name not in OF_POLICY)
 
 
 def kinds_asked(

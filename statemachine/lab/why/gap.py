@@ -28,7 +28,7 @@ from ..compare.outcomes import OUTCOMES
 from ..compare.series import BASE, SCALARS
 from ..recordings import Trace
 from ..runs.floating import free_joint_of_robot
-from .asked_quantities import ASKED, Curves, curves_asked, kinds_asked
+from .asked_quantities import ASKED, Curves, curves_asked, further_asked, kinds_asked
 
 BALLS = "ball joints"
 Measure = Literal["worst", "end", "rms"]
@@ -142,6 +142,7 @@ class Ruler:
                 self._single[name] = int(model.jnt_qposadr[a]), int(matched.right.jnt_qposadr[b])
         self._kinds |= self._kinds_of_bodies()
         until = float(self.time[-1])
+        self._further = further_asked(left)
         self._kinds |= kinds_asked(quantity, (left, right), until, floats=bases[0] is not None)
         self.units = {name: QUANTITIES[kind].unit for name, kind in self._kinds.items()}
         if not self.units:
@@ -178,7 +179,7 @@ class Ruler:
     @property
     def further_quantities(self) -> tuple[str, ...]:
         """Return what is measured only where it is asked for, of a robot that floats."""
-        return () if self._places[0].base is None else ASKED
+        return () if self._places[0].base is None else self._further
 
     def quantity_of(self, words: str) -> str:
         """Return the quantity that a table calls so: "torso rotation", "torso position"."""

@@ -299,6 +299,7 @@ class Setup:
             keyframe=self._keyframes[run.side],
             qpos=qpos,
             qvel=qvel,
+            experiment=self.scenario.name,
         )
 
     def _controller(self, side: int, model: Model, equalized: frozenset[str]) -> Controller:

@@ -33,6 +33,7 @@ from ..several_sides import (
     side_groups,
     sides_gap,
 )
+from ..sides_outcomes import SidesOutcome, sides_outcomes
 from . import causes, gap
 from .causes import ExplainRequest
 from .converge import ConvergeRequest
@@ -127,6 +128,7 @@ class EnginesResult(ShownResult):
         origin: What the gap between the odd side and the nearest other one comes from; None where
             no side is odd, or where that could not be looked for.
         missing: A line for each engine of "all" that is not installed.
+        outcomes: What came of a policy on each side; empty where anything else is run.
     """
 
     page_function: ClassVar[str] = "questions.engines:page"
@@ -143,6 +145,7 @@ class EnginesResult(ShownResult):
     finer: FinerSides | None = None
     origin: GapOrigin | None = None
     missing: tuple[str, ...] = ()
+    outcomes: tuple[SidesOutcome, ...] = ()
 
     @property
     def span(self) -> Span:
@@ -196,6 +199,9 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
         until=max(each.comparison.until for each in compared.values()),
         ended=tuple(ended.values()),
         missing=tuple(str(error) for error in missing),
+        outcomes=sides_outcomes(
+            {pair: each.comparison for pair, each in compared.items()}, len(labels)
+        ),
     )
     if len(complete) < LEAST_SIDES:
         return result
