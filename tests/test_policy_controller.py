@@ -179,6 +179,20 @@ def test_a_run_is_repeated_bit_by_bit(tmp_path: Path, backend: str, kind: str) -
     assert one.walk == other.walk
 
 
+def test_a_run_begins_without_memory_of_the_one_before(tmp_path: Path, model: Model) -> None:
+    network = saved(
+        tmp_path / "policy.onnx",
+        [node("Identity", "before", "actions"), node("Add", "before one", "after")],
+        [tensor("obs", [1, SIZE]), tensor("before", [1, 2])],
+        [tensor("actions", [1, 2]), tensor("after", [1, 2])],
+        {"one": np.ones((1, 2))},
+    )
+    policy = on_model(tmp_path, model, network)
+    runs = [run(policy, 20).controller.calls for _ in range(2)]
+    told = [[call.action[0] for call in calls] for calls in runs]
+    assert told == [[0.0, 1.0], [0.0, 1.0]]
+
+
 def test_joints_start_in_the_default_pose_where_the_model_has_no_keyframe(
     tmp_path: Path, model: Model
 ) -> None:

@@ -38,6 +38,9 @@ class Evolution:
         self.length = np.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n))
         self.path, self.step_path = np.zeros(n), np.zeros(n)
         self.covariance, self.sigma, self.generation = np.eye(n), 1.0, 0
+        # Of the covariance, and the steps of the generation that was asked for.
+        self.basis, self.spread = np.eye(n), np.ones(n)
+        self.steps = np.zeros((size, n))
 
     @property
     def mean(self) -> Floats:

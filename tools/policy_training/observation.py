@@ -45,7 +45,7 @@ FAULTS = (
     Fault("action × 4", action=4.0),
     Fault("delay of 1 step", delay=1),
     Fault("delay of 2 steps", delay=2),
-    Fault("decimation halved", decimation=0.4),
+    Fault("decimation halved", decimation=0.4),  # 2 steps for 5
     Fault("decimation doubled", decimation=2.0),
 )
 

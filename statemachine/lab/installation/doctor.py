@@ -98,6 +98,8 @@ _PACKAGES = (
     ("scipy", "sweeps", ("sweep",)),
     ("distributed", "sweeps through Dask", ("cluster",)),
     ("gymnasium", "reinforcement learning", ("gym",)),
+    ("onnxruntime", "walking policies", ("policy",)),
+    ("pyyaml", "contracts of policies", ("policy",)),
     ("mujoco-menagerie", "public robots", ("menagerie",)),
     ("robot_descriptions", "public robots", ("robots",)),
     ("pytest", "check --faults", ("faults",)),

@@ -50,7 +50,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Term:
+class ObservedTerm:
     """One term of an observation.
 
     Attributes:
@@ -147,7 +147,7 @@ class Servos:
 
 
 @dataclass(frozen=True)
-class Timing:
+class CallTiming:
     """How often the policy is called.
 
     Attributes:
@@ -190,13 +190,13 @@ class Contract:
     schema: str
     joints: tuple[str, ...]
     default_joint_pos: Array
-    terms: tuple[Term, ...]
+    terms: tuple[ObservedTerm, ...]
     history: History
     quat_order: QuatOrder
     clips_before_scale: bool
     action: Action
     servos: Servos
-    timing: Timing
+    timing: CallTiming
     command_limits: dict[str, tuple[float, float]]
     unread: tuple[str, ...] = ()
 

@@ -12,7 +12,7 @@ from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array
 
 
-class Section:
+class ContractSection:
     """A section of a contract's file, which remembers what was read of it.
 
     Attributes:
@@ -25,7 +25,7 @@ class Section:
         self._content = cast("Mapping[object, object]", content)
         self._file = file
         self._read: set[str] = set()
-        self._sections: list[Section] = []
+        self._sections: list[ContractSection] = []
         self.path = path
 
     def name_of(self, key: str) -> str:
@@ -56,14 +56,14 @@ class Section:
         """Return the names of all fields, in their order."""
         return [str(key) for key in self._content]
 
-    def section(self, key: str) -> Section:
+    def section(self, key: str) -> ContractSection:
         """Return a section of this one; an empty one where it is missing."""
         content = self.value(key)
-        section = Section({} if content is None else content, self.name_of(key), self._file)
+        section = ContractSection({} if content is None else content, self.name_of(key), self._file)
         self._sections.append(section)
         return section
 
-    def sections(self, key: str) -> list[Section]:
+    def sections(self, key: str) -> list[ContractSection]:
         """Return a list of sections.
 
         Raises:
@@ -72,9 +72,9 @@ class Section:
         entries = self.value(key)
         if not _is_list(entries) or not len(entries):
             raise self.error(key, "a list of tables is expected")
-        sections: list[Section] = []
+        sections: list[ContractSection] = []
         for number, entry in enumerate(entries):
-            sections.append(Section(entry, f"{self.name_of(key)}[{number}]", self._file))
+            sections.append(ContractSection(entry, f"{self.name_of(key)}[{number}]", self._file))
         self._sections += sections
         return sections
 

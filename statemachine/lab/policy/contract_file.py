@@ -18,20 +18,20 @@ from .contract import (
     SCHEMA,
     Action,
     ActuatorKind,
+    CallTiming,
     Clock,
     Contract,
     Frame,
     History,
     Init,
     Layout,
+    ObservedTerm,
     Order,
     QuatOrder,
     Servos,
-    Term,
     TermId,
-    Timing,
 )
-from .contract_fields import Section
+from .contract_fields import ContractSection
 from .unitree_deploy import contract_of_deploy
 
 EXTRA: Final = "policy"
@@ -68,7 +68,7 @@ def read_contract(file: AnyPath) -> Contract:
             f"{path.name} is no contract: schema is {schema!r}, and {SCHEMA!r} is expected (or a "
             "deploy.yaml of Unitree's, which has joint_ids_map)"
         )
-    return _contract_of(Section(content, "", path.name), path.name)
+    return _contract_of(ContractSection(content, "", path.name), path.name)
 
 
 def _yaml_of(path: Path) -> Mapping[str, object]:
@@ -106,7 +106,7 @@ def _has_too_many_entries(content: object) -> bool:
     return bool(pending)
 
 
-def _contract_of(root: Section, file: str) -> Contract:
+def _contract_of(root: ContractSection, file: str) -> Contract:
     """Return the contract of a file in gaitkeeper's format."""
     for key in _SOURCES:
         root.value(key)
@@ -151,7 +151,7 @@ class _Imu:
     quat_order: QuatOrder
 
 
-def _imu(imu: Section) -> _Imu:
+def _imu(imu: ContractSection) -> _Imu:
     """Return how the harness reads the sensors of the base."""
     imu.value("body")
     rotation = imu.numbers("rotation_in_root", 4) if imu.has("rotation_in_root") else None
@@ -166,9 +166,11 @@ def _imu(imu: Section) -> _Imu:
     )
 
 
-def _terms(group: Section, joints: Sequence[str], default: Array, imu: _Imu) -> tuple[Term, ...]:
+def _terms(
+    group: ContractSection, joints: Sequence[str], default: Array, imu: _Imu
+) -> tuple[ObservedTerm, ...]:
     """Return the terms of an observation."""
-    terms: list[Term] = []
+    terms: list[ObservedTerm] = []
     for section in group.sections("terms"):
         term = _term(section, joints, default, imu)
         if any(known.name == term.name for known in terms):
@@ -177,7 +179,9 @@ def _terms(group: Section, joints: Sequence[str], default: Array, imu: _Imu) -> 
     return tuple(terms)
 
 
-def _term(section: Section, joints: Sequence[str], default: Array, imu: _Imu) -> Term:
+def _term(
+    section: ContractSection, joints: Sequence[str], default: Array, imu: _Imu
+) -> ObservedTerm:
     """Return one term of an observation."""
     term_id = cast("TermId", section.text("id", _TERMS))
     parameters = section.section("params")
@@ -205,7 +209,7 @@ def _term(section: Section, joints: Sequence[str], default: Array, imu: _Imu) ->
     values: tuple[float, ...] = ()
     if term_id == "constant":
         values = tuple(parameters.numbers("value", dim).tolist())
-    return Term(
+    return ObservedTerm(
         id=term_id,
         name=section.text("source_name", (), term_id),
         scale=section.numbers("scale", dim, 1.0),
@@ -219,7 +223,7 @@ def _term(section: Section, joints: Sequence[str], default: Array, imu: _Imu) ->
     )
 
 
-def _told_joints(parameters: Section, joints: Sequence[str]) -> tuple[str, ...]:
+def _told_joints(parameters: ContractSection, joints: Sequence[str]) -> tuple[str, ...]:
     """Return whose angles or speeds a term tells; empty for those of the policy, in its order."""
     if not parameters.has("joints"):
         return ()
@@ -229,7 +233,7 @@ def _told_joints(parameters: Section, joints: Sequence[str]) -> tuple[str, ...]:
     return () if told == tuple(joints) else told
 
 
-def _dim(term_id: TermId, parameters: Section, n: int) -> int:
+def _dim(term_id: TermId, parameters: ContractSection, n: int) -> int:
     """Return how many numbers a term has."""
     if term_id in _OF_THREE:
         return 3
@@ -243,7 +247,7 @@ def _dim(term_id: TermId, parameters: Section, n: int) -> int:
     return n
 
 
-def _clock(parameters: Section) -> Clock:
+def _clock(parameters: ContractSection) -> Clock:
     """Return the clock of a term that tells a phase."""
     parameters.value("clock")
     parameters.value("arithmetic")  # of which precision the phase is
@@ -261,7 +265,7 @@ def _clock(parameters: Section) -> Clock:
     )
 
 
-def _history(section: Section) -> History:
+def _history(section: ContractSection) -> History:
     """Return how earlier observations are handed over."""
     for key in ("chunks", "first_frame"):
         if section.has(key):
@@ -274,7 +278,7 @@ def _history(section: Section) -> History:
     )
 
 
-def _action(section: Section, joints: Sequence[str], default: Array) -> Action:
+def _action(section: ContractSection, joints: Sequence[str], default: Array) -> Action:
     """Return how actions become targets."""
     section.value("kind")
     section.value("joints")
@@ -295,7 +299,7 @@ def _action(section: Section, joints: Sequence[str], default: Array) -> Action:
     )
 
 
-def _servos(actuators: Section, model: Section, joints: Sequence[str]) -> Servos:
+def _servos(actuators: ContractSection, model: ContractSection, joints: Sequence[str]) -> Servos:
     """Return what drives the joints."""
     for key in ("pd_period", "integrator", "torque_limit_at"):
         actuators.value(key)
@@ -321,7 +325,7 @@ def _servos(actuators: Section, model: Section, joints: Sequence[str]) -> Servos
     return servos
 
 
-def _timing(section: Section) -> Timing:
+def _timing(section: ContractSection) -> CallTiming:
     """Return how often the policy is called."""
     for key in ("order", "target_hold"):
         section.value(key)
@@ -336,10 +340,10 @@ def _timing(section: Section) -> Timing:
         if decimation is not None and decimation != round(steps):
             raise section.error("decimation", f"policy_dt / sim_dt = {round(steps)} is expected")
         decimation = round(steps)
-    return Timing(policy_dt, decimation)
+    return CallTiming(policy_dt, decimation)
 
 
-def _command_limits(section: Section) -> dict[str, tuple[float, float]]:
+def _command_limits(section: ContractSection) -> dict[str, tuple[float, float]]:
     """Return the speeds that the policy may be asked for, by axis."""
     for key in ("name", "trained", "heading"):
         section.value(key)

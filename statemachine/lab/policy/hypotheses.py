@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ...interface import Array
-from .contract import Contract, Servos, Term, TermId, Timing
+from .contract import CallTiming, Contract, ObservedTerm, Servos, TermId
 
 HypothesisKind = Literal[
     "quaternion order",
@@ -79,7 +79,7 @@ def hypotheses_of(contract: Contract) -> tuple[Hypothesis, ...]:
     )
 
 
-def with_term(contract: Contract, term: Term, changed: Term) -> Contract:
+def with_term(contract: Contract, term: ObservedTerm, changed: ObservedTerm) -> Contract:
     """Return a contract with another term in place of one."""
     terms = tuple(changed if known is term else known for known in contract.terms)
     return replace(contract, terms=terms)
@@ -126,7 +126,7 @@ def _swapped_legs(contract: Contract) -> Iterator[Hypothesis]:
         yield Hypothesis("swapped legs", "", "", name, changed)
 
 
-def _read_from(contract: Contract, term: Term, order: Sequence[str]) -> Term:
+def _read_from(contract: Contract, term: ObservedTerm, order: Sequence[str]) -> ObservedTerm:
     """Return a term whose joints are exchanged as an order exchanges those of the policy.
 
     An exchange of a term that is exchanged already gives the order of the policy again. Where
@@ -258,7 +258,7 @@ def _policy_rates(contract: Contract) -> Iterator[Hypothesis]:
         faster.append((1, 2))
     for more, less in faster:
         steps = None if decimation is None else decimation * more // less
-        changed_timing = Timing(timing.policy_dt * more / less, steps)
+        changed_timing = CallTiming(timing.policy_dt * more / less, steps)
         changed = replace(contract, timing=changed_timing)
         before, after = 1.0 / timing.policy_dt, 1.0 / changed_timing.policy_dt
         yield Hypothesis("policy rate", "", f"{before:g} Hz", f"{after:g} Hz", changed)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Array, Ints
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
-from .contract import Clock, Contract, History, Term
+from .contract import Clock, Contract, History, ObservedTerm
 
 _DOWN = np.array((0.0, 0.0, -1.0))
 
@@ -90,7 +90,7 @@ class Observer:
             values[term.name] = self._scaled(term, value)
         return values
 
-    def _scaled(self, term: Term, value: Array) -> Array:
+    def _scaled(self, term: ObservedTerm, value: Array) -> Array:
         """Return a term after its clip and its scale."""
         if term.clip is None:
             return value * term.scale
@@ -99,7 +99,7 @@ class Observer:
             return np.clip(value, low, high) * term.scale
         return np.clip(value * term.scale, low, high)
 
-    def _value(self, term: Term, state: RobotState) -> Array:
+    def _value(self, term: ObservedTerm, state: RobotState) -> Array:
         """Return a term before its clip and its scale."""
         if term.id == "projected_gravity":
             return self._rotation(state).T @ _DOWN
@@ -117,7 +117,7 @@ class Observer:
             return self._phase(term, term.clock, state)
         return self._velocity(term, state)
 
-    def _velocity(self, term: Term, state: RobotState) -> Array:
+    def _velocity(self, term: ObservedTerm, state: RobotState) -> Array:
         """Return a linear or an angular velocity at a sensor, in the axes of the term."""
         mount = self.mounts.get(term.site, AT_BASE)
         world_of_base = self._rotation(state)
@@ -134,7 +134,7 @@ class Observer:
             quat = wxyz_from_xyzw(quat)
         return matrix_from_quat(quat)
 
-    def _phase(self, term: Term, clock: Clock, state: RobotState) -> Array:
+    def _phase(self, term: ObservedTerm, clock: Clock, state: RobotState) -> Array:
         """Return sine and cosine of a phase; of two legs both sines come first."""
         stands = clock.stand_threshold or 0.0
         if float(np.linalg.norm(state.command)) < stands:

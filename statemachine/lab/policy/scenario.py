@@ -22,7 +22,7 @@ from ..runs.scenarios import Scenario
 from .binding import bind
 from .checks import check_network
 from .command import Command, speeds_of, typed_speeds, usual_commands
-from .contract import Contract, Term
+from .contract import Contract, ObservedTerm
 from .contract_file import read_contract
 from .controller import PolicyController
 from .network import Network
@@ -142,7 +142,7 @@ def _by_names_of(contract: Contract, model: Model, names: Mapping[str, str]) -> 
         names: By names of the contract, those that stand for them where a model lacks these.
     """
     joints = _present(contract.joints, model.joint_names, names)
-    terms: list[Term] = []
+    terms: list[ObservedTerm] = []
     for term in contract.terms:
         (site,) = _present((term.site,), model.site_names, names)
         term_joints = _present(term.joints, model.joint_names, names)

@@ -56,7 +56,7 @@ class ContractsResult:
         network: What the file of the policy says.
         commands: The speeds that were asked for.
         differences: What the two say otherwise.
-        kinds: The named changes that make the second of the first; empty where none alone does.
+        kinds: The named changes that make one of the other; empty where none alone does.
         engines: One for each engine.
     """
 
@@ -142,9 +142,10 @@ def _largest_gaps(
 
 
 def _kinds(first: Contract, second: Contract) -> tuple[HypothesisKind, ...]:
-    """Return the named changes that make the second contract of the first."""
-    kinds: list[HypothesisKind] = []
-    for hypothesis in hypotheses_of(first):
-        if not field_differences(hypothesis.contract, second) and hypothesis.kind not in kinds:
-            kinds.append(hypothesis.kind)
+    """Return the named changes that make one of the contracts of the other."""
+    kinds: dict[HypothesisKind, None] = {}
+    for one, other in ((first, second), (second, first)):
+        for hypothesis in hypotheses_of(one):
+            if not field_differences(hypothesis.contract, other):
+                kinds[hypothesis.kind] = None
     return tuple(kinds)

@@ -15,8 +15,18 @@ from typing import Final
 
 from ...errors import did_you_mean
 from ...interface import Array
-from .contract import SCHEMA, Action, Clock, Contract, History, Servos, Term, TermId, Timing
-from .contract_fields import Section
+from .contract import (
+    SCHEMA,
+    Action,
+    CallTiming,
+    Clock,
+    Contract,
+    History,
+    ObservedTerm,
+    Servos,
+    TermId,
+)
+from .contract_fields import ContractSection
 
 DEPLOY_SCHEMA: Final = "unitree deploy.yaml"
 
@@ -106,7 +116,7 @@ def contract_of_deploy(content: Mapping[str, object], file: str) -> Contract:
         BadInputError: A field is missing or out of range, an observation is not known, or no
             robot is known that has as many motors.
     """
-    root = Section(content, "", file)
+    root = ContractSection(content, "", file)
     motors = root.size("stiffness")
     ids = root.ids("joint_ids_map")
     joints = _joints(root, motors, ids)
@@ -126,13 +136,13 @@ def contract_of_deploy(content: Mapping[str, object], file: str) -> Contract:
         clips_before_scale=not scales_first,
         action=_action(root.section("actions"), len(joints)),
         servos=Servos(kp=_of_motors(root, "stiffness", ids), kd=_of_motors(root, "damping", ids)),
-        timing=Timing(root.positive("step_dt")),
+        timing=CallTiming(root.positive("step_dt")),
         command_limits=_limits(root.section("commands").section("base_velocity")),
     )
     return replace(contract, unread=tuple(root.unread()))
 
 
-def _joints(root: Section, motors: int, ids: list[int]) -> tuple[str, ...]:
+def _joints(root: ContractSection, motors: int, ids: list[int]) -> tuple[str, ...]:
     """Return the names of the joints in the order of the policy."""
     for order in ORDERS:
         if len(order.joints) != motors:
@@ -149,7 +159,7 @@ def _joints(root: Section, motors: int, ids: list[int]) -> tuple[str, ...]:
     )
 
 
-def _of_motors(root: Section, key: str, ids: list[int]) -> Array:
+def _of_motors(root: ContractSection, key: str, ids: list[int]) -> Array:
     """Return the numbers (n,) of the joints of the policy from those of all motors."""
     numbers = root.numbers(key, root.size("stiffness"))
     if (numbers < 0.0).any():
@@ -157,9 +167,9 @@ def _of_motors(root: Section, key: str, ids: list[int]) -> Array:
     return numbers[ids]
 
 
-def _terms(observations: Section, default: Array) -> tuple[tuple[Term, ...], int]:
+def _terms(observations: ContractSection, default: Array) -> tuple[tuple[ObservedTerm, ...], int]:
     """Return the terms of an observation, and how many moments are handed over."""
-    terms: list[Term] = []
+    terms: list[ObservedTerm] = []
     lengths: dict[str, int] = {}
     for name in observations.fields():
         if name in ("use_gym_history", "scale_first"):
@@ -183,7 +193,7 @@ def _terms(observations: Section, default: Array) -> tuple[tuple[Term, ...], int
     return tuple(terms), lengths[terms[0].name]
 
 
-def _term(section: Section, name: str, default: Array) -> Term:
+def _term(section: ContractSection, name: str, default: Array) -> ObservedTerm:
     """Return one term of an observation."""
     term_id = _TERMS[name]
     parameters = section.section("params")
@@ -202,7 +212,7 @@ def _term(section: Section, name: str, default: Array) -> Term:
             offset_steps=_STEPS_AHEAD,
             stand_threshold=_STANDS_BELOW,
         )
-    return Term(
+    return ObservedTerm(
         id=term_id,
         name=name,
         scale=section.numbers("scale", dim, 1.0),
@@ -212,7 +222,7 @@ def _term(section: Section, name: str, default: Array) -> Term:
     )
 
 
-def _action(actions: Section, n: int) -> Action:
+def _action(actions: ContractSection, n: int) -> Action:
     """Return how actions become targets."""
     for key in actions.fields():
         if key != "JointPositionAction":
@@ -231,7 +241,7 @@ def _action(actions: Section, n: int) -> Action:
     )
 
 
-def _limits(velocity: Section) -> dict[str, tuple[float, float]]:
+def _limits(velocity: ContractSection) -> dict[str, tuple[float, float]]:
     """Return the speeds that the policy may be asked for, by axis."""
     ranges = velocity.section("ranges")
     ranges.value("heading")

@@ -1,0 +1,86 @@
+"""What docs/policies.md says of the quadruped and of its faults is what runs give."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from statemachine import load
+from statemachine.lab.policy.contract_file import read_contract
+from statemachine.lab.policy.network import Network
+from statemachine.lab.policy.on_model import PolicyOnModel
+from statemachine.lab.policy.walk import Command, Walk, all_walked
+from statemachine.models import models_dir
+
+from .support.policies import contract_file
+from .support.requirements import ROOT, need_engine
+
+yaml = pytest.importorskip("yaml")
+pytest.importorskip("onnxruntime")
+FOLDER = models_dir() / "quadruped"
+PAGE = (ROOT / "docs" / "policies.md").read_text("utf-8")
+ROWS = {
+    cells[0]: cells[1:]
+    for line in re.findall(r"^\| (?!contract)(.*) \|$", PAGE, re.MULTILINE)
+    for cells in [line.split(" | ")]
+}
+# What each row changes, by the path of a field; a number counts in a list.
+FAULTS: dict[str, tuple[str, Any]] = {
+    "sound": ("source.robot", "quadruped"),
+    "gyroscope in world axes": ("policy_io.imu.frame", "world"),
+    "velocity in world axes": ("TERMS.base_lin_vel.params", {"frame": "world"}),
+    "quaternion with w last": ("policy_io.imu.quat_order", "xyzw"),
+    "clock half as fast": ("TERMS.gait_phase.params", {"period": 0.8}),
+    "joint speeds unscaled": ("TERMS.joint_vel_rel.scale", 1.0),
+    "angles from zero": ("TERMS.joint_pos_rel.params", {"default": 0.0}),
+    "one call late": ("control.actions.joint_pos.delay_steps", 1),
+}
+
+
+def walks(folder: Path, fault: str) -> list[Walk]:
+    """Return the runs of a contract with one fault, straight on and turning."""
+    fields = yaml.safe_load((FOLDER / "contract.yaml").read_text("utf-8"))
+    path, value = FAULTS[fault]
+    *sections, last = path.split(".")
+    section = fields
+    for key in sections:
+        if key == "TERMS":
+            terms = fields["policy_io"]["observation_groups"]["policy"]["terms"]
+            section = {term["id"]: term for term in terms}
+        else:
+            section = section[key]
+    section[last] = value
+    contract = read_contract(contract_file(folder, fields))
+    network = Network(FOLDER / "policy.onnx")
+    policy = PolicyOnModel.of(contract, network, load("quadruped/scene"))
+    commands = (Command(0.3), Command(0.3, 0.0, 0.5))
+    return [recorded.walk for recorded in all_walked(policy, commands, 10.0)]
+
+
+def test_the_page_has_a_row_for_each_fault() -> None:
+    assert list(ROWS) == list(FAULTS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ROWS)
+def test_a_row_has_the_speeds_of_the_runs(tmp_path: Path, fault: str) -> None:
+    need_engine("mujoco")
+    straight, turning = walks(tmp_path, fault)
+    assert straight.reached is None or abs(straight.reached[2]) < 0.05
+    found: list[float | str] = []
+    for walk, axis in ((straight, 0), (turning, 0), (turning, 2)):
+        found.append("falls" if walk.reached is None else walk.reached[axis])
+    for shown, speed in zip(ROWS[fault], found, strict=True):
+        if isinstance(speed, str):
+            assert shown == speed
+        else:
+            assert float(shown) == pytest.approx(speed, abs=0.03)
+
+
+def test_the_page_names_what_a_fault_may_be() -> None:
+    """Each entry of the list once, in its order."""
+    numbers = [int(number) for number in re.findall(r"^(\d+)\. \*\*", PAGE, re.MULTILINE)]
+    assert numbers == list(range(1, 14))
