@@ -388,8 +388,10 @@ def test_a_speed_that_differs_has_causes() -> None:
         quantity=FORWARD,
         chaos=False,
     )
-    speeds = [outcomes_of_run(_recorded_with(kp), 1.0)[FORWARD] for kp in (60.0, 30.0)]
-    assert result.gap == pytest.approx(abs(speeds[0] - speeds[1]))
+    left, right = (outcomes_of_run(_recorded_with(kp), 1.0)[FORWARD] for kp in (60.0, 30.0))
+    assert left is not None
+    assert right is not None
+    assert result.gap == pytest.approx(abs(left - right))
 
 
 @pytest.mark.slow
