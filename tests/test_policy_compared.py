@@ -32,12 +32,15 @@ from statemachine.lab.compare.outcomes import (
 from statemachine.lab.compare.sides import Request, Side
 from statemachine.lab.compare.typed_command import typed_command
 from statemachine.lab.policy.scenario import policy_scenario
+from statemachine.lab.questions.compare_verdict import headline_of
+from statemachine.lab.questions.policy_outcomes import outcomes_table
 from statemachine.lab.questions.requests.gap import CompareRequest, CompareResult
 from statemachine.lab.questions.sides_outcomes import sides_outcomes
 from statemachine.lab.recordings import Trace, record_scenario
 from statemachine.lab.recordings.request import RecordRequest, answer_record
 from statemachine.lab.runs.walking import headings, lateral_way, mean_speeds
 from statemachine.measures import parse_tolerances
+from statemachine.measures.text import quantity
 from statemachine.models import models_dir
 
 from .support.requirements import SHARED, need_engine, shared
@@ -354,6 +357,22 @@ def test_an_outcome_has_the_value_of_each_side(compared: CompareResult) -> None:
     left, right = (outcomes_of_run(trace, 1.0)[FORWARD] for trace in compared.run.traces)
     assert (forward.left, forward.right) == (left, right)
     assert forward.left != forward.right
+
+
+def test_the_table_of_outcomes_has_a_row_for_each(compared: CompareResult) -> None:
+    table = outcomes_table(compared.comparison)
+    assert [row[0] for row in table.rows] == [
+        outcome.name for outcome in compared.comparison.outcomes
+    ]
+
+
+def test_the_verdict_begins_with_what_came_of_the_policy(compared: CompareResult) -> None:
+    comparison = compared.comparison
+    forward = comparison.outcome_named(FORWARD)
+    assert forward is not None
+    headline = headline_of(compared.finding, comparison, None)
+    for speed in (forward.left, forward.right):
+        assert quantity(speed, "m/s") in headline.lead
 
 
 def test_a_policy_has_an_open_loop_beside_the_closed_one(compared: CompareResult) -> None:
