@@ -9,6 +9,7 @@ import pytest
 
 from statemachine.backends import parse_backend
 from statemachine.lab.validate.battery import CaseResult, ValidateRequest, answer, run_case
+from statemachine.lab.validate.case import Expectation
 from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.variants import Variant, variants_of
 from tools.validate_table import (
@@ -33,6 +34,11 @@ def row_of(case: str, backend: str, integrator: str) -> TableRow:
     return rows[0]
 
 
+def is_rounded(record: Expectation | None) -> bool:
+    """Whether rounding is all that is seen, whose digits and size are of the processor."""
+    return record is not None and record.rounded is not None
+
+
 def is_rough(result: CaseResult) -> bool:
     """Whether another make of processor may give other digits."""
     return result.group == "contact" or result.case.is_chaotic
@@ -43,6 +49,8 @@ def faults_of(result: CaseResult) -> list[str]:
     row = row_of(result.name, result.backend, result.integrator)
     faults: list[str] = []
     verdicts = {row.verdict, result.verdict}
+    if is_rounded(result.expectation):
+        return [] if verdicts <= {"exact", "bounded"} else [f"verdict {result.verdict}"]
     is_near = is_rough(result) and verdicts <= {
         "bounded",
         "converges",
@@ -73,7 +81,8 @@ def test_each_engine_and_integrator_has_one_row_of_a_case_with_its_cause(name: s
             expectation = CASES[name].expectation(word, variant.integrator)
             cause = "none" if expectation is None else expectation.cause
             assert row.cause == ("–" if cause == "none" else cause)
-            assert expectation is None or row.verdict == expectation.verdict
+            if expectation is not None and not is_rounded(expectation):
+                assert row.verdict == expectation.verdict
 
 
 def test_the_table_has_no_row_of_another_case() -> None:

@@ -48,6 +48,10 @@ SLACK = 1.25  # what another make of processor or another compiler may add to an
 # What a step may change a number by, relative to its size, that is stored in single precision: one
 # unit in the last place. A rounding is half of that; speed and place are both rounded.
 SINGLE = 2.0**-23
+_ROUNDING = (
+    "A step rounds numbers by at most 1.2e-7 of the largest, in single precision; the error is "
+    "within what that makes of all steps."
+)
 EVERY = "*"  # every engine or integrator that no other key names
 
 
@@ -112,7 +116,7 @@ def rounded(size: float = 1.0) -> Expectation:
     Args:
         size: Of the largest number that is rounded [unit of the error].
     """
-    return Expectation("bounded", math.inf, None, "single precision", rounded=size)
+    return Expectation("bounded", math.inf, None, "single precision", _ROUNDING, size)
 
 
 def wrong(within: float, cause: Cause, order: float | None = None, note: str = "") -> Expectation:
