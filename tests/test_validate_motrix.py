@@ -147,12 +147,10 @@ class RoundedRun(Run):
                 state[:] = state.astype(np.float32)
 
 
-def rounded_error(
-    name: str, timestep: float, integrator: Integrator = "Euler"
-) -> tuple[float, int]:
+def rounded_error(name: str, timestep: float) -> tuple[float, int]:
     """Return the error of MuJoCo with a rounded state, and the number of steps."""
-    case, variant = CASES[name], Variant(parse_backend("mujoco"), integrator)
-    text = case.model_text(timestep, integrator)
+    case, variant = CASES[name], Variant(parse_backend("mujoco"), "Euler")
+    text = case.model_text(timestep, "Euler")
     with variant.loaded(text, timestep) as model, make_data(model) as data:
         run = RoundedRun(model, data)
         return case.error_of(case.measure(run), case.truth_of(run.time)), run.steps
