@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
@@ -26,6 +27,12 @@ from .support.requirements import need_engine
 
 ROWS = rows_in(TARGET.read_text("utf-8"))
 QUICK = ("free-fall", "spring-energy", "pendulum-60", "bounce", "torque-moving")
+
+
+@cache
+def ways_of(backend: str) -> list[Variant]:
+    """Return the ways in which a backend steps; each is tried once."""
+    return variants_of(parse_backend(backend))
 
 
 def row_of(case: str, backend: str, integrator: str) -> TableRow:
@@ -76,7 +83,7 @@ def faults_of(result: CaseResult) -> list[str]:
 def test_each_engine_and_integrator_has_one_row_of_a_case_with_its_cause(name: str) -> None:
     for word in BACKENDS:
         need_engine(word.partition(":")[0])
-        for variant in variants_of(parse_backend(word)):
+        for variant in ways_of(word):
             row = row_of(name, word, variant.integrator)
             expectation = CASES[name].expectation(word, variant.integrator)
             cause = "none" if expectation is None else expectation.cause
