@@ -39,6 +39,7 @@ from statemachine.lab.robots import (
     gaps,
 )
 from statemachine.lab.robots.request import RobotsRequest
+from statemachine.lab.robots.survey import reason_in_general
 from statemachine.lab.robots.table import read_table, write_table
 from statemachine.processes import sandbox
 
@@ -118,6 +119,14 @@ def test_a_gap_is_wrong_where_our_backend_computes_the_joints(backend: str, is_w
     assert bool(ExaminedModel("", "", "", backends=rows).wrong("mujoco")) is is_wrong
 
 
+@pytest.mark.parametrize(("backend", "is_wrong"), [("pybullet", True), ("motrix", False)])
+def test_an_explosion_is_wrong_where_our_backend_computes_the_joints(
+    backend: str, is_wrong: bool
+) -> None:
+    rows = {backend: BackendRow(with_contacts=RunGap(400, 1e3))}
+    assert bool(ExaminedModel("", "", "", backends=rows).wrong("mujoco")) is is_wrong
+
+
 def test_a_part_is_a_model_where_it_loads_and_moves() -> None:
     part = ExaminedModel("a.xml", "", "", part_of="b.xml")
     assert not part.is_model
@@ -153,6 +162,38 @@ def test_the_sums_of_engines_count_each_thing_by_itself() -> None:
         RefusedFeature("tendon", models=2, alone=1, loaded_without_contacts=1),
         RefusedFeature("mesh", models=1, alone=0, loaded_without_contacts=0),
     )
+
+
+@pytest.mark.parametrize(
+    ("refusal", "reason"),
+    [
+        ("MuJoCo cannot read /a b/c.xml: no mesh 'hip'", "no mesh …"),
+        (
+            "MotrixSim cannot read c.xml: failed to load scene, Invalid inertia for Link at link "
+            'index 26 ("hip"): not positive [[0.0, 0.0, 0.0]]',
+            "Invalid inertia for Link at link index … (…): not positive …",
+        ),
+        (
+            "MotrixSim cannot read C:\\a.xml: unknown variant `include`, expected one of `body`",
+            "unknown variant `include`",
+        ),
+        ("MotrixSim cannot read c.xml: Invalid extension: /a/b.msh", "Invalid extension: …"),
+        ("it is out of order", "it is out of order"),
+    ],
+)
+def test_a_reason_in_general_has_nothing_of_one_file(refusal: str, reason: str) -> None:
+    assert reason_in_general(refusal) == reason
+
+
+@pytest.mark.parametrize(("default", "has_reason"), [("", True), ("no mesh", False)])
+def test_why_a_file_is_not_read_is_told_where_the_default_engine_reads_it(
+    default: str, has_reason: bool
+) -> None:
+    unread = BackendRow(refusal="motrix cannot read a.xml: no box 3", features=("not read",))
+    backends = {"mujoco": BackendRow(refusal=default), "motrix": unread}
+    survey = Survey("mujoco", (ExaminedModel("a.xml", "", "", backends=backends),), (), "")
+    (refused,) = survey.refused_features("motrix")
+    assert refused.feature == ("not read: no box …" if has_reason else "not read")
 
 
 def test_a_survey_of_one_model_has_no_parts() -> None:

@@ -35,7 +35,7 @@ from ..runs.interleaved_timing import Ratio, time_interleaved
 from ..runs.scenarios import scenario
 from ..validate.fingertip import certify
 from . import gaps
-from .records import RUNS, BackendRow, ExaminedModel, WitnessRow
+from .records import NOT_READ, RUNS, BackendRow, ExaminedModel, WitnessRow
 
 TRIED = ("hold", "gravity", "droop", "waves")
 _SHORT = 40  # steps of a scenario
@@ -304,7 +304,7 @@ def _features(error: StateMachineError) -> tuple[str, ...]:
     """Return what of a model is refused, in a few words each."""
     if isinstance(error, UnsupportedError):
         return error.features or (error.feature,)
-    return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)
+    return (NOT_READ,) if isinstance(error, ModelError) else (type(error).__name__,)
 
 
 def main(path: str, quick: str, seed: str, answer: str) -> None:
