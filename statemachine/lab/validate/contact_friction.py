@@ -11,7 +11,7 @@ from .case import GRAVITY, Case, bounded, converges, exact, exact_steps, wrong
 from .contact_incline import DIAGONAL, FRICTION, SLIDING, STICKS, Incline, block
 from .contact_steps import skid
 from .contact_tools import PYRAMIDAL, ROUND, on_engines
-from .motrix_notes import DEPTH, HARD_FRICTION, SQUARE
+from .known_causes import DEPTH, HARD_FRICTION, SQUARE
 from .run import Run
 from .soft_contact import SoftContact
 

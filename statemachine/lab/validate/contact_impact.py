@@ -8,7 +8,7 @@ from ...interface import Data
 from .case import GRAVITY, Case, converges, exact, exact_steps, rounded, wrong
 from .contact_steps import Step, each_step, on_spring
 from .contact_tools import on_engines
-from .motrix_notes import IMPLICIT_DAMPING
+from .known_causes import IMPLICIT_DAMPING
 from .run import Run, zero
 from .soft_contact import spring_of_restitution
 

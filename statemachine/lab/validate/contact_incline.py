@@ -10,7 +10,7 @@ import numpy as np
 from ...interface.records import Array
 from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, rounded, wrong
 from .contact_tools import PYRAMIDAL, ROUND, net_force, on_engines, one, tilted_gravity
-from .motrix_notes import DEPTH, HARD_FRICTION, SQUARE
+from .known_causes import DEPTH, HARD_FRICTION, SQUARE
 from .run import Run, zero
 
 FRICTION = 0.5

@@ -8,7 +8,7 @@ import numpy as np
 
 from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, exact, rounded, wrong
 from .contact_tools import ROUND, forces_on, net_force, on_engines
-from .motrix_notes import COLD_START, INVERSE_INERTIA, ORDER, ROCKING
+from .known_causes import COLD_START, INVERSE_INERTIA, ORDER, ROCKING
 from .run import Run, zero
 from .soft_contact import SoftContact
 

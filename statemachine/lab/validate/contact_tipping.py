@@ -10,7 +10,7 @@ from ...interface import Data
 from ...interface.records import Array
 from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
 from .contact_tools import ROUND, on_engines, one, tilted_gravity
-from .motrix_notes import CORNERS
+from .known_causes import CORNERS
 from .run import Run, Samples, zero, zero_crossings
 
 SLOPE = 0.3  # [rad] of the incline on which blocks stand

@@ -11,7 +11,7 @@ import math
 
 from ...interface import Data
 from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, refused, rounded, wrong
-from .motrix_notes import DRY_FRICTION, INVERSE_INERTIA
+from .known_causes import DRY_FRICTION, INVERSE_INERTIA
 from .run import Run, zero
 
 _BODY = (

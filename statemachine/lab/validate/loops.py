@@ -14,7 +14,7 @@ from ...interface import Data
 from ...interface.records import Array
 from ...rotations import matrix_from_quat
 from .case import GRAVITY, Case, bounded, converges, exact, refused, rounded
-from .motrix_notes import IMPLICIT_SERVO, INVERSE_INERTIA
+from .known_causes import IMPLICIT_SERVO, INVERSE_INERTIA
 from .pendulums import elliptic_period
 from .run import Run, largest_deviation, zero, zero_crossings
 

@@ -14,7 +14,7 @@ from ...interface import Data
 from ...interface.records import Array
 from ...rotations import matrix_from_quat, rotation
 from .case import NO_MOTION, Case, bounded, converges, exact, wrong
-from .motrix_notes import INSTABILITY, QUATERNION
+from .known_causes import INSTABILITY, QUATERNION
 from .run import Run, largest_deviation, zero, zero_crossings
 
 # A body whose origin is 0.3 m off its centre of mass, thrown and spinning about the vertical.

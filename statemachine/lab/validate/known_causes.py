@@ -1,4 +1,4 @@
-"""What MotrixSim computes otherwise than a closed form wants, each in a sentence or two.
+"""What makes MotrixSim differ from a closed form, cause by cause, each in a sentence or two.
 
 Each was tried on the engine: `tests/test_validate_motrix.py` does it again.
 """
