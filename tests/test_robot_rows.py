@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,7 @@ from statemachine.processes import sandbox
 
 from .support.backends import BOTH
 from .support.files import written
+from .support.requirements import need_engine
 from .support.small_models import loaded
 
 FAR = RunGap(400, 1e-3, moved=1.0)
@@ -540,11 +541,12 @@ def examined(
     patch: pytest.MonkeyPatch,
     loads: Callable[..., Model],
     run_gap: Callable[..., RunGap] = lambda *_, **__: RunGap(1),
+    backends: Sequence[str] = BOTH,
 ) -> tuple[ExaminedModel, list[str]]:
     """Return the row of a small model that is loaded so, and the parts that were told."""
     parts: list[str] = []
     patch.setattr(examine, "load_to_run", loads)
-    patch.setattr(examine, "backend_names", lambda: list(BOTH))
+    patch.setattr(examine, "backend_names", lambda: list(backends))
     patch.setattr(gaps, "run_gap", run_gap)
     patch.setattr(examine, "certify", lambda *_, **__: 1 / 0)
     path = written(folder / "tiny.xml", TINY)
@@ -656,3 +658,22 @@ def test_a_restore_that_parts_from_its_run_is_told_where_equality_is_promised(
     monkeypatch.setattr(examine, "future", future)
     row, _ = examined(tmp_path, monkeypatch, load_with({}))
     assert row.backends[backend].restores is restores
+
+
+@pytest.mark.parametrize(("backend", "is_fault"), [("pybullet", True), ("motrix", False)])
+def test_a_run_that_diverges_is_a_fault_where_our_backend_computes_the_joints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backend: str, is_fault: bool
+) -> None:
+    need_engine(backend)
+
+    def diverging(model: Model, *_: object) -> np.ndarray:
+        if model.backend == backend:
+            raise DivergedError("it went beyond max_qvel")
+        return np.zeros(3)
+
+    monkeypatch.setattr(examine, "future", diverging)
+    backends = ("mujoco", backend)
+    row, _ = examined(tmp_path, monkeypatch, load_with({}), backends=backends)
+    assert any(backend in fault for fault in row.faults) is is_fault
+    assert row.backends[backend].restores is None
+    assert row.backends["mujoco"].restores is True

@@ -290,7 +290,7 @@ class ExaminedModel:
                 said.append(f"{name}: not the bits of the engine without us")
             if row.restores is False:
                 said.append(f"{name}: two restores of one State part")
-            if name == default or _is_as_it_comes(name):
+            if name == default or is_as_it_comes(name):
                 continue
             if row.unexplained:
                 said.append(f"{name}: {_gap_words(row.without_contacts)}")
@@ -303,7 +303,7 @@ class ExaminedModel:
         return tuple(said)
 
 
-def _is_as_it_comes(backend: str) -> bool:
+def is_as_it_comes(backend: str) -> bool:
     """Tell whether a backend computes nothing itself: a gap or an explosion is its engine's then.
 
     The others are held against the default one. Of a backend of another package it is not known.
