@@ -45,9 +45,6 @@ thousand single objects whose URDF gives `izz="0"`, which MuJoCo refuses.
 
 With contacts a gap is largest where shapes overlap at the start, as laikago's do by 109 mm: each
 engine pushes them apart in its own way.
-
-PyBullet's joints are computed by our backend, so that a gap without contacts must have a reason.
-MotrixSim reads the file itself and computes its joints itself: its gap is a fact about the engine.
 """
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...show.blocks import only_on_pages
-from .records import NOT_READ, TOLERANCE, BackendRow, ExaminedModel
+from .records import NOT_READ, TOLERANCE, BackendRow, ExaminedModel, is_as_it_comes
 
 _LONGEST = 72  # characters of a reason
 # Before the reason why an engine does not read a file: what is not read, and where.
@@ -105,6 +105,12 @@ class Survey:
     def others(self) -> tuple[str, ...]:
         """Return the backends that are compared with the default one."""
         return tuple(name for name in self.backends if name != self.default)
+
+    @property
+    @only_on_pages
+    def as_they_come(self) -> tuple[str, ...]:
+        """Return those of them of which nothing is computed here: their gaps contradict nothing."""
+        return tuple(name for name in self.others if is_as_it_comes(name))
 
     @property
     @only_on_pages
