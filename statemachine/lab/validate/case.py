@@ -232,13 +232,18 @@ class Case:
     def expectation(self, backend: str, integrator: Integrator) -> Expectation | None:
         """Return what is known of a backend and an integrator; None if that is nothing.
 
+        Nothing is known of an engine that reads no integrator and has no record of its own. An
+        engine as it comes has that of its name where none is of it as it comes.
+
         Args:
             backend: As it is typed behind --backend.
             integrator: How it steps.
         """
-        names = dict.fromkeys((backend, engine_of(backend)))
+        names = dict.fromkeys((backend, backend.partition(":")[0], engine_of(backend)))
         keys = [f"{name} {way}" for name in names for way in (integrator, EVERY)]
-        for key in (*keys, integrator, EVERY):
+        if integrator != "own":
+            keys += [integrator, EVERY]
+        for key in keys:
             if key in self.expected:
                 return self.expected[key]
         return None

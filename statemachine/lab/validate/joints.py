@@ -197,7 +197,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": exact(5e-9),
         },
         rounding=5e-9,
@@ -219,7 +219,7 @@ CASES: tuple[Case, ...] = (
             "Euler": converges(1.0, 0.0112),
             "discrete": converges(1.0, 0.0067),
             "motrix *": converges(1.0, 0.0024),
-            "own": wrong(0.41, "engine's own"),
+            "pybullet:engine own": wrong(0.41, "engine's own"),
             "*": converges(1.0, 0.0024),
         },
         rounding=1e-11,
@@ -240,7 +240,7 @@ CASES: tuple[Case, ...] = (
             "mujoco==3.3.7 implicit": converges(1.0, 0.0034, "engine's own"),
             "mujoco==3.3.7 implicitfast": converges(1.0, 0.0034, "engine's own"),
             "motrix *": rounded(),
-            "own": wrong(18.5, "engine's own"),
+            "pybullet:engine own": wrong(18.5, "engine's own"),
             "*": exact(),
         },
     ),
@@ -257,7 +257,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": exact(),
         },
         timesteps=FEW_TIMESTEPS,
@@ -275,7 +275,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(9.5e-4, "computed by our backend"),
             "motrix *": bounded(9e-4, "engine's own", DRY_FRICTION),
-            "own": exact(),
+            "pybullet:engine own": exact(),
             "*": bounded(9.5e-4, "engine's own"),
         },
         timesteps=FEW_TIMESTEPS,
@@ -292,7 +292,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": exact(),
         },
         timesteps=FEW_TIMESTEPS,
@@ -310,7 +310,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "RK4": bounded(1.2e-4, "engine's own"),
             "motrix *": converges(1.0, 0.0049),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": converges(1.0, 0.005),
         },
     ),
@@ -327,7 +327,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": exact(),
         },
         timesteps=FEW_TIMESTEPS,
@@ -345,7 +345,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": exact(),
         },
         timesteps=FEW_TIMESTEPS,
@@ -363,7 +363,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(1.14e-4, "computed by our backend"),
             "motrix *": bounded(2.48e-4, "engine's own", INVERSE_INERTIA),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": bounded(1.14e-4, "engine's own"),
         },
         timesteps=FEW_TIMESTEPS,

@@ -108,7 +108,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(3.7e-4, "computed by our backend"),
             "motrix *": bounded(3.7e-4, "engine's own"),
-            "own": wrong(0.5, "engine's own"),
+            "pybullet:engine own": wrong(0.5, "engine's own"),
             "*": bounded(3.7e-4, "engine's own"),
         },
         timesteps=FEW_TIMESTEPS,
@@ -125,7 +125,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": refused(),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": exact(5e-9),
         },
         rounding=5e-9,
@@ -143,7 +143,7 @@ CASES: tuple[Case, ...] = (
         source="Landau and Lifshitz, section 17 (no collision adds energy)",
         expected={
             "motrix *": exact(),
-            "own": NO_MOTION,
+            "pybullet:engine own": NO_MOTION,
             "*": exact(),
         },
         timesteps=FEW_TIMESTEPS,
@@ -160,6 +160,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": refused(),
+            "pybullet:engine own": exact(),
             "*": exact(),
         },
         timesteps=(0.005, 0.002),
@@ -177,6 +178,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": refused(),
+            "pybullet:engine own": exact(),
             "*": exact(),
         },
         timesteps=(0.005, 0.002),

@@ -194,7 +194,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(1.6e-4, "computed by our backend"),
             "motrix *": bounded(2.65e-4, "engine's own", INVERSE_INERTIA),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": bounded(1.6e-4, "engine's own"),
         },
         timesteps=_TIMESTEPS,
@@ -212,7 +212,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(5.9e-4, "computed by our backend"),
             "motrix *": bounded(0.00123, "engine's own", INVERSE_INERTIA),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": bounded(5.9e-4, "engine's own"),
         },
         timesteps=_TIMESTEPS,
@@ -229,7 +229,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": refused(),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": exact(1e-8),
         },
         timesteps=_FEW_TIMESTEPS,
@@ -252,7 +252,7 @@ CASES: tuple[Case, ...] = (
             "pybullet implicitfast": bounded(1.2e-4, "computed by our backend"),
             "pybullet *": bounded(4.3e-4, "computed by our backend"),
             "motrix *": refused(),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": bounded(4.3e-4, "engine's own"),
         },
         timesteps=_TIMESTEPS,
@@ -270,7 +270,7 @@ CASES: tuple[Case, ...] = (
             "mujoco RK4": bounded(0.0025, "engine's own"),
             "pybullet *": converges(0.7, 0.0217, "computed by our backend"),
             "motrix *": converges(0.55, 0.0246, "engine's own", INVERSE_INERTIA),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": converges(0.7, 0.0217, "engine's own"),
         },
         timesteps=_TIMESTEPS,
@@ -288,7 +288,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(0.00197, "computed by our backend"),
             "motrix *": bounded(8.4e-4, "engine's own", IMPLICIT_SERVO),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": bounded(0.00197, "engine's own"),
         },
         timesteps=_FEW_TIMESTEPS,
@@ -306,7 +306,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": exact(1e-6),
         },
         timesteps=_FEW_TIMESTEPS,
@@ -325,7 +325,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "pybullet *": bounded(9e-4, "computed by our backend"),
             "motrix *": bounded(7.4e-4, "engine's own", INVERSE_INERTIA),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "*": bounded(9e-4, "engine's own"),
         },
         timesteps=_FEW_TIMESTEPS,

@@ -160,7 +160,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "RK4": exact(),
             "motrix *": rounded(),
-            "own": NO_MOTION,
+            "pybullet:engine own": NO_MOTION,
             "*": converges(2.0, 5.2e-6),
         },
     ),
@@ -177,7 +177,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "RK4": exact(),
             "motrix *": rounded(),
-            "own": NO_MOTION,
+            "pybullet:engine own": NO_MOTION,
             "*": converges(2.0, 5.2e-6),
         },
     ),
@@ -194,7 +194,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "RK4": exact(),
             "motrix *": converges(1.0, 0.0047),
-            "own": NO_MOTION,
+            "pybullet:engine own": NO_MOTION,
             "*": converges(1.0, 0.0047),
         },
     ),
@@ -210,7 +210,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "RK4": exact(),
             "motrix *": rounded(),
-            "own": NO_MOTION,
+            "pybullet:engine own": NO_MOTION,
             "*": converges(2.0, 2.7e-5),
         },
     ),
@@ -226,7 +226,7 @@ CASES: tuple[Case, ...] = (
         expected={
             "RK4": bounded(6e-7, "discretisation"),
             "motrix *": bounded(0.1, "discretisation"),
-            "own": NO_MOTION,
+            "pybullet:engine own": NO_MOTION,
             "*": bounded(0.1, "discretisation"),
         },
         tolerance=0.2,

@@ -113,7 +113,7 @@ CASES: tuple[Case, ...] = (
             "mujoco==3.3.7 RK4": converges(2.0, 0.43, "engine's own"),
             "pybullet *": refused(),
             "motrix *": diverges("engine's own"),
-            "own": refused(),
+            "pybullet:engine own": refused(),
             "implicit": wrong(0.97, "engine's own"),
             "RK4": converges(3.6, 0.32),
             "*": diverges("engine's own"),
@@ -133,7 +133,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": exact(),
         },
         rounding=1e-9,
@@ -152,7 +152,7 @@ CASES: tuple[Case, ...] = (
         relative=True,
         expected={
             "motrix *": rounded(),
-            "own": wrong(1.0, "engine's own"),
+            "pybullet:engine own": wrong(1.0, "engine's own"),
             "*": exact(),
         },
     ),
