@@ -73,7 +73,7 @@ def read_file(path: Path, raw: MjModel) -> MotrixReading:
         reason = "the activation of an actuator can be neither read nor set in it"
         raise unsupported_by("motrix", "activation", reason)
     if not raw.nv:
-        raise unsupported_by("motrix", "joints", "it cannot step a model without any")
+        raise unsupported_by("motrix", "a model without joints", "it cannot step one")
     world, lines = EngineModel(path).world()
     engine = EngineModel(path, _of_urdf(world, raw) if path.suffix.lower() == ".urdf" else {})
     world, scene = engine.edited_world(), engine.scene
