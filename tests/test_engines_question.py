@@ -16,12 +16,21 @@ from statemachine import cli, lab
 from statemachine.backends import chosen, installed_backends
 from statemachine.cli.compare.requests import request_of
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.lab.compare import Comparison
 from statemachine.lab.compare.chaos import Chance, ChaosFloor
+from statemachine.lab.compare.convergence import FINER, LimitVerdict
 from statemachine.lab.compare.odd_side import ODD
 from statemachine.lab.questions.engines import page
+from statemachine.lab.questions.finer_sides import (
+    FinerGap,
+    FinerSides,
+    OddGapState,
+    finer_sides,
+)
 from statemachine.lab.questions.requests.engines import EnginesRequest, EnginesResult, answer
 from statemachine.lab.questions.requests.gap import CompareRequest
-from statemachine.lab.questions.several_sides import measured_quantities, sides_gap
+from statemachine.lab.questions.several_sides import Two, measured_quantities, sides_gap
+from statemachine.show.blocks import Table
 from statemachine.show.first_screen import LINES, lines_of
 
 from .support.backends import BOTH, registered
@@ -58,6 +67,13 @@ def damped(pendulum: Path) -> EnginesResult:
 def coarse(pendulum: Path) -> EnginesResult:
     """Of three pendulums one with a long timestep."""
     return falling(pendulum, "timestep=0.01", "timestep=0.0005", "timestep=0.00025")
+
+
+@pytest.fixture(scope="module")
+def drifting(pendulum: Path) -> EnginesResult:
+    """Of three pendulums one with a long timestep, and another with a little more damping."""
+    options = "timestep=0.01", "timestep=0.0005", "timestep=0.0005 damping=0.0002"
+    return falling(pendulum, *options)
 
 
 @pytest.fixture(scope="module")
@@ -170,6 +186,63 @@ def test_a_gap_of_the_damping_stays_with_finer_steps(damped: EnginesResult) -> N
 def test_a_side_that_is_odd_at_some_steps_alone_is_not_steady(damped: EnginesResult) -> None:
     assert damped.finer is not None
     assert not replace(damped.finer, odd=("damping=0.3", "", "")).is_steady
+
+
+def test_where_finer_steps_change_the_odd_side_which_one_is_odd_is_unclear(
+    drifting: EnginesResult,
+) -> None:
+    """What the long timestep makes shrinks with it, and what the damping makes does not."""
+    assert drifting.finer is not None
+    assert (drifting.state, drifting.finer.state) == ("unclear", "changes")
+    assert drifting.finer.odd[0] == drifting.labels[0]
+    assert drifting.finer.odd[-1] == ""
+
+
+def test_steps_are_refined_to_the_end_where_they_change_the_odd_side(
+    drifting: EnginesResult,
+) -> None:
+    assert drifting.finer is not None
+    assert drifting.finer.finer == FINER
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "odd", "state"),
+    [
+        (("discretisation", "discretisation", "stays"), "aaa", "vanishes"),
+        (("discretisation", "rounding", "stays"), "a  ", "vanishes"),
+        (("stays", "in part", "rounding"), "aaa", "stays"),
+        (("stays", "in part", "rounding"), "aba", "changes"),
+        (("stays", "stays", "rounding"), "a a", "changes"),
+        (("stays", "unclear", "rounding"), "aaa", "unclear"),
+        (("stays", "discretisation", "rounding"), "aaa", "unclear"),
+    ],
+)
+def test_what_becomes_of_the_odd_side(
+    verdicts: tuple[LimitVerdict, ...], odd: str, state: OddGapState
+) -> None:
+    pairs = zip(("ab", "ac", "bc"), verdicts, strict=True)
+    gaps = tuple(
+        FinerGap(left, right, (1.0, 1.0, 1.0), verdict) for (left, right), verdict in pairs
+    )
+    assert FinerSides(FINER[:3], gaps, tuple(each.strip() for each in odd), ()).state == state
+
+
+def test_a_gap_is_judged_by_all_steps_that_were_run(pendulum: Path) -> None:
+    """The first three gaps of this one are level, and its five have no steady order."""
+    files = [f"{pendulum} damping={value}" for value in (0.1, 0.3)]
+    two = lab.compare(*files, what="fall", seconds=0.2, chaos=False).comparison
+    unsteady, wild = (1, 1.07, 0.93, 0.855, 1.007), (1, 3, 1, 3, 1)
+    pairs = {(0, 1): unsteady, (0, 2): unsteady, (1, 2): wild}
+
+    def run(pair: Two, finer: int) -> Comparison:
+        factor = pairs[pair][FINER.index(finer)]
+        agreements = [replace(a, max=factor * a.max) for a in two.agreements]
+        return replace(two, agreements=tuple(agreements))
+
+    compared = dict.fromkeys(pairs, two)
+    quantities = measured_quantities(compared, dict.fromkeys(pairs))
+    result = finer_sides(compared, run, quantities, "run", {0: "a", 1: "b", 2: "c"})
+    assert [gap.verdict for gap in result.gaps] == ["unclear"] * 3
 
 
 def test_what_the_gap_comes_from_is_looked_for(damped: EnginesResult) -> None:
@@ -346,6 +419,20 @@ def test_the_arm_on_engines_as_they_come(here: Cli) -> None:
 def test_the_page_fits(damped: EnginesResult, details: bool) -> None:
     assert wide_lines(damped.text(details)) == []
     assert lines_of(page(damped)) <= LINES
+
+
+@pytest.mark.parametrize("details", [False, True])
+def test_the_page_shows_who_is_odd_at_each_step_where_that_changes(
+    drifting: EnginesResult, details: bool
+) -> None:
+    assert drifting.finer is not None
+    (table,) = (
+        each
+        for each in drifting.page(details).blocks
+        if isinstance(each, Table) and each.rows[-1][0] == "odd is"
+    )
+    assert [*table.rows[-1][2:]] == [label or "none" for label in drifting.finer.odd]
+    assert wide_lines(drifting.text(details)) == []
 
 
 def test_the_first_line_names_the_odd_one_and_its_gap(damped: EnginesResult) -> None:

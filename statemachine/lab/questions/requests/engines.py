@@ -40,7 +40,7 @@ from .gap import CompareRequest
 
 SEARCH_SECONDS = 30.0  # [s] by the clock: a hint needs the largest cause, and --why finds all
 # "too few": of fewer than three sides a run reaches its end.
-EnginesState = Literal["odd", "none", "alike", "nothing moved", "too few"]
+EnginesState = Literal["odd", "unclear", "none", "alike", "nothing moved", "too few"]
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,10 @@ class EnginesResult(ShownResult):
         unit: Its SI unit.
         gaps: Between each two sides whose runs reach the end.
         groups: Which sides agree, and which one is odd: over the whole run, and at its end.
-        state: "odd" where a side is; "none" where no side is, and some are told apart; "alike"
-            where no two are; "nothing moved" where there was nothing to compare; "too few" where
-            fewer than three runs reach the end.
+        state: "odd" where a side is; "unclear" where one is with the steps as given, and not with
+            some finer ones; "none" where no side is, and some are told apart; "alike" where no two
+            are; "nothing moved" where there was nothing to compare; "too few" where fewer than
+            three runs reach the end.
         ended: The sides whose runs do not.
         finer: The same with finer steps; None where no side is odd, or where one does not run so.
         origin: What the gap between the odd side and the nearest other one comes from; None where
@@ -215,11 +216,10 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
     )
     if result.odd is None:
         return result
-    return replace(
-        result,
-        finer=_finer(result, sides, comparisons, quantities, complete, reporter),
-        origin=_origin(result, sides, reporter),
-    )
+    finer = _finer(result, sides, comparisons, quantities, complete, reporter)
+    if finer is not None and finer.state == "changes":
+        result = replace(result, state="unclear")
+    return replace(result, finer=finer, origin=_origin(result, sides, reporter))
 
 
 def labels_of_sides(sides: Sequence[Side]) -> list[str]:
