@@ -253,6 +253,7 @@ def test_where_nothing_touches_no_part_is_called_contact(lost: Path, old_release
 
 
 BAR = '<geom type="box" size=".15 .02 .02" pos=".15 0 0" mass=".3"/>'
+SWING = '<joint name="j" axis="0 1 0" damping=".01"/>'
 END = f'<body name="end" pos=".3 0 0"><joint name="k" axis="0 1 0"/>{BAR}</body>'
 
 
