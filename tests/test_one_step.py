@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import statemachine as sm
-from statemachine.errors import BadInputError
+from statemachine import lab
+from statemachine.errors import BadInputError, EngineWarning
 from statemachine.lab.compare import rerun_of
 from statemachine.lab.compare.one_step import RELATIVE, OneStep, StageGap, one_step
 from statemachine.lab.compare.sides import Request
@@ -249,3 +251,12 @@ def test_one_step_starts_the_second_file_with_the_activations_of_the_first(
         for name, b, rows in zip(("one.xml", "two.xml"), order, (drives, drives[::-1]), strict=True)
     )
     assert one_step(rerun(one), two).first is None
+
+
+def test_single_precision_is_no_difference_of_a_stage() -> None:
+    """MotrixSim finds the same contacts to 5e-8 m, and makes other forces of them."""
+    need_engine("motrix")
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):
+        result = lab.one_step(backends=("mujoco", "motrix"), what="hold", seconds=0.4)
+    assert result.first is not None
+    assert result.first.stage == "contact force"
