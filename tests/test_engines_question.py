@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 from statemachine import cli, lab
 from statemachine.backends import chosen, installed_backends
 from statemachine.cli.compare.requests import request_of
-from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.errors import BadInputError, MissingEngineError, ModelError, UnknownNameError
 from statemachine.lab.compare import Comparison
 from statemachine.lab.compare.chaos import Chance, ChaosFloor
 from statemachine.lab.compare.convergence import FINER, LimitVerdict
@@ -27,6 +28,7 @@ from statemachine.lab.questions.finer_sides import (
     OddGapState,
     finer_sides,
 )
+from statemachine.lab.questions.requests import gap as two_sides
 from statemachine.lab.questions.requests.engines import EnginesRequest, EnginesResult, answer
 from statemachine.lab.questions.requests.gap import CompareRequest
 from statemachine.lab.questions.several_sides import Two, measured_quantities, sides_gap
@@ -37,6 +39,7 @@ from .support.backends import BOTH, registered
 from .support.claims import assert_has, refused
 from .support.files import written, written_all
 from .support.processes import Cli
+from .support.requirements import need_engine
 from .support.screens import wide_lines
 
 HIDDEN = "tests.support.hidden_world:load"
@@ -325,6 +328,29 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 @pytest.mark.parametrize(("ask", "says"), REFUSED, ids=[says for _, says in REFUSED])
 def test_what_cannot_have_an_odd_one_is_refused(ask: Callable[[], object], says: str) -> None:
     refused(((BadInputError, UnknownNameError), says, ask))
+
+
+@pytest.fixture
+def damper(pendulum: Path) -> Path:
+    """A file that MuJoCo and PyBullet take, and MotrixSim does not."""
+    need_engine("motrix")
+    drive = '<actuator><damper joint="swing" kv="1" ctrlrange="0 1"/></actuator></mujoco>'
+    return written(pendulum.parent / "damper.xml", PENDULUM.replace("</mujoco>", drive))
+
+
+def test_of_all_engines_one_that_cannot_load_the_file_is_told_with_the_others(
+    damper: Path,
+) -> None:
+    call = partial(lab.engines, damper, what="gravity")
+    refused((BadInputError, "without motrix: --backend mujoco --backend pybullet", call))
+
+
+def test_a_file_that_a_side_cannot_load_is_told_before_anything_runs(
+    damper: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(two_sides, "answer", lambda *_: pytest.fail("something ran"))
+    sides = [f"{damper}@{name}" for name in (*BOTH, "motrix")]
+    refused((ModelError, "MotrixSim cannot read", lambda: lab.engines(sides, what="gravity")))
 
 
 def typed(*words: str) -> Any:

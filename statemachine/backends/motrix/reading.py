@@ -244,7 +244,7 @@ def _leave_out_inert(read: _Numbers) -> None:
     raw = read.raw
     for joint in range(raw.njnt):
         name = raw.joint(joint).name or f"joint {joint}"
-        if raw.jnt_actfrclimited[joint]:
+        if raw.jnt_actfrclimited[joint] and raw.nactuator:
             read.inert(f"actuatorfrcrange of {name}")
             raw.jnt_actfrclimited[joint] = False
         if raw.jnt_type[joint] == JointType.BALL:

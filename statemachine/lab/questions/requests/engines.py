@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import ClassVar, Literal
 
-from ....backends.chosen import chosen_backends
+from ....backends.chosen import ALL, chosen_backends
 from ....backends.installed_backends import installed_backends
-from ....errors import BadInputError, EndedEarlyError, StateMachineError
+from ....errors import BadInputError, EndedEarlyError, MissingEngineError, StateMachineError
 from ....measures.text import listed
 from ...compare.agreement import Comparison, compare
 from ...compare.odd_side import LEAST_SIDES
@@ -178,6 +178,7 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
     for error in missing:
         reporter.note(f"{error}; it is left out")
     names = labels_of_sides(sides) if request.sides else [str(backend) for backend in backends]
+    _load_each(request, sides, names)
     labels = dict(enumerate(names))
     compared: dict[Two, gap.CompareResult] = {}
     for left, right in combinations(labels, 2):
@@ -242,6 +243,26 @@ def sides_of(request: EnginesRequest) -> tuple[Side, ...]:
     return tuple(
         Side(model, backend.name, backend.defaults, {}, run.menagerie) for backend in backends
     )
+
+
+def _load_each(request: EnginesRequest, sides: Sequence[Side], names: Sequence[str]) -> None:
+    """Load each side once, so that one that cannot be loaded is told before anything runs.
+
+    Raises:
+        BadInputError: An engine of "all" cannot load the file; which ones to name instead.
+        StateMachineError: Another side cannot be loaded.
+    """
+    options = {**request.run.scenario().options, **request.run.options}
+    for side, name in zip(sides, names, strict=True):
+        try:
+            side.load(**options)
+        except MissingEngineError:
+            continue  # its recorded run may take its place
+        except StateMachineError as error:
+            if ALL not in request.backends:
+                raise
+            others = " ".join(f"--backend {other}" for other in names if other != name)
+            raise BadInputError(f"{error}; without {name}: {others}") from error
 
 
 def _ended(
