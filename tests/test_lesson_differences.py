@@ -118,7 +118,7 @@ def test_falls_that_are_the_same_are_not_apart() -> None:
 
 def longer(*position: float) -> Droop:
     """Return where a joint is at some moments [m]."""
-    moments = np.arange(len(position)) * 4.0
+    moments = np.arange(0.0, 4.0 * len(position), 4.0)
     return Droop(moments, np.array(position), np.array(position))
 
 
