@@ -40,7 +40,7 @@ from statemachine.lab.runs.walking import headings, lateral_way, mean_speeds
 from statemachine.measures import parse_tolerances
 from statemachine.models import models_dir
 
-from .support.requirements import need_engine
+from .support.requirements import SHARED, need_engine, shared
 
 FOLDER = models_dir() / "quadruped"
 POLICY, CONTRACT = str(FOLDER / "policy.onnx"), str(FOLDER / "contract.yaml")
@@ -128,7 +128,7 @@ def test_a_recorded_run_is_that_of_plain_mujoco(runtime: Any) -> None:
 @pytest.mark.parametrize("backend", ["mujoco", "pybullet", "motrix"])
 def test_a_policy_commands_the_same_bits_twice(backend: str) -> None:
     need_engine(backend)
-    first, second = _recorded(backend=backend), _recorded(backend=backend)
+    first, second = (_recorded(seconds=0.2, backend=backend) for _ in range(2))
     assert first.qpos.tobytes() == second.qpos.tobytes()
 
 
@@ -388,8 +388,10 @@ def test_a_speed_that_differs_has_causes() -> None:
         quantity=FORWARD,
         chaos=False,
     )
-    speeds = [outcomes_of_run(_recorded_with(kp), 1.0)[FORWARD] for kp in (60.0, 30.0)]
-    assert result.gap == pytest.approx(abs(speeds[0] - speeds[1]))
+    left, right = (outcomes_of_run(_recorded_with(kp), 1.0)[FORWARD] for kp in (60.0, 30.0))
+    assert left is not None
+    assert right is not None
+    assert result.gap == pytest.approx(abs(left - right))
 
 
 @pytest.mark.slow
@@ -405,3 +407,63 @@ def test_a_gain_that_differs_is_named_the_cause() -> None:
     )
     (row,) = result.to_dict()["share"]
     assert row == pytest.approx(1.0)
+
+
+# A public policy: that of the Go1, of MuJoCo Playground.
+
+_GO1 = """
+schema: gaitkeeper/contract/v3
+timing: {policy_dt: 0.02, sim_dt: 0.004}
+policy_io:
+  joints:
+    names: [FR_hip_joint, FR_thigh_joint, FR_calf_joint, FL_hip_joint, FL_thigh_joint,
+            FL_calf_joint, RR_hip_joint, RR_thigh_joint, RR_calf_joint, RL_hip_joint,
+            RL_thigh_joint, RL_calf_joint]
+  imu: {site: imu, frame: body}
+  observation_groups:
+    policy:
+      terms:
+        - {id: base_lin_vel, params: {site: imu}}
+        - {id: base_ang_vel}
+        - {id: projected_gravity}
+        - {id: joint_pos_rel}
+        - {id: joint_vel_rel}
+        - {id: last_action}
+        - {id: velocity_commands}
+control:
+  default_joint_pos: [0.1, 0.9, -1.8, -0.1, 0.9, -1.8, 0.1, 0.9, -1.8, -0.1, 0.9, -1.8]
+  actions: {joint_pos: {scale: 0.5}}
+  actuators: {kind: implicit_pd}
+"""
+
+
+def _go1(folder: Path, backend: str, timestep: float | None = None) -> dict[str, float | None]:
+    """Return what comes of the Go1's policy in 2 s, asked for 0.8 m/s forward."""
+    go1 = shared(SHARED / "policies" / "go1" / "policy.onnx")
+    contract = folder / "go1.yaml"
+    contract.write_text(_GO1, "utf-8")
+    asked = RecordRequest(
+        str(go1),
+        go1.with_name("scene.xml"),
+        backend,
+        seconds=2.0,
+        timestep=timestep,
+        contract=contract,
+        command=(0.8, 0.0, 0.0),
+    )
+    return outcomes_of_run(answer_record(asked), 2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", ["mujoco", "pybullet", "motrix"])
+def test_the_go1_walks_as_fast_as_it_is_asked(tmp_path: Path, backend: str) -> None:
+    need_engine(backend)
+    outcomes = _go1(tmp_path, backend)
+    assert outcomes[FELL] is None
+    assert outcomes[FORWARD] == pytest.approx(0.8, abs=0.08)
+
+
+@pytest.mark.slow
+def test_the_go1_falls_on_pybullet_as_it_comes(tmp_path: Path) -> None:
+    need_engine("pybullet")
+    assert _go1(tmp_path, "pybullet:engine", timestep=0.004)[FELL] is not None

@@ -162,6 +162,7 @@ def record_request_of(options: argparse.Namespace) -> RecordRequest:
     from ..lab.policy.command import speeds_of
     from ..lab.recordings.request import RecordRequest
 
+    command = None if options.command is None else speeds_of(options.command)
     return RecordRequest(
         what=options.what,
         model=options.model or None,
@@ -172,7 +173,7 @@ def record_request_of(options: argparse.Namespace) -> RecordRequest:
         timestep=options.timestep,
         seed=options.seed,
         contract=options.contract,
-        command=None if options.command is None else speeds_of(options.command),
+        command=command,
     )
 
 

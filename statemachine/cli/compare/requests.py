@@ -167,6 +167,7 @@ def _run_of(
     if sides:
         sides = _with_parts(options, sides[0], sides[1], names)
     every = 1 if options.every is None else every_of_word(options.every)
+    command = None if options.command is None else speeds_of(options.command)
     return Request(
         what=what,
         backends=backends,
@@ -180,7 +181,7 @@ def _run_of(
         every=every,
         keyframe=options.keyframe,
         contract=options.contract,
-        command=None if options.command is None else speeds_of(options.command),
+        command=command,
     )
 
 

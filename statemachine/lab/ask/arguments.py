@@ -142,6 +142,8 @@ class RunArguments:
 
     def _request(self, options: Mapping[str, OptionValue]) -> Request:
         """Return a Request with all that it has whatever the sides are."""
+        contract = _text(self.contract)
+        command = None if self.command is None else speeds_of(self.command)
         return Request(
             what=self._what(),
             backends=self.backends,
@@ -152,8 +154,8 @@ class RunArguments:
             names=self.pairs_of_names,
             every=self.every,
             keyframe=self.keyframe,
-            contract=_text(self.contract),
-            command=None if self.command is None else speeds_of(self.command),
+            contract=contract,
+            command=command,
         )
 
     def _what(self) -> tuple[What, ...]:

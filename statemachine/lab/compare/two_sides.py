@@ -265,6 +265,7 @@ def _command(request: Request, backend: BackendChoice) -> str:
     if {*request.options} - {"timestep"}:
         return ""
     words = ["statemachine", "trace", "record", *request.words, "--backend", str(backend)]
+    of_policy = options_of_policy(request.contract, request.command)
     folder = "DIR" if request.menagerie else None
     return command(
         words,
@@ -273,5 +274,5 @@ def _command(request: Request, backend: BackendChoice) -> str:
         ("--seed", request.seed, 0),
         ("--timestep", request.options.get("timestep"), None),
         ("--keyframe", request.keyframe, None),
-        *options_of_policy(request.contract, request.command),
+        *of_policy,
     )

@@ -43,6 +43,7 @@ class ConvergencePage(PageContent):
         next_command: What to type next; "" for nothing.
         call_periods: How often a function is called on each side; None where none is run.
         details: Whether everything is shown.
+        is_policy: Whether a policy is run, which says itself how often it commands.
     """
 
     template = "convergence.md.j2"
@@ -54,6 +55,7 @@ class ConvergencePage(PageContent):
     next_command: str
     call_periods: CallPeriods | None
     details: bool
+    is_policy: bool
 
     @property
     def left(self) -> str:
@@ -119,7 +121,7 @@ class ConvergencePage(PageContent):
     @property
     def periods_differ(self) -> bool:
         """Tell whether a command holds for another time on each side."""
-        return self.period_left != self.period_right
+        return not self.is_policy and self.period_left != self.period_right
 
     @property
     def period_left(self) -> str:
@@ -203,6 +205,7 @@ def _page(result: ConvergeResult, worst: Sequence[GapLimit], details: bool = Fal
         next_step=next_step,
         next_command=_next_command(next_step, result, run, periods),
         details=details,
+        is_policy=run.is_policy,
     )
     return with_answer(render(content))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...measures.text import NO_NUMBER, quantity, short_time
@@ -46,18 +47,22 @@ def outcomes_table(comparison: Comparison) -> Table:
     left, right = short_labels(comparison)
     if max(len(left), len(right)) > _COLUMN:
         left, right = "left", "right"
-    return Table.of(
-        comparison.outcomes,
-        {
-            "what came of it": lambda outcome: outcome.name,
-            left: lambda outcome: _value(outcome, outcome.left),
-            right: lambda outcome: _value(outcome, outcome.right),
-            "apart": _apart,
-            "verdict": lambda outcome: TableCell(outcome.verdict, verdict=outcome.verdict),
-        },
-        words={"verdict"},
-        emphasis=lambda outcome: outcome.verdict == "differs",
-    )
+    columns: dict[str, Callable[[RunOutcome], str]] = {
+        "what came of it": lambda outcome: outcome.name,
+        left: _left_text,
+        right: _right_text,
+        "apart": _apart,
+        "verdict": _verdict,
+    }
+    return Table.of(comparison.outcomes, columns, words={"verdict"}, emphasis=_differs)
+
+
+def _verdict(outcome: RunOutcome) -> str:
+    return TableCell(outcome.verdict, verdict=outcome.verdict)
+
+
+def _differs(outcome: RunOutcome) -> bool:
+    return outcome.verdict == "differs"
 
 
 def _apart(outcome: RunOutcome) -> str:
@@ -80,6 +85,9 @@ def outcome_text(name: str, unit: str, value: float | None) -> str:
     return quantity(value, unit)
 
 
-def _value(outcome: RunOutcome, value: float | None) -> str:
-    """Return an outcome of one side."""
-    return outcome_text(outcome.name, outcome.unit, value)
+def _left_text(outcome: RunOutcome) -> str:
+    return outcome_text(outcome.name, outcome.unit, outcome.left)
+
+
+def _right_text(outcome: RunOutcome) -> str:
+    return outcome_text(outcome.name, outcome.unit, outcome.right)

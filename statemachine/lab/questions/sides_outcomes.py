@@ -49,8 +49,8 @@ def sides_outcomes(
 
 def sides_outcomes_table(outcomes: Iterable[SidesOutcome], labels: Sequence[str]) -> Table:
     """Return a row for each outcome, with a column for each side."""
-    rows = [
-        (outcome.name, *(outcome_text(outcome.name, outcome.unit, v) for v in outcome.values))
-        for outcome in outcomes
-    ]
+    rows: list[list[str]] = []
+    for outcome in outcomes:
+        texts = [outcome_text(outcome.name, outcome.unit, value) for value in outcome.values]
+        rows.append([outcome.name, *texts])
     return Table(("what came of it", *labels), rows)

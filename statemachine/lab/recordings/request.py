@@ -111,6 +111,7 @@ class RecordRequest:
         words = ["statemachine", "trace", "record", Path(self.what).name]
         if self.model is not None:
             words.append(without_folders(self.model))
+        of_policy = options_of_policy(self.contract, self.command)
         typed = command(
             words,
             ("--backend", str(self.chosen_backend()), DEFAULT),
@@ -118,7 +119,7 @@ class RecordRequest:
             ("--seconds", self.seconds, None),
             ("--timestep", self.timestep, None),
             ("--seed", self.seed, 0),
-            *options_of_policy(self.contract, self.command),
+            *of_policy,
         )
         return printable(typed)
 

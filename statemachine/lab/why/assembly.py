@@ -87,7 +87,7 @@ def explanation_of(search: Search) -> Explanation:
         impossible=impossible,
         unmatched=matched.only,
         missing=_missing(request),
-        notes=_notes(matched, left, right, asks_function=request.periods is not None),
+        notes=_notes(matched, left, right, asks_function=request.scenario.is_user_function),
         unread=_unread(matched, request, gap),
         still=_still(search.causes, left, trials.traces[0]),
         motion=motion,

@@ -190,20 +190,20 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
         compared[left, right] = gap.answer(question, reporter)
     ended = _ended(compared, labels)
     complete = {side: label for side, label in labels.items() if side not in ended}
+    of_pairs = {pair: each.comparison for pair, each in compared.items()}
     comparisons: dict[Two, Comparison] = {}
     floors = {pair: each.floor for pair, each in compared.items()}
-    for pair, each in compared.items():
+    for pair, comparison in of_pairs.items():
         if not ended.keys() & set(pair):
-            comparisons[pair] = each.comparison
+            comparisons[pair] = comparison
+    until = max(comparison.until for comparison in of_pairs.values())
     result = EnginesResult(
         request=request,
         labels=tuple(names),
-        until=max(each.comparison.until for each in compared.values()),
+        until=until,
         ended=tuple(ended.values()),
         missing=tuple(str(error) for error in missing),
-        outcomes=sides_outcomes(
-            {pair: each.comparison for pair, each in compared.items()}, len(labels)
-        ),
+        outcomes=sides_outcomes(of_pairs, len(labels)),
     )
     if len(complete) < LEAST_SIDES:
         return result
