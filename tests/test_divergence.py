@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends import pybullet_backend
+from statemachine.backends.compiled.model import compile_file, fastest
 from statemachine.cli import main
 from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
@@ -23,7 +25,7 @@ from .support.compared import page_of
 from .support.files import written
 from .support.motions import after, opened
 from .support.requirements import need_engine
-from .support.small_models import ROTOR, STUCK_POST
+from .support.small_models import ROTOR, STUCK_POST, mjcf
 
 
 def loaded(folder: Path, text: str, **options: Any) -> sm.Model:
@@ -199,3 +201,14 @@ def test_both_sides_of_a_comparison_may_diverge(tmp_path: Path) -> None:
     traces = run_sides(Request(("droop",), model=str(path))).traces
     assert all(trace.header.ended for trace in traces)
     assert "ended early" in page_of(compare_traces(*traces)).headline.text
+
+
+def test_the_bound_of_a_motor_that_pushes_a_free_body_is_a_number(tmp_path: Path) -> None:
+    """Its first gear is 0 and its range infinite: there is nothing to multiply."""
+    text = mjcf(
+        '<body><freejoint name="j"/><geom size=".1"/></body>',
+        '<actuator><motor joint="j" gear="0 0 1 0 0 0"/></actuator>',
+    )
+    compiled = compile_file(written(tmp_path / "m.xml", text))
+    with warnings.catch_warnings(action="error", category=RuntimeWarning):
+        assert np.isfinite(fastest(compiled)).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,19 +16,30 @@ import pytest
 from statemachine import cli, lab
 from statemachine.backends import chosen, installed_backends
 from statemachine.cli.compare.requests import request_of
-from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.errors import BadInputError, MissingEngineError, ModelError, UnknownNameError
+from statemachine.lab.compare import Comparison
 from statemachine.lab.compare.chaos import Chance, ChaosFloor
+from statemachine.lab.compare.convergence import FINER, LimitVerdict
 from statemachine.lab.compare.odd_side import ODD
 from statemachine.lab.questions.engines import page
+from statemachine.lab.questions.finer_sides import (
+    FinerGap,
+    FinerSides,
+    OddGapState,
+    finer_sides,
+)
+from statemachine.lab.questions.requests import gap as two_sides
 from statemachine.lab.questions.requests.engines import EnginesRequest, EnginesResult, answer
 from statemachine.lab.questions.requests.gap import CompareRequest
-from statemachine.lab.questions.several_sides import measured_quantities, sides_gap
+from statemachine.lab.questions.several_sides import Two, measured_quantities, sides_gap
+from statemachine.show.blocks import Table
 from statemachine.show.first_screen import LINES, lines_of
 
 from .support.backends import BOTH, registered
 from .support.claims import assert_has, refused
 from .support.files import written, written_all
 from .support.processes import Cli
+from .support.requirements import need_engine
 from .support.screens import wide_lines
 
 HIDDEN = "tests.support.hidden_world:load"
@@ -58,6 +70,13 @@ def damped(pendulum: Path) -> EnginesResult:
 def coarse(pendulum: Path) -> EnginesResult:
     """Of three pendulums one with a long timestep."""
     return falling(pendulum, "timestep=0.01", "timestep=0.0005", "timestep=0.00025")
+
+
+@pytest.fixture(scope="module")
+def drifting(pendulum: Path) -> EnginesResult:
+    """Of three pendulums one with a long timestep, and another with a little more damping."""
+    options = "timestep=0.01", "timestep=0.0005", "timestep=0.0005 damping=0.0002"
+    return falling(pendulum, *options)
 
 
 @pytest.fixture(scope="module")
@@ -172,6 +191,63 @@ def test_a_side_that_is_odd_at_some_steps_alone_is_not_steady(damped: EnginesRes
     assert not replace(damped.finer, odd=("damping=0.3", "", "")).is_steady
 
 
+def test_where_finer_steps_change_the_odd_side_which_one_is_odd_is_unclear(
+    drifting: EnginesResult,
+) -> None:
+    """What the long timestep makes shrinks with it, and what the damping makes does not."""
+    assert drifting.finer is not None
+    assert (drifting.state, drifting.finer.state) == ("unclear", "changes")
+    assert drifting.finer.odd[0] == drifting.labels[0]
+    assert drifting.finer.odd[-1] == ""
+
+
+def test_steps_are_refined_to_the_end_where_they_change_the_odd_side(
+    drifting: EnginesResult,
+) -> None:
+    assert drifting.finer is not None
+    assert drifting.finer.finer == FINER
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "odd", "state"),
+    [
+        (("discretisation", "discretisation", "stays"), "aaa", "vanishes"),
+        (("discretisation", "rounding", "stays"), "a  ", "vanishes"),
+        (("stays", "in part", "rounding"), "aaa", "stays"),
+        (("stays", "in part", "rounding"), "aba", "changes"),
+        (("stays", "stays", "rounding"), "a a", "changes"),
+        (("stays", "unclear", "rounding"), "aaa", "unclear"),
+        (("stays", "discretisation", "rounding"), "aaa", "unclear"),
+    ],
+)
+def test_what_becomes_of_the_odd_side(
+    verdicts: tuple[LimitVerdict, ...], odd: str, state: OddGapState
+) -> None:
+    pairs = zip(("ab", "ac", "bc"), verdicts, strict=True)
+    gaps = tuple(
+        FinerGap(left, right, (1.0, 1.0, 1.0), verdict) for (left, right), verdict in pairs
+    )
+    assert FinerSides(FINER[:3], gaps, tuple(each.strip() for each in odd), ()).state == state
+
+
+def test_a_gap_is_judged_by_all_steps_that_were_run(pendulum: Path) -> None:
+    """The first three gaps of this one are level, and its five have no steady order."""
+    files = [f"{pendulum} damping={value}" for value in (0.1, 0.3)]
+    two = lab.compare(*files, what="fall", seconds=0.2, chaos=False).comparison
+    unsteady, wild = (1, 1.07, 0.93, 0.855, 1.007), (1, 3, 1, 3, 1)
+    pairs = {(0, 1): unsteady, (0, 2): unsteady, (1, 2): wild}
+
+    def run(pair: Two, finer: int) -> Comparison:
+        factor = pairs[pair][FINER.index(finer)]
+        agreements = [replace(a, max=factor * a.max) for a in two.agreements]
+        return replace(two, agreements=tuple(agreements))
+
+    compared = dict.fromkeys(pairs, two)
+    quantities = measured_quantities(compared, dict.fromkeys(pairs))
+    result = finer_sides(compared, run, quantities, "run", {0: "a", 1: "b", 2: "c"})
+    assert [gap.verdict for gap in result.gaps] == ["unclear"] * 3
+
+
 def test_what_the_gap_comes_from_is_looked_for(damped: EnginesResult) -> None:
     assert damped.origin is not None
     assert_has(damped.origin, cause="damping of swing", is_located=False, cited_case=None)
@@ -252,6 +328,29 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 @pytest.mark.parametrize(("ask", "says"), REFUSED, ids=[says for _, says in REFUSED])
 def test_what_cannot_have_an_odd_one_is_refused(ask: Callable[[], object], says: str) -> None:
     refused(((BadInputError, UnknownNameError), says, ask))
+
+
+@pytest.fixture
+def damper(pendulum: Path) -> Path:
+    """A file that MuJoCo and PyBullet take, and MotrixSim does not."""
+    need_engine("motrix")
+    drive = '<actuator><damper joint="swing" kv="1" ctrlrange="0 1"/></actuator></mujoco>'
+    return written(pendulum.parent / "damper.xml", PENDULUM.replace("</mujoco>", drive))
+
+
+def test_of_all_engines_one_that_cannot_load_the_file_is_told_with_the_others(
+    damper: Path,
+) -> None:
+    call = partial(lab.engines, damper, what="gravity")
+    refused((BadInputError, "without motrix: --backend mujoco --backend pybullet", call))
+
+
+def test_a_file_that_a_side_cannot_load_is_told_before_anything_runs(
+    damper: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(two_sides, "answer", lambda *_: pytest.fail("something ran"))
+    sides = [f"{damper}@{name}" for name in (*BOTH, "motrix")]
+    refused((ModelError, "MotrixSim cannot read", lambda: lab.engines(sides, what="gravity")))
 
 
 def typed(*words: str) -> Any:
@@ -346,6 +445,20 @@ def test_the_arm_on_engines_as_they_come(here: Cli) -> None:
 def test_the_page_fits(damped: EnginesResult, details: bool) -> None:
     assert wide_lines(damped.text(details)) == []
     assert lines_of(page(damped)) <= LINES
+
+
+@pytest.mark.parametrize("details", [False, True])
+def test_the_page_shows_who_is_odd_at_each_step_where_that_changes(
+    drifting: EnginesResult, details: bool
+) -> None:
+    assert drifting.finer is not None
+    (table,) = (
+        each
+        for each in drifting.page(details).blocks
+        if isinstance(each, Table) and each.rows[-1][0] == "odd is"
+    )
+    assert [*table.rows[-1][2:]] == [label or "none" for label in drifting.finer.odd]
+    assert wide_lines(drifting.text(details)) == []
 
 
 def test_the_first_line_names_the_odd_one_and_its_gap(damped: EnginesResult) -> None:

@@ -20,7 +20,7 @@ from statemachine.course.grading.faults.examination import Examination, FailedTe
 from statemachine.course.grading.faults.patches import PATCHES
 from statemachine.course.grading.faults.run import examine
 from statemachine.course.grading.page import faults_page
-from statemachine.errors import BadInputError, EngineError
+from statemachine.errors import BadInputError, EngineError, UnsupportedError
 
 from .support.backends import each_of_both
 from .support.claims import assert_has, refused
@@ -28,7 +28,7 @@ from .support.files import written_all
 from .support.motions import opened
 from .support.pages import shown
 from .support.processes import of_python
-from .support.requirements import ROOT
+from .support.requirements import ROOT, need_engine
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -332,6 +332,21 @@ def test_another_pytests_settings_do_not_disturb(
     monkeypatch.setenv("PYTEST_PLUGINS", "no_such_plugin")
     assert examine(odd, only=["xyzw"]).failures == ()
     assert {entry.name for entry in odd.parent.iterdir()} == {path.name, *beside}
+
+
+def test_a_backend_into_which_no_fault_can_be_put_is_unsupported() -> None:
+    call = partial(examine, EXERCISE, "motrix")
+    error = refused((UnsupportedError, "backends of mujoco and pybullet", call))
+    assert_has(error, backend="motrix", feature="check --faults")
+
+
+@pytest.mark.slow
+def test_the_tests_of_a_student_run_on_a_healthy_arm_of_any_engine(write: Write) -> None:
+    need_engine("motrix")
+    file = write("def test_engine(model): assert model.backend == 'motrix'")
+    plugin = "statemachine.course.grading.faults.plugin"
+    words = ("-p", "no:cacheprovider", "-p", plugin, "--engine", "motrix", file)
+    of_python("-m", "pytest", "-q", *words, folder=file.parent, code=0)
 
 
 # The page and the command.

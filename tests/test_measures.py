@@ -228,6 +228,14 @@ def test_two_robots_have_the_floors_of_the_smaller_one() -> None:
     assert RobotScale(2.0, 0.5).smaller(RobotScale(1.0, 0.7)) == RobotScale(1.0, 0.5)
 
 
+def test_a_step_in_single_precision_has_higher_floors() -> None:
+    """A millionth of 0.5 m, of a radian and of g, where the other side has a billionth."""
+    single = RobotScale(2.0, 0.5).smaller(RobotScale(2.0, 0.5, step_share=1e-6))
+    assert (single.length, single.angle) == pytest.approx((5e-7, 1e-6))
+    assert single.acceleration == pytest.approx(9.81e-6)
+    assert single.force == RobotScale(2.0, 0.5).force
+
+
 @pytest.mark.parametrize(
     ("floor", "unknown", "known"),
     [(force_floor, 1e-6, SINGLE * 19.62), (energy_floor, 1e-9, SINGLE * 19.62 * 0.5)],

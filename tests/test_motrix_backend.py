@@ -582,7 +582,7 @@ def test_contacts_can_be_switched_off(box: sm.Model) -> None:
 
 
 def test_a_model_without_a_joint_is_refused_for_it_cannot_step_one(tmp_path: Path) -> None:
-    refused((UnsupportedError, "without any", lambda: small(tmp_path, '<geom size="1"/>')))
+    refused((UnsupportedError, "without joints", lambda: small(tmp_path, '<geom size="1"/>')))
 
 
 def test_limits_can_be_switched_off(tmp_path: Path) -> None:

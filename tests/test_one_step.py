@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import statemachine as sm
-from statemachine.errors import BadInputError
+from statemachine import lab
+from statemachine.errors import BadInputError, EngineWarning
 from statemachine.lab.compare import rerun_of
 from statemachine.lab.compare.one_step import RELATIVE, OneStep, StageGap, one_step
 from statemachine.lab.compare.sides import Request
@@ -249,3 +251,25 @@ def test_one_step_starts_the_second_file_with_the_activations_of_the_first(
         for name, b, rows in zip(("one.xml", "two.xml"), order, (drives, drives[::-1]), strict=True)
     )
     assert one_step(rerun(one), two).first is None
+
+
+@pytest.fixture(scope="module")
+def motrix_steps() -> OneStepResult:
+    """Steps of the arm that touches its floor, on MuJoCo and on MotrixSim."""
+    need_engine("motrix")
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):
+        return lab.one_step(backends=("mujoco", "motrix"), what="hold", seconds=0.4)
+
+
+def test_single_precision_is_no_difference_of_a_stage(motrix_steps: OneStepResult) -> None:
+    """MotrixSim finds the same contacts to 5e-8 m, and makes other forces of them."""
+    assert motrix_steps.first is not None
+    assert motrix_steps.first.stage == "contact force"
+
+
+def test_what_the_velocity_changes_by_is_not_compared_with_an_acceleration(
+    motrix_steps: OneStepResult,
+) -> None:
+    gaps = {gap.stage: gap for gap in motrix_steps.stages}
+    assert not gaps["acceleration"].is_available
+    assert gaps["velocity update"].is_available

@@ -81,6 +81,12 @@ def test_stages_are_counted_by_what_became_of_them() -> None:
     assert content(steps_of(SAME)).of_usual is None
 
 
+def test_what_was_not_compared_before_the_first_difference_is_not_called_equal() -> None:
+    assert content(steps_of(SAME, NONE, BIAS)).has_all_before
+    assert not content(steps_of(SAME, UNTOLD, BIAS)).has_all_before
+    assert content(steps_of(SAME, BIAS, UNTOLD)).has_all_before
+
+
 def test_the_null_is_that_of_most_tolerances() -> None:
     """Of kinematics a fifth of it, of the bias a tenth."""
     null = content(ALL).null

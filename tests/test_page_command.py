@@ -105,3 +105,10 @@ def test_no_folder_of_this_machine_is_on_a_page(run: Request, what: object, tmp_
     assert "/" not in command
     assert "page.html" in command
     assert "DIR" in command
+
+
+def test_a_call_of_python_has_the_tolerances_and_the_uncertainty(run: Request) -> None:
+    what = lambda model, data: None  # noqa: E731
+    asked = CompareRequest(Request((what,), sides=run.sides), {"joint": 0.01}, None)
+    command = page_command(asked, None, Path("page.html"))
+    assert "tolerances={'joint': 0.01}, chaos=False" in command

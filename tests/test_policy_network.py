@@ -41,7 +41,7 @@ def remembering(folder: Path, batch: int | str = 1) -> Path:
 def test_it_computes_what_its_file_says(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     weights, offset, observation = (random.normal(size=size) for size in ((5, 3), (3,), (5,)))
-    network = Network(linear_network(tmp_path, weights, offset))
+    network = Network(linear_network(tmp_path, weights, offset.tolist()))
     assert network(observation) == pytest.approx(observation @ weights + offset, abs=1e-5)
 
 

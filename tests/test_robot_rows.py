@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,11 +39,13 @@ from statemachine.lab.robots import (
     gaps,
 )
 from statemachine.lab.robots.request import RobotsRequest
+from statemachine.lab.robots.survey import reason_in_general
 from statemachine.lab.robots.table import read_table, write_table
 from statemachine.processes import sandbox
 
 from .support.backends import BOTH
 from .support.files import written
+from .support.requirements import need_engine
 from .support.small_models import loaded
 
 FAR = RunGap(400, 1e-3, moved=1.0)
@@ -118,6 +120,14 @@ def test_a_gap_is_wrong_where_our_backend_computes_the_joints(backend: str, is_w
     assert bool(ExaminedModel("", "", "", backends=rows).wrong("mujoco")) is is_wrong
 
 
+@pytest.mark.parametrize(("backend", "is_wrong"), [("pybullet", True), ("motrix", False)])
+def test_an_explosion_is_wrong_where_our_backend_computes_the_joints(
+    backend: str, is_wrong: bool
+) -> None:
+    rows = {backend: BackendRow(with_contacts=RunGap(400, 1e3))}
+    assert bool(ExaminedModel("", "", "", backends=rows).wrong("mujoco")) is is_wrong
+
+
 def test_a_part_is_a_model_where_it_loads_and_moves() -> None:
     part = ExaminedModel("a.xml", "", "", part_of="b.xml")
     assert not part.is_model
@@ -153,6 +163,38 @@ def test_the_sums_of_engines_count_each_thing_by_itself() -> None:
         RefusedFeature("tendon", models=2, alone=1, loaded_without_contacts=1),
         RefusedFeature("mesh", models=1, alone=0, loaded_without_contacts=0),
     )
+
+
+@pytest.mark.parametrize(
+    ("refusal", "reason"),
+    [
+        ("MuJoCo cannot read /a b/c.xml: no mesh 'hip'", "no mesh …"),
+        (
+            "MotrixSim cannot read c.xml: failed to load scene, Invalid inertia for Link at link "
+            'index 26 ("hip"): not positive [[0.0, 0.0, 0.0]]',
+            "Invalid inertia for Link at link index … (…): not positive …",
+        ),
+        (
+            "MotrixSim cannot read C:\\a.xml: unknown variant `include`, expected one of `body`",
+            "unknown variant `include`",
+        ),
+        ("MotrixSim cannot read c.xml: Invalid extension: /a/b.msh", "Invalid extension: …"),
+        ("it is out of order", "it is out of order"),
+    ],
+)
+def test_a_reason_in_general_has_nothing_of_one_file(refusal: str, reason: str) -> None:
+    assert reason_in_general(refusal) == reason
+
+
+@pytest.mark.parametrize(("default", "has_reason"), [("", True), ("no mesh", False)])
+def test_why_a_file_is_not_read_is_told_where_the_default_engine_reads_it(
+    default: str, has_reason: bool
+) -> None:
+    unread = BackendRow(refusal="motrix cannot read a.xml: no box 3", features=("not read",))
+    backends = {"mujoco": BackendRow(refusal=default), "motrix": unread}
+    survey = Survey("mujoco", (ExaminedModel("a.xml", "", "", backends=backends),), (), "")
+    (refused,) = survey.refused_features("motrix")
+    assert refused.feature == ("not read: no box …" if has_reason else "not read")
 
 
 def test_a_survey_of_one_model_has_no_parts() -> None:
@@ -499,11 +541,12 @@ def examined(
     patch: pytest.MonkeyPatch,
     loads: Callable[..., Model],
     run_gap: Callable[..., RunGap] = lambda *_, **__: RunGap(1),
+    backends: Sequence[str] = BOTH,
 ) -> tuple[ExaminedModel, list[str]]:
     """Return the row of a small model that is loaded so, and the parts that were told."""
     parts: list[str] = []
     patch.setattr(examine, "load_to_run", loads)
-    patch.setattr(examine, "backend_names", lambda: list(BOTH))
+    patch.setattr(examine, "backend_names", lambda: list(backends))
     patch.setattr(gaps, "run_gap", run_gap)
     patch.setattr(examine, "certify", lambda *_, **__: 1 / 0)
     path = written(folder / "tiny.xml", TINY)
@@ -615,3 +658,22 @@ def test_a_restore_that_parts_from_its_run_is_told_where_equality_is_promised(
     monkeypatch.setattr(examine, "future", future)
     row, _ = examined(tmp_path, monkeypatch, load_with({}))
     assert row.backends[backend].restores is restores
+
+
+@pytest.mark.parametrize(("backend", "is_fault"), [("pybullet", True), ("motrix", False)])
+def test_a_run_that_diverges_is_a_fault_where_our_backend_computes_the_joints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backend: str, is_fault: bool
+) -> None:
+    need_engine(backend)
+
+    def diverging(model: Model, *_: object) -> np.ndarray:
+        if model.backend == backend:
+            raise DivergedError("it went beyond max_qvel")
+        return np.zeros(3)
+
+    monkeypatch.setattr(examine, "future", diverging)
+    backends = ("mujoco", backend)
+    row, _ = examined(tmp_path, monkeypatch, load_with({}), backends=backends)
+    assert any(backend in fault for fault in row.faults) is is_fault
+    assert row.backends[backend].restores is None
+    assert row.backends["mujoco"].restores is True

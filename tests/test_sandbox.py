@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import fields
 from functools import partial
@@ -319,6 +320,25 @@ def test_a_view_is_written_outside_in(tmp_path: Path) -> None:
 
 
 # What processes share
+
+
+def _grow() -> None:
+    """Let joblib find, after the next call in this process, that it has grown too much."""
+    executor = sys.modules["joblib.externals.loky.process_executor"]
+    vars(executor).update(_MAX_MEMORY_LEAK_SIZE=-(10**12), _MEMORY_LEAK_CHECK_DELAY=0.0)
+
+
+def test_a_process_that_has_grown_is_replaced_without_a_word() -> None:
+    pytest.importorskip("psutil")  # without it joblib does not look
+    pytest.importorskip("joblib")
+    with (
+        warnings.catch_warnings(record=True, action="always") as told,
+        worker_processes(1) as (worker,),
+    ):
+        calls = [worker(_grow), *(worker(os.getpid) for _ in range(8))]
+        numbers = {call.result(timeout=60) for call in calls[1:]}
+    assert len(numbers) > 1
+    assert told == []
 
 
 def test_a_worker_that_ends_loses_nothing_of_another() -> None:

@@ -29,11 +29,13 @@ from statemachine.lab.why.explained_gap import explained_gap
 from statemachine.lab.why.page import page
 from statemachine.lab.why.setup import NONE
 from statemachine.lab.why.split import GapSplit, split_of
-from statemachine.lab.why.split_page import split_blocks
+from statemachine.lab.why.split_page import SplitParagraphs, split_blocks
 from statemachine.lab.why.trials import Trials
 from statemachine.show.blocks import Page
+from statemachine.show.templates import render_blocks
 
 from .support.backends import RELEASES, registered
+from .support.claims import assert_in
 from .support.explained import ARM, explained
 from .support.files import written
 from .support.hidden_world import ExampleModel
@@ -41,6 +43,7 @@ from .support.hidden_world import load as load_hidden
 from .support.pages import shown
 from .support.processes import Cli
 from .support.requirements import ROOT, need_engine
+from .support.small_models import IMPLICIT, mjcf
 
 OLD = RELEASES[0]
 KP = 'kp="998.22" kv="2.731" '
@@ -206,7 +209,85 @@ def test_between_two_other_engines_the_figures_are_made_the_same(arm: Model) -> 
     assert parts(split) == pytest.approx({"import": 0, "joint dynamics": 1, "contact": 0}, abs=0.01)
 
 
+def softer(lost: Path) -> Path:
+    """Return the arm's file with softer servos, and dampers of their own."""
+    text = lost.read_text("utf-8").replace("<position ", '<position kp="500" kv="2.731" ')
+    return written(lost.parent / "softer.xml", text)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "figures_of"),
+    [
+        ("mujoco", OLD, "right"),
+        (OLD, "mujoco", "left"),
+        (OLD, "pybullet", "left"),
+        ("mujoco", "mujoco", None),
+    ],
+)
+def test_whose_figures_both_engines_have_is_told(
+    left: str, right: str, figures_of: str | None, lost: Path, old_releases: None
+) -> None:
+    need_engine("pybullet")
+    split, _ = divided(sm.load("so101", backend=left), sm.load(softer(lost), backend=right))
+    assert split.figures_of == figures_of
+
+
+def test_beside_the_installed_mujoco_the_order_of_sides_does_not_matter(
+    lost: Path, old_releases: None
+) -> None:
+    one, other = sm.load("so101"), sm.load(softer(lost), backend=OLD)
+    assert parts(divided(one, other)[0]) == pytest.approx(parts(divided(other, one)[0]), abs=1e-9)
+
+
+def test_where_nothing_touches_no_part_is_called_contact(lost: Path, old_releases: None) -> None:
+    """Import and joint dynamics make some of the gap together: the arm has no floor here."""
+    split, _ = divided(sm.load("so101"), sm.load(softer(lost), backend=OLD))
+    assert abs(parts(split)["contact"]) > 0.1
+    assert not split.touches
+    page = SplitParagraphs(split, "1°", "short")
+    assert page.is_without_contact
+    assert not replace(page, split=replace(split, touches=True)).is_without_contact
+
+
 # What cannot be separated.
+
+
+BAR = '<geom type="box" size=".15 .02 .02" pos=".15 0 0" mass=".3"/>'
+SWING = '<joint name="j" axis="0 1 0" damping=".01"/>'
+END = f'<body name="end" pos=".3 0 0"><joint name="k" axis="0 1 0"/>{BAR}</body>'
+
+
+@pytest.fixture
+def bars(tmp_path: Path, old_releases: None) -> GapSplit:
+    """Return the split of a gap of which neither side runs on the installed MuJoCo.
+
+    Only the right has a joint k.
+    """
+    need_engine("pybullet")
+    left, right = (
+        written(
+            tmp_path / name,
+            mjcf(
+                f'<body><joint name="j" axis="0 1 0" damping=".01"/>{BAR}{end}</body>', "", IMPLICIT
+            ),
+        )
+        for name, end in (("one.xml", ""), ("two.xml", END))
+    )
+    split, _ = divided(sm.load(left, backend="pybullet"), sm.load(right, backend=OLD), "fall")
+    assert split is not None
+    return split
+
+
+def test_figures_that_cannot_be_made_the_same_leave_import_alone(bars: GapSplit) -> None:
+    share = parts(bars)
+    assert (bars.obstacle, share["joint dynamics"], share["contact"]) == ("figures", None, None)
+    assert share["import"] + bars.together == 1
+
+
+def test_a_page_names_the_figures_that_cannot_be_made_the_same(bars: GapSplit) -> None:
+    text = shown(Page("", "", render_blocks(SplitParagraphs(bars, "70.8°", "short"))))
+    assert bars.detail == "extra joint of k"
+    assert_in(" ".join(text.split()), "Joint dynamics and contact cannot be separated", bars.detail)
 
 
 def test_what_a_reader_does_not_tell_cannot_be_separated(arm: Model) -> None:
@@ -262,7 +343,8 @@ def test_json_has_the_three_shares(lost: Path, here: Cli) -> None:
     need_engine("pybullet")
     done = here("compare", "hold", "so101", f"{lost}@pybullet", "--why", "--no-chaos", "--json")
     split = json.loads(done.stdout)["split"]
-    assert split.keys() == {"readers", "reads_alike", "parts", "obstacle", "detail", "together"}
+    names = {"readers", "reads_alike", "parts", "figures_of", "touches", "obstacle", "detail"}
+    assert split.keys() == {*names, "together"}
     assert [part["name"] for part in split["parts"]] == ["import", "joint dynamics", "contact"]
     assert all(part.keys() == {"name", "share"} for part in split["parts"])
 

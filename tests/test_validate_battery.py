@@ -197,6 +197,19 @@ def test_a_record_is_found_by_engine_and_integrator_before_integrator_alone() ->
     assert fall(expected={"RK4": exact()}).expectation("mujoco", "Euler") is None
 
 
+def test_an_engine_that_reads_no_integrator_has_records_of_its_own_alone() -> None:
+    case = fall(expected={"own *": exact(3.0), "*": exact()})
+    assert case.expectation("own", "own") == exact(3.0)
+    assert case.expectation("other", "own") is None
+
+
+def test_an_engine_as_it_comes_has_the_record_of_its_name_where_it_has_no_other() -> None:
+    records = {"first *": exact(1.0), "first:engine own": exact(2.0), "second *": exact(3.0)}
+    case = fall(expected=records)
+    assert case.expectation("first:engine", "own") == exact(2.0)
+    assert case.expectation("second:engine", "own") == exact(3.0)
+
+
 def test_zero_crossings_are_those_of_a_sine() -> None:
     times = np.arange(0.0, 7.0, 0.01)
     samples = Samples(times, np.sin(times - 1.0))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
 from statemachine.backends import parse_backend
 from statemachine.lab.validate.battery import CaseResult, ValidateRequest, answer, run_case
+from statemachine.lab.validate.case import Expectation
 from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.variants import Variant, variants_of
 from tools.validate_table import (
@@ -27,10 +29,21 @@ ROWS = rows_in(TARGET.read_text("utf-8"))
 QUICK = ("free-fall", "spring-energy", "pendulum-60", "bounce", "torque-moving")
 
 
+@cache
+def ways_of(backend: str) -> list[Variant]:
+    """Return the ways in which a backend steps; each is tried once."""
+    return variants_of(parse_backend(backend))
+
+
 def row_of(case: str, backend: str, integrator: str) -> TableRow:
     rows = [row for row in ROWS if row.case == case and row.is_of(backend, integrator)]
     assert len(rows) == 1
     return rows[0]
+
+
+def is_rounded(record: Expectation | None) -> bool:
+    """Whether rounding is all that is seen, whose digits and size are of the processor."""
+    return record is not None and record.rounded is not None
 
 
 def is_rough(result: CaseResult) -> bool:
@@ -43,6 +56,8 @@ def faults_of(result: CaseResult) -> list[str]:
     row = row_of(result.name, result.backend, result.integrator)
     faults: list[str] = []
     verdicts = {row.verdict, result.verdict}
+    if is_rounded(result.expectation):
+        return [] if verdicts <= {"exact", "bounded"} else [f"verdict {result.verdict}"]
     is_near = is_rough(result) and verdicts <= {
         "bounded",
         "converges",
@@ -68,12 +83,13 @@ def faults_of(result: CaseResult) -> list[str]:
 def test_each_engine_and_integrator_has_one_row_of_a_case_with_its_cause(name: str) -> None:
     for word in BACKENDS:
         need_engine(word.partition(":")[0])
-        for variant in variants_of(parse_backend(word)):
+        for variant in ways_of(word):
             row = row_of(name, word, variant.integrator)
             expectation = CASES[name].expectation(word, variant.integrator)
             cause = "none" if expectation is None else expectation.cause
             assert row.cause == ("–" if cause == "none" else cause)
-            assert expectation is None or row.verdict == expectation.verdict
+            if expectation is not None and not is_rounded(expectation):
+                assert row.verdict == expectation.verdict
 
 
 def test_the_table_has_no_row_of_another_case() -> None:

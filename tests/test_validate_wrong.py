@@ -13,7 +13,9 @@ from statemachine.lab.validate.variants import Variant, variants_of
 from tools.validate_faults.__main__ import blind, nowhere
 from tools.validate_faults.matrix import Cell, outcome_of
 from tools.validate_faults.other_cases import OTHER_CASES
-from tools.validate_faults.table import FAULTS, Fault
+from tools.validate_faults.table import FAULTS, Fault, Outcome
+
+from .support.requirements import need_engine
 
 NAMES = [fault.name for fault in FAULTS]
 
@@ -42,7 +44,9 @@ def test_case_of_a_wrong_parameter_has_that_parameter(fault: Fault) -> None:
 
 
 def test_no_wrong_parameter_is_on_record_as_missed() -> None:
-    records = {fault.on_pybullet for fault in FAULTS} | {fault.as_it_comes for fault in FAULTS}
+    records = set[Outcome]()
+    for fault in FAULTS:
+        records |= {fault.on_pybullet, fault.as_it_comes, fault.on_motrix}
     assert records == {"noticed", "not read", "wrong anyway", "refused"}
 
 
@@ -65,6 +69,15 @@ def test_wrong_parameter_is_noticed_on_pybullet_if_it_is_read(fault: Fault) -> N
 @pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
 def test_wrong_parameter_is_not_missed_where_pybullet_as_it_comes_is_right(fault: Fault) -> None:
     assert outcomes(fault, "pybullet:engine") == {fault.as_it_comes}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
+def test_wrong_parameter_is_noticed_on_motrix_if_it_is_read_and_the_case_is_right(
+    fault: Fault,
+) -> None:
+    need_engine("motrix")
+    assert outcomes(fault, "motrix") == {fault.on_motrix}
 
 
 def test_for_every_case_a_wrong_parameter_is_named_that_it_notices() -> None:

@@ -23,6 +23,7 @@ from statemachine.lab.recordings import record_scenario, rerun
 from statemachine.lab.runs.scenarios import Scenario, scenario
 from statemachine.lab.why import Explanation, WhyRequest, explain, search
 from statemachine.lab.why import page as report
+from statemachine.lab.why.gap import Measure
 from statemachine.lab.why.settings import NEEDS, TITLES
 from statemachine.lab.why.shapley import shapley
 from statemachine.show.as_json import dumps
@@ -683,3 +684,21 @@ def test_files_and_settings_of_an_engine_are_explained_together(
     result = explain(WhyRequest(arm, right, HOLD, uncertain=None))
     assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("measure", ["worst", "end"])
+def test_the_joint_that_is_farthest_apart_is_named(arm: Model, measure: Measure) -> None:
+    """Each joint alone is less far apart than the one that is named, which is all of the gap."""
+    other = arm.replace(damping=[0.6, 0.6, 1.4, 0.6, 0.6, 0.6])
+    result = explain(WhyRequest(arm, other, HOLD, measure=measure, uncertain=None))
+    alone: dict[str, float] = {}
+    for name in arm.joint_names:
+        asked = WhyRequest(arm, other, HOLD, quantity=name, uncertain=None)
+        alone[name] = explain(asked).first[name].worst
+    assert result.joint == max(alone, key=alone.__getitem__)
+    assert alone[result.joint] == result.first["joints"].worst
+
+
+def test_of_another_quantity_no_joint_is_named(arm: Model) -> None:
+    request = WhyRequest(arm, arm.replace(damping=2.0), HOLD, quantity="gripperframe")
+    assert explain(replace(request, uncertain=None)).joint == ""

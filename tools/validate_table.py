@@ -25,7 +25,7 @@ from statemachine.lab.validate.verdict import CaseMeasurement
 from statemachine.measures.text import display_unit, milliseconds
 from statemachine.show.blocks import Table
 
-BACKENDS = ("mujoco", "pybullet", "pybullet:engine")
+BACKENDS = ("mujoco", "pybullet", "pybullet:engine", "motrix")
 TIMESTEP = 0.002  # [s] at which the error is shown: the one that MuJoCo starts with
 TARGET = Path(__file__).parent.parent / "docs" / "validate.md"
 MARK = "<!-- What follows is made by `python -m tools.validate_table`. -->"

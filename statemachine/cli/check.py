@@ -44,7 +44,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="the student's file, like step_loop.py, or the folder that it is in; or those of a "
         "class, each in the folder or in a folder of its own there",
     )
-    add_backend(parser, f"mujoco or pybullet (default {DEFAULT})")
+    add_backend(parser, f"mujoco, pybullet or motrix (default {DEFAULT})")
     parser.add_argument(
         "--time-limit",
         type=typed_float,

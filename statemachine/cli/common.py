@@ -80,7 +80,7 @@ class TerminalReporter:
 
 
 # Options that several commands have.
-_RUNS = "mujoco, pybullet or a release, mujoco==3.3.7"
+_RUNS = "mujoco, pybullet, motrix or a release, mujoco==3.3.7"
 _EACH = f"all: those that are installed; may be repeated (default {DEFAULT})"
 ONE_BACKEND = f"{_RUNS}; pybullet:engine: as its own users meet it (default {DEFAULT})"
 EACH_BACKEND = f"{_RUNS}; pybullet:engine: as its own users meet it; {_EACH}"

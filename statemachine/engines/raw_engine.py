@@ -39,6 +39,8 @@ class RawEngine(CompiledModels):
         steps: Names of its functions f(model, data[, nstep]) that advance time.
         forwards: Names of those f(model, data) that only recompute.
         survives_fork: Whether a model that ran in a process may run in a fork of it.
+        tells_acceleration: Whether qacc is what the forces give, before it is integrated; else it
+            is what the velocities change by in the step.
     """
 
     emulated = False
@@ -47,6 +49,7 @@ class RawEngine(CompiledModels):
     steps: tuple[str, ...] = ()
     forwards: tuple[str, ...] = ()
     survives_fork = True
+    tells_acceleration = True
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -13,7 +13,8 @@ Of one step from one state, where nothing has had the time to add up, it is a bi
 acceleration, of the robot's size for a place. In 2 s such an acceleration makes 20 nm. A force has
 the floor of the acceleration, times the inertia that it acts on, so that a light wrist has a lower
 one than the shoulder. It is far above what double precision makes of a step (1e-16, times some
-thousands), and below what a solver leaves of a contact (MuJoCo's stops at 1e-8).
+thousands), and below what a solver leaves of a contact (MuJoCo's stops at 1e-8). Where a side
+computes in single precision it is a millionth: a step leaves no more.
 """
 
 from __future__ import annotations
@@ -42,10 +43,12 @@ class RobotScale:
     Attributes:
         mass: Of all that can move [kg].
         size: The diagonal of the box around it [m], above zero.
+        step_share: The share that is the floor of one step.
     """
 
     mass: float
     size: float
+    step_share: float = STEP_SHARE
 
     @classmethod
     def of(cls, model: Model, positions: Array) -> RobotScale:
@@ -64,11 +67,16 @@ class RobotScale:
         if model.compiled is not None and moving:
             geoms = np.isin(model.geom_bodyid, sorted(moving))
             size = max(size, 2 * float(model.compiled.geom_rbound[geoms].max(initial=0.0)))
-        return cls(mass, size if size > 0 else _UNKNOWN_SIZE)
+        step_share = max(STEP_SHARE, model.capabilities.rounding)
+        return cls(mass, size if size > 0 else _UNKNOWN_SIZE, step_share)
 
     def smaller(self, other: RobotScale) -> RobotScale:
-        """Return the scale of two robots that are compared: floors are those of the smaller one."""
-        return RobotScale(min(self.mass, other.mass), min(self.size, other.size))
+        """Return the scale of two robots that are compared.
+
+        Floors are those of the smaller one, and of the less precise one.
+        """
+        step_share = max(self.step_share, other.step_share)
+        return RobotScale(min(self.mass, other.mass), min(self.size, other.size), step_share)
 
     @property
     def weight(self) -> float:
@@ -91,7 +99,7 @@ class RobotScale:
 
         The floor of a force on it is that, times the inertia of its degree of freedom.
         """
-        return STEP_SHARE * GRAVITY
+        return self.step_share * GRAVITY
 
     @property
     def angular_acceleration(self) -> float:
@@ -100,17 +108,17 @@ class RobotScale:
         It is that of a pendulum as long as the robot. The floor of a torque is that, times the
         inertia of its degree of freedom.
         """
-        return STEP_SHARE * GRAVITY / self.size
+        return self.step_share * GRAVITY / self.size
 
     @property
     def length(self) -> float:
         """Return the floor of a place, or of a depth, in one step [m]."""
-        return STEP_SHARE * self.size
+        return self.step_share * self.size
 
     @property
     def angle(self) -> float:
         """Return the floor of a rotation, in one step [rad]."""
-        return STEP_SHARE
+        return self.step_share
 
 
 def force_floor(robot: RobotScale | None) -> float:

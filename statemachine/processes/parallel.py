@@ -106,12 +106,15 @@ def worker_processes(jobs: int) -> Iterator[list[Callable[..., Future[Any]]]]:
                 executors[worker] = new()
                 return executors[worker].submit(*call)
 
-    try:
-        yield [partial(submit, worker) for worker in range(jobs)]
-    finally:
-        for executor in executors:
-            with suppress(Exception):
-                executor.shutdown(wait=True, kill_workers=True)
+    with warnings.catch_warnings():
+        # joblib replaces a process that has grown by 300 MB, as one does with many models.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+        try:
+            yield [partial(submit, worker) for worker in range(jobs)]
+        finally:
+            for executor in executors:
+                with suppress(Exception):
+                    executor.shutdown(wait=True, kill_workers=True)
 
 
 def _begin_trackers() -> None:

@@ -234,4 +234,5 @@ def run(policy: PolicyOnModel, steps: int, command: Sequence[float] = (0.0, 0.0,
             data.ctrl = ctrl
             step(model, data)
         end = np.array(data.qpos)
-    return PolicyRun(controller, *(np.array(column) for column in zip(*rows, strict=True)), end)
+    ctrls, positions, speeds = (np.array(column) for column in zip(*rows, strict=True))
+    return PolicyRun(controller, ctrls, positions, speeds, end)

@@ -26,7 +26,7 @@ from statemachine.lab.validate.variants import Variant, variants_of
 
 from .matrix import Cell, cells_of
 
-BACKENDS = ("mujoco", "pybullet", "pybullet:engine")
+BACKENDS = ("mujoco", "pybullet", "pybullet:engine", "motrix")
 
 
 def _variants(words: Sequence[str]) -> list[Variant]:

@@ -43,6 +43,7 @@ class Fault:
         with_discrete: What the case does on MuJoCo with its integrator discrete.
         on_pybullet: What the case does there with our backend.
         as_it_comes: What it does on PyBullet as its own users meet it.
+        on_motrix: What it does on MotrixSim.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Fault:
     with_discrete: Outcome = "noticed"
     on_pybullet: Outcome = "noticed"
     as_it_comes: Outcome = "noticed"
+    on_motrix: Outcome = "noticed"
 
 
 _BY_ONE_PERCENT = scaled(1.01)
@@ -99,13 +101,20 @@ FAULTS: tuple[Fault, ...] = (
         "centre of mass 1 % too far",
         "torque-at-rest",
         attribute("inertial", "pos", _BY_ONE_PERCENT),
+        on_motrix="refused",
     ),
     Fault(
         "centre of mass on the other side",
         "torque-moving",
         attribute("inertial", "pos", scaled(-1.0)),
+        on_motrix="refused",
     ),
-    Fault("link 1 % too long", "torque-at-rest", attribute("body", "pos", _BY_ONE_PERCENT)),
+    Fault(
+        "link 1 % too long",
+        "torque-at-rest",
+        attribute("body", "pos", _BY_ONE_PERCENT),
+        on_motrix="refused",
+    ),
     Fault(
         "armature 1 % too large",
         "armature",
@@ -215,6 +224,7 @@ FAULTS: tuple[Fault, ...] = (
         option("elliptic", "pyramidal"),
         on_pybullet="not read",
         as_it_comes="not read",
+        on_motrix="not read",
     ),
     Fault("size 1 % too large", "contact-depth", attribute("geom", "size", _BY_ONE_PERCENT)),
     # Orientation.
@@ -229,9 +239,19 @@ FAULTS: tuple[Fault, ...] = (
         attribute("geom body", "quat", scaled(-1.0, 1, 3)),
     ),
     # Of one case each, which notices no smaller or no other fault.
-    Fault("weight of a pin 1 % too large", "reaction-at-rest", _MASS, as_it_comes="refused"),
     Fault(
-        "gravity of a pin 1 % too large", "reaction-moving", _MORE_GRAVITY, as_it_comes="refused"
+        "weight of a pin 1 % too large",
+        "reaction-at-rest",
+        _MASS,
+        as_it_comes="refused",
+        on_motrix="refused",
+    ),
+    Fault(
+        "gravity of a pin 1 % too large",
+        "reaction-moving",
+        _MORE_GRAVITY,
+        as_it_comes="refused",
+        on_motrix="refused",
     ),
     Fault(
         "gravity 1 % too small of what swings on a pin",
@@ -270,7 +290,13 @@ FAULTS: tuple[Fault, ...] = (
         attribute("joint", "polycoef", _BY_ONE_PERCENT),
         as_it_comes="refused",
     ),
-    Fault("weight on a limit 1 % too large", "limit-force", _MASS, as_it_comes="refused"),
+    Fault(
+        "weight on a limit 1 % too large",
+        "limit-force",
+        _MASS,
+        as_it_comes="refused",
+        on_motrix="refused",
+    ),
     Fault("no limit", "limit-rebound", without("joint", "range limited"), as_it_comes="not read"),
     Fault(
         "time constant of friction 1 % too short",
@@ -278,6 +304,7 @@ FAULTS: tuple[Fault, ...] = (
         written("geom", "solref", "0.0198 1"),
         on_pybullet="not read",
         as_it_comes="not read",
+        on_motrix="wrong anyway",
     ),
     Fault(
         "slope of a roll 1 % too steep",
@@ -293,6 +320,7 @@ FAULTS: tuple[Fault, ...] = (
         "sphere-slides-then-rolls",
         written("geom", "shellinertia", "true"),
         as_it_comes="not read",
+        on_motrix="not read",
     ),
     Fault(
         "friction of a sphere 1 % too small",
@@ -320,6 +348,7 @@ FAULTS: tuple[Fault, ...] = (
         _MORE_GRAVITY,
         on_pybullet="wrong anyway",
         as_it_comes="wrong anyway",
+        on_motrix="wrong anyway",
     ),
     Fault(
         "friction a third of what it is",
@@ -337,6 +366,7 @@ FAULTS: tuple[Fault, ...] = (
         "tipping-threshold",
         gravity(scaled(1.1, 0, 1)),
         as_it_comes="wrong anyway",
+        on_motrix="wrong anyway",
     ),
     Fault("gravity a fifth too small", "rocking-energy", gravity(scaled(0.8))),
     Fault(

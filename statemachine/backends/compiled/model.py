@@ -283,8 +283,8 @@ def fastest(m: mujoco.MjModel) -> Array:
     def reached(force: Array, slope: Array) -> Array:
         total = np.where(straight, m.dof_M0 * np.linalg.norm(gravity(m)), 0.0)
         damping = m.dof_damping + m.dof_M0 / _DAY
-        np.add.at(total, dofs, (gear * force)[pulls])
-        np.add.at(damping, dofs, (gear**2 * slope)[pulls])
+        np.add.at(total, dofs, gear[pulls] * force[pulls])
+        np.add.at(damping, dofs, gear[pulls] ** 2 * slope[pulls])
         return total / np.maximum(damping, TINY)
 
     slope = np.maximum(-bias[:, 2], 0.0)

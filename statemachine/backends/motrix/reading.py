@@ -16,7 +16,7 @@ import numpy as np
 from ...interface import Array, JointType
 from ...interface.checks import unsupported_by
 from ...rotations import matrix_from_quat
-from ..compiled.actuators import ActivationKind
+from ..compiled.actuators import ActivationKind, GainKind
 from ..compiled.algebra import principal_axes
 from ..compiled.flags import DisableFlag
 from ..compiled.stages import set_constants
@@ -73,7 +73,7 @@ def read_file(path: Path, raw: MjModel) -> MotrixReading:
         reason = "the activation of an actuator can be neither read nor set in it"
         raise unsupported_by("motrix", "activation", reason)
     if not raw.nv:
-        raise unsupported_by("motrix", "joints", "it cannot step a model without any")
+        raise unsupported_by("motrix", "a model without joints", "it cannot step one")
     world, lines = EngineModel(path).world()
     engine = EngineModel(path, _of_urdf(world, raw) if path.suffix.lower() == ".urdf" else {})
     world, scene = engine.edited_world(), engine.scene
@@ -122,6 +122,7 @@ def with_numbers_of(
     _take_over_joints(scene, layout, read)
     _take_over_actuators(scene, read)
     _take_over_bodies(scene, layout, read)
+    _leave_out_inert(read)
     if otherwise:
         set_constants(own)
     return own, tuple(otherwise)
@@ -143,6 +144,10 @@ class _Numbers:
     def differs(self, name: str, theirs: float, ours: float) -> None:
         """Note that a number is another one."""
         self._otherwise.append(f"{name} {theirs:.6g}, not {ours:.6g}")
+
+    def inert(self, name: str) -> None:
+        """Note that something has no effect."""
+        self._otherwise.append(f"{name} without effect")
 
     def array(self, name: str, ours: Array, theirs: Any) -> None:
         """Let an array of the compiled model, of any length, take over other numbers."""
@@ -229,3 +234,37 @@ def _take_over_actuators(scene: Any, read: _Numbers) -> None:
         elif limits is None and raw.actuator_forcelimited[number]:
             raw.actuator_forcelimited[number] = False
             read.array(f"forcerange of {name}", raw.actuator_forcerange[number], 0.0)
+
+
+def _leave_out_inert(read: _Numbers) -> None:
+    """Take out what MotrixSim reads without a complaint, and what then acts on no motion.
+
+    It subtracts a gap from its margin, as MuJoCo did before 4.0.
+    """
+    raw = read.raw
+    for joint in range(raw.njnt):
+        name = raw.joint(joint).name or f"joint {joint}"
+        if raw.jnt_actfrclimited[joint] and raw.nactuator:
+            read.inert(f"actuatorfrcrange of {name}")
+            raw.jnt_actfrclimited[joint] = False
+        if raw.jnt_type[joint] == JointType.BALL:
+            read.array(f"stiffness of {name}", raw.jnt_stiffness[joint : joint + 1], 0.0)
+    for actuator in range(raw.nactuator):
+        name = raw.actuator(actuator).name or f"actuator {actuator}"
+        if raw.actuator_gaintype[actuator] == GainKind.AFFINE:
+            read.array(f"gainprm of {name}", raw.actuator_gainprm[actuator, 1:], 0.0)
+    for tendon in range(raw.ntendon):
+        name = raw.tendon(tendon).name or f"tendon {tendon}"
+        low, high = raw.tendon_lengthspring[tendon]
+        if low != high:
+            read.array(f"stiffness of {name}", raw.tendon_stiffness[tendon : tendon + 1], 0.0)
+    _subtract_gaps(read, "geom", raw.geom_margin, raw.geom_gap)
+    _subtract_gaps(read, "pair", raw.pair_margin, raw.pair_gap)
+
+
+def _subtract_gaps(read: _Numbers, kind: str, margins: Array, gaps: Array) -> None:
+    """Take over margins (n,) [m] of which MotrixSim subtracts gaps (n,) [m]."""
+    for number in np.flatnonzero(gaps).tolist():
+        name = getattr(read.raw, kind)(number).name or f"{kind} {number}"
+        without = margins[number] - gaps[number]
+        read.array(f"margin of {name}", margins[number : number + 1], without)

@@ -21,6 +21,7 @@ class MotrixEngine(RawEngine):
     """
 
     survives_fork = False  # its threads do not come along
+    tells_acceleration = False
     phrases = function_of(".motrix.conventions:phrases")
     plain_run = function_of(".motrix.plain_runs:plain_run")
     restore_methods = function_of(".motrix.plain_runs:restore_methods")

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...interface import Array
 from ...measures import RobotScale
-from ...measures.floors import STEP_SHARE
 from ...rotations import angle_between
 from .stages import (
     ACCELERATION,
@@ -154,7 +153,7 @@ def _floors(column: StageColumn, robot: RobotScale, inertias: Array) -> Array:
     """
     if column.stage == MASS:
         rows, columns = np.triu_indices(len(inertias))
-        return STEP_SHARE * np.sqrt(inertias[rows] * inertias[columns])
+        return robot.step_share * np.sqrt(inertias[rows] * inertias[columns])
     by_unit = {
         "m": robot.length,
         "rad": robot.angle,

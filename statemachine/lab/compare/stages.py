@@ -116,11 +116,15 @@ class StageReader:
     def _read(self, side: int, data: Data, qpos: Array) -> list[Array]:
         """Return all columns of a side but the velocity update, each (k, size)."""
         model, dofs = self._models[side], self._dofs[side]
-        mass = raw_engine_of(model.backend).mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
+        engine = raw_engine_of(model.backend)
+        mass = engine.mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
         forces = []
-        for arrays in ARRAYS.values():
+        for stage, arrays in ARRAYS.items():
             parts = [array_or_nan(data, name)[dofs] for name in arrays]
-            forces.append(np.concatenate(parts)[:, None])
+            values = np.concatenate(parts)[:, None]
+            if stage == ACCELERATION and not engine.tells_acceleration:
+                values = np.full_like(values, np.nan)
+            forces.append(values)
         return [*self._poses(side, data), mass[self._upper][:, None], *forces]
 
     def _poses(self, side: int, data: Data) -> tuple[Array, Array]:

@@ -27,11 +27,13 @@ HypothesisKind = Literal[
     "servos",
 ]
 
-# What joint speeds, angular and linear velocities are usually multiplied by, from legged_gym on.
-_USUAL_SCALES: Final[dict[TermId, float]] = {
-    "joint_vel_rel": 0.05,
-    "base_ang_vel": 0.25,
-    "base_lin_vel": 2.0,
+# What speeds, and the speeds that are asked for, are usually multiplied by, from legged_gym on: one
+# number for all, or one for each.
+_USUAL_SCALES: Final[dict[TermId, tuple[float, ...]]] = {
+    "joint_vel_rel": (0.05,),
+    "base_ang_vel": (0.25,),
+    "base_lin_vel": (2.0,),
+    "velocity_commands": (2.0, 2.0, 0.25),
 }
 _ACTION_FACTOR: Final = 4.0  # 0.25 rad and 1 rad are the usual scales of actions
 _SIDES: Final = (("left", "right"), ("FL", "FR"), ("RL", "RR"), ("L_", "R_"), ("Left", "Right"))
@@ -191,28 +193,47 @@ def _absolute_angles(contract: Contract) -> Iterator[Hypothesis]:
         yield Hypothesis("absolute angles", term.name, before, after, changed)
 
 
+def _usual_scale(term: ObservedTerm) -> Array | None:
+    """Return what a term is usually multiplied by, (dim,); None where nothing is usual."""
+    usual = _USUAL_SCALES.get(term.id)
+    return None if usual is None else np.resize(np.array(usual), term.dim)
+
+
+def _scale_text(scale: Array) -> str:
+    """Return a scale as it is read: one number where all are equal."""
+    if (scale == scale[0]).all():
+        return f"{scale[0]:g}"
+    return ", ".join(f"{number:g}" for number in scale)
+
+
 def _terms_left_out(contract: Contract) -> Iterator[Hypothesis]:
-    """Yield each term that is told as zero, as it is; and the last action as zero."""
+    """Yield each term that is told as zero, as it is or as it is usually scaled.
+
+    The last action, which not every policy is told, is also yielded as zero.
+    """
     for term in contract.terms:
         if not term.scale.any():
-            changed = with_term(contract, term, replace(term, scale=np.ones(term.dim)))
-            yield Hypothesis("term left out", term.name, "zero", "as it is", changed)
+            ones, usual = np.ones(term.dim), _usual_scale(term)
+            for scale in (ones,) if usual is None else (ones, usual):
+                changed = with_term(contract, term, replace(term, scale=scale))
+                after = f"times {_scale_text(scale)}"
+                yield Hypothesis("term left out", term.name, "zero", after, changed)
         elif term.id == "last_action":
             changed = with_term(contract, term, replace(term, scale=np.zeros(term.dim)))
-            yield Hypothesis("term left out", term.name, "as it is", "zero", changed)
+            yield Hypothesis("term left out", term.name, "told", "zero", changed)
 
 
 def _speed_scales(contract: Contract) -> Iterator[Hypothesis]:
     """Yield velocities with their usual scale where they have none, and without where they have."""
     for term in contract.terms:
-        usual = _USUAL_SCALES.get(term.id)
+        usual = _usual_scale(term)
         if usual is None or not term.scale.any():
             continue
         is_unscaled = bool((term.scale == 1.0).all())
-        scale = usual if is_unscaled else 1.0
-        changed = with_term(contract, term, replace(term, scale=np.full(term.dim, scale)))
-        before = f"{term.scale[0]:g}"
-        yield Hypothesis("speed scale", term.name, before, f"{scale:g}", changed)
+        scale = usual if is_unscaled else np.ones(term.dim)
+        changed = with_term(contract, term, replace(term, scale=scale))
+        texts = _scale_text(term.scale), _scale_text(scale)
+        yield Hypothesis("speed scale", term.name, *texts, changed)
 
 
 def _action_scales(contract: Contract) -> Iterator[Hypothesis]:

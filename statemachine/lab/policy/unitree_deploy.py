@@ -73,32 +73,27 @@ _LONG_ARM = f"{_SHORT_ARM} wrist_pitch wrist_yaw"
 
 # `joint_sdk_names` of unitree_rl_lab (source/unitree_rl_lab/unitree_rl_lab/assets/robots/
 # unitree.py); those of the H1 and of the G1 of 29 joints are also in gaitkeeper's tables.
+_GO2 = _joints_of("FR FL RR RL", "hip thigh calf")
+_H1 = (
+    *_joints_of("right left", "hip_roll hip_pitch knee"),
+    *("torso_joint", "left_hip_yaw_joint", "right_hip_yaw_joint", ""),
+    *_joints_of("left right", "ankle"),
+    *_joints_of("right left", _SHOULDER_TO_ELBOW),
+)
+_G1_SHORT = (
+    *(*_G1_LEGS, "waist_yaw_joint", "", ""),
+    *(*_joints_of("left", _SHORT_ARM), "", ""),
+    *_joints_of("right", _SHORT_ARM),
+)
+_G1_LONG = (
+    *(*_G1_LEGS, "waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint"),
+    *_joints_of("left right", _LONG_ARM),
+)
 ORDERS: Final = (
-    MotorOrder("Go2, B2", _joints_of("FR FL RR RL", "hip thigh calf")),
-    MotorOrder(
-        "H1",
-        (
-            *_joints_of("right left", "hip_roll hip_pitch knee"),
-            *("torso_joint", "left_hip_yaw_joint", "right_hip_yaw_joint", ""),
-            *_joints_of("left right", "ankle"),
-            *_joints_of("right left", _SHOULDER_TO_ELBOW),
-        ),
-    ),
-    MotorOrder(
-        "G1 of 23 joints",
-        (
-            *(*_G1_LEGS, "waist_yaw_joint", "", ""),
-            *(*_joints_of("left", _SHORT_ARM), "", ""),
-            *_joints_of("right", _SHORT_ARM),
-        ),
-    ),
-    MotorOrder(
-        "G1 of 29 joints",
-        (
-            *(*_G1_LEGS, "waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint"),
-            *_joints_of("left right", _LONG_ARM),
-        ),
-    ),
+    MotorOrder("Go2, B2", _GO2),
+    MotorOrder("H1", _H1),
+    MotorOrder("G1 of 23 joints", _G1_SHORT),
+    MotorOrder("G1 of 29 joints", _G1_LONG),
 )
 
 

@@ -15,14 +15,15 @@ from ..compare.odd_side import ODD
 from ..compare.typed_command import typed_command
 from ..why.cited_case_page import CitedCasePage
 from .compared_names import name_of
-from .finer_sides import FinerGap, FinerSides
+from .finer_sides import FinerGap, FinerSides, OddGapState
 from .requests.engines import SEARCH_SECONDS, EnginesResult, EnginesState, sides_of
 from .several_sides import OddOne, SidesGap, Span
 from .sides_outcomes import sides_outcomes_table
 
 _NOBODY = "none"
+_ODD_ROW = "odd is"
 _SPANS: dict[Span, str] = {"run": "over the run", "end": "at the end"}
-_STEPS = ("at h", "h/2", "h/4", "h/8")
+_STEPS = ("at h", "h/2", "h/4", "h/8", "h/16")
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,11 @@ class EnginesPage(PageContent):
     Attributes:
         experiment: What was run.
         result: Which side is odd.
-        gaps: Table of those between each two sides.
-        more: How many of these it does not show.
+        gaps: Table of those between each two sides; without rows where `changing_gaps` stands in
+            its place.
+        changing_gaps: Table of these with finer steps, where the odd side changes with them; else
+            without rows.
+        more: How many pairs it does not show.
         next_command: What to type next; "" for nothing.
         details: Whether everything is shown.
     """
@@ -42,6 +46,7 @@ class EnginesPage(PageContent):
     experiment: str
     result: EnginesResult
     gaps: Table
+    changing_gaps: Table
     more: int
     next_command: str
     details: bool
@@ -152,8 +157,8 @@ class EnginesPage(PageContent):
         return lines
 
     @property
-    def steps(self) -> Literal["", "vanishes", "stays", "unclear"]:
-        """Return what becomes of the gap of the odd side with finer steps; "" if not known."""
+    def steps(self) -> OddGapState | Literal[""]:
+        """Return what becomes of the odd side with finer steps; "" if not known."""
         return "" if self.result.finer is None else self.result.finer.state
 
     @property
@@ -275,10 +280,13 @@ def _page(result: EnginesResult, gaps: Sequence[SidesGap], details: bool = False
         sides = dict(zip(result.labels, sides_of(result.request), strict=True))
         pair = result.request.pair(sides[result.odd.side], sides[result.odd.nearest])
         command = typed_command(pair).lines("--why")
+    changing = gaps if result.state == "unclear" else ()
+    compared = () if changing and not details else gaps
     content = EnginesPage(
         experiment=result.request.run.experiment,
         result=result,
-        gaps=_gaps_table(gaps, result.unit),
+        gaps=_gaps_table(compared, result.unit),
+        changing_gaps=_changing_table(result, changing),
         more=len(result.gaps) - len(gaps),
         next_command=command,
         details=details,
@@ -320,6 +328,20 @@ def _finer_table(gaps: Sequence[FinerGap], unit: str) -> Table:
     for level in range(levels):
         columns[_STEPS[level]] = _gap_at(level, unit)
     return Table.of(gaps, columns, "", words={"left", "right", "the gap is"})
+
+
+def _changing_table(result: EnginesResult, gaps: Sequence[SidesGap]) -> Table:
+    """Return a row for each of some pairs, their gap with ever finer steps, and who is odd then."""
+    if result.finer is None or not gaps:
+        return Table((), [])
+    sizes = {(each.left, each.right): each.gaps for each in result.finer.gaps}
+    rows: list[tuple[str, ...]] = []
+    for gap in gaps:
+        cells = [quantity(size, result.unit) for size in sizes[gap.left, gap.right]]
+        rows.append((gap.left, gap.right, *cells))
+    rows.append((_ODD_ROW, "", *(label or _NOBODY for label in result.finer.odd)))
+    headers = ("left", "right", *_STEPS[: len(result.finer.finer)])
+    return Table(headers, rows, words=frozenset({0, 1}), emphasis=frozenset({len(gaps)}))
 
 
 def _gap_at(level: int, unit: str) -> Callable[[FinerGap], str]:

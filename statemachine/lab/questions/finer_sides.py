@@ -17,10 +17,9 @@ from .several_sides import (
     sides_gap,
 )
 
-_LEVELS = FINER[:4]  # as given, and with steps 2, 4 and 8 times finer
-_AT_LEAST = 3  # of these, where three gaps are level
+_AT_LEAST = 3  # of `FINER`, where that is enough for every gap
 
-OddGapState = Literal["vanishes", "stays", "unclear"]
+OddGapState = Literal["vanishes", "stays", "changes", "unclear"]
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class FinerGap:
         left: What a side is called.
         right: What the other is called.
         gaps: Between them [unit]: with the steps as given, and with ever finer ones.
-        verdict: As of a `GapLimit`, from as few of these gaps as make it clear.
+        verdict: As of a `GapLimit`, from all of these gaps.
     """
 
     left: str
@@ -71,15 +70,18 @@ class FinerSides:
 
     @property
     def state(self) -> OddGapState:
-        """Return in a word what becomes of the gaps of the side that is odd as the sides come.
+        """Return in a word what becomes of the side that is odd as the sides come.
 
-        "vanishes" where those to all others do; "stays" where that to some other does, in part or
-        whole; else "unclear".
+        "vanishes" where its gaps to all others do; else "changes" where another side is odd, or
+        none, with some finer steps; "stays" where its gaps to all others do, in part or whole;
+        else "unclear".
         """
-        own = [gap.verdict for gap in self.gaps if self.odd[0] in (gap.left, gap.right)]
-        if all(verdict in ("discretisation", "rounding") for verdict in own):
+        own = {gap.verdict for gap in self.gaps if self.odd[0] in (gap.left, gap.right)}
+        if own <= {"discretisation", "rounding"}:
             return "vanishes"
-        return "stays" if {"stays", "in part"} & set(own) else "unclear"
+        if not self.is_steady:
+            return "changes"
+        return "stays" if own <= {"stays", "in part"} else "unclear"
 
     @property
     def is_steady(self) -> bool:
@@ -94,7 +96,9 @@ def finer_sides(
     span: Span,
     labels: Mapping[int, str],
 ) -> FinerSides:
-    """Run all sides with steps 2 and 4 times finer; and 8 times, while something is unclear.
+    """Run all sides with steps 2 and 4 times finer; then 8 and 16, while something is unclear.
+
+    That is so as well while not the same side is odd with all of these steps.
 
     Args:
         compared: Each two sides as they come; as many pairs as there are.
@@ -107,14 +111,16 @@ def finer_sides(
         StateMachineError: A side does not run with finer steps.
     """
     runs: list[Mapping[Two, Comparison]] = [compared]
-    for finer in _LEVELS[1:]:
+    for finer in FINER[1:]:
         made: dict[Two, Comparison] = {}
         for pair in compared:
             made[pair] = run(pair, finer)
         runs.append(made)
+        if len(runs) < _AT_LEAST:
+            continue
         result = _result(runs, quantities, span, labels)
-        if len(runs) >= _AT_LEAST and "unclear" not in {gap.verdict for gap in result.gaps}:
-            break
+        if result.is_steady and "unclear" not in {gap.verdict for gap in result.gaps}:
+            return result
     return _result(runs, quantities, span, labels)
 
 
@@ -139,18 +145,10 @@ def _result(
     finer: list[FinerGap] = []
     for pair, first in levels[0].items():
         sizes = [_size(gaps[pair], span) for gaps in levels]
-        finer.append(FinerGap(first.left, first.right, tuple(sizes), _verdict(sizes)))
+        verdict, _ = verdict_of(sizes, LEAST_GAP)
+        finer.append(FinerGap(first.left, first.right, tuple(sizes), verdict))
     moved = [MovedSide(labels[side], _moved(side, runs, quantities, span)) for side in labels]
-    return FinerSides(_LEVELS[: len(runs)], tuple(finer), tuple(odds), tuple(moved))
-
-
-def _verdict(sizes: list[float]) -> LimitVerdict:
-    """Return what becomes of a gap, from as few of its sizes as make it clear."""
-    for count in range(_AT_LEAST, len(sizes) + 1):
-        verdict, _ = verdict_of(sizes[:count], LEAST_GAP)
-        if verdict != "unclear":
-            return verdict
-    return "unclear"
+    return FinerSides(FINER[: len(runs)], tuple(finer), tuple(odds), tuple(moved))
 
 
 def _size(gap: SidesGap, span: Span) -> float:

@@ -51,6 +51,14 @@ class OneStepPage(PageContent):
         return None if self.steps.first is None else self.steps.first.of_usual
 
     @property
+    def has_all_before(self) -> bool:
+        """Tell whether every stage before the first that differs was compared, or has nothing."""
+        if self.steps.first is None:
+            return True
+        place = self.steps.stages.index(self.steps.first)
+        return all(gap.is_available for gap in self.steps.stages[:place])
+
+    @property
     def agreeing(self) -> int:
         """Return the number of stages that are compared and do not differ."""
         return sum(

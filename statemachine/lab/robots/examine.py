@@ -35,7 +35,7 @@ from ..runs.interleaved_timing import Ratio, time_interleaved
 from ..runs.scenarios import scenario
 from ..validate.fingertip import certify
 from . import gaps
-from .records import RUNS, BackendRow, ExaminedModel, WitnessRow
+from .records import NOT_READ, RUNS, BackendRow, ExaminedModel, WitnessRow, is_as_it_comes
 
 TRIED = ("hold", "gravity", "droop", "waves")
 _SHORT = 40  # steps of a scenario
@@ -91,7 +91,9 @@ class _Examination:
             with self._part(f"the engine alone, {backend}"):
                 is_equal = self._equals_engine(model)
                 self._put(backend, replace(self._known(backend), equals_engine=is_equal))
-            with self._part(f"restore, {backend}"):
+            # What diverges has no future; an engine that computes all itself may.
+            expected = (DivergedError,) if is_as_it_comes(backend) else ()
+            with self._part(f"restore, {backend}"), suppress(*expected):
                 is_restored = self._restores(model)
                 self._put(backend, replace(self._known(backend), restores=is_restored))
         with self._part("witness"), suppress(MissingEngineError):
@@ -304,7 +306,7 @@ def _features(error: StateMachineError) -> tuple[str, ...]:
     """Return what of a model is refused, in a few words each."""
     if isinstance(error, UnsupportedError):
         return error.features or (error.feature,)
-    return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)
+    return (NOT_READ,) if isinstance(error, ModelError) else (type(error).__name__,)
 
 
 def main(path: str, quick: str, seed: str, answer: str) -> None:

@@ -17,6 +17,7 @@ _ONE_RUN = 3.0  # one run tells a chaos floor to about a factor
 _STILL = 0.3  # [rad or m]: what moves less than this may be pushed about by a contact
 _FIRST_ORDER = 1.5  # by how much a gap shrinks at least with half the timestep
 RUNS = "runs"
+NOT_READ = "not read"  # of a file
 
 Loading = Literal["with contacts", "without contacts", "never"]
 Exactness = Literal["ended", "refused", "differs", "exact", "not asked"]
@@ -289,7 +290,9 @@ class ExaminedModel:
                 said.append(f"{name}: not the bits of the engine without us")
             if row.restores is False:
                 said.append(f"{name}: two restores of one State part")
-            if name != default and row.unexplained and not _is_as_it_comes(name):
+            if name == default or is_as_it_comes(name):
+                continue
+            if row.unexplained:
                 said.append(f"{name}: {_gap_words(row.without_contacts)}")
             gap = row.with_contacts
             if gap is not None and gap.explodes:
@@ -300,10 +303,10 @@ class ExaminedModel:
         return tuple(said)
 
 
-def _is_as_it_comes(backend: str) -> bool:
-    """Tell whether a backend promises no joint dynamics, so that its gap is its engine's.
+def is_as_it_comes(backend: str) -> bool:
+    """Tell whether a backend computes nothing itself: a gap or an explosion is its engine's then.
 
-    The default one's are what is promised. Of a backend of another package it is not known.
+    The others are held against the default one. Of a backend of another package it is not known.
     """
     return backend in ROOMS and backend != DEFAULT and not raw_engine_of(backend).emulated
 

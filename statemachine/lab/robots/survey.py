@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...show.blocks import only_on_pages
-from .records import TOLERANCE, BackendRow, ExaminedModel
+from .records import NOT_READ, TOLERANCE, BackendRow, ExaminedModel, is_as_it_comes
+
+_LONGEST = 72  # characters of a reason
+# Before the reason why an engine does not read a file: what is not read, and where.
+_HEAD = re.compile(r"^.*? cannot read .+?: ")
+# What is of one file alone: names in quotes, paths, numbers, and the place in a file.
+_PARTICULARS = re.compile(r"""(["'])[^"']+\1|\(index [^)]*\)|\S*[/\\]\S*|\[.*\]|\d[\d.]*""")
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,8 @@ class RefusedFeature:
     """A feature of models that a backend refuses.
 
     Attributes:
-        feature: In a few words.
+        feature: In a few words; of a file that the engine does not read, and the default one does,
+            the engine's own reason without what is of this file alone.
         models: How many models are refused for it, alone or among others.
         alone: How many are refused for nothing else.
         loaded_without_contacts: How many of them load with contacts off.
@@ -99,6 +108,12 @@ class Survey:
 
     @property
     @only_on_pages
+    def as_they_come(self) -> tuple[str, ...]:
+        """Return those of them of which nothing is computed here: their gaps contradict nothing."""
+        return tuple(name for name in self.others if is_as_it_comes(name))
+
+    @property
+    @only_on_pages
     def ran_experiments(self) -> bool:
         """Tell whether an experiment was tried on a model."""
         return any(model.ran_experiments for model in self.models)
@@ -119,20 +134,31 @@ class Survey:
 
     def refused_features(self, backend: str) -> tuple[RefusedFeature, ...]:
         """Return what a backend refuses, the most frequent feature first."""
-        refused = [row for row in self._rows(backend) if row.refusal]
         models: Counter[str] = Counter()
         alone: Counter[str] = Counter()
         loaded: Counter[str] = Counter()
-        for row in refused:
-            models.update(row.features)
-            if len(row.features) == 1:
-                alone.update(row.features)
+        for model in self.models:
+            if backend not in model.backends or not model.backends[backend].refusal:
+                continue
+            row = model.backends[backend]
+            features = self._refused_in(model, row)
+            models.update(features)
+            if len(features) == 1:
+                alone.update(features)
             if row.loading == "without contacts":
-                loaded.update(row.features)
+                loaded.update(features)
         return tuple(
             RefusedFeature(name, count, alone[name], loaded[name])
             for name, count in models.most_common()
         )
+
+    def _refused_in(self, model: ExaminedModel, row: BackendRow) -> tuple[str, ...]:
+        """Return what of a model is refused; of a file that is not read, why not."""
+        default = model.backends.get(self.default)
+        is_read_elsewhere = default is not None and default.loads and default is not row
+        if row.features == (NOT_READ,) and is_read_elsewhere:
+            return (f"{NOT_READ}: {reason_in_general(row.refusal)}",)
+        return row.features
 
     def _rows(self, backend: str) -> list[BackendRow]:
         """Return what was found of each model that was examined on a backend."""
@@ -156,3 +182,14 @@ class Survey:
             rounding=sum(gap.is_rounding for gap in gaps),
             vanishes=sum(gap.first_order for gap in gaps),
         )
+
+
+def reason_in_general(refusal: str) -> str:
+    """Return why an engine does not read a file, without what is of this file alone.
+
+    Args:
+        refusal: What it says, in one line.
+    """
+    text = _PARTICULARS.sub("…", _HEAD.sub("", refusal))
+    text = text.removeprefix("failed to load scene, ").partition(", expected one of")[0]
+    return textwrap.shorten(text, _LONGEST, placeholder=" …")

@@ -24,6 +24,7 @@ Cause = Literal[
     "contact model",
     "computed by our backend",
     "engine's own",
+    "single precision",
 ]
 # From the best to the worst.
 Verdict = Literal[
@@ -44,6 +45,13 @@ TIMESTEPS = (0.005, 0.002, 0.001, 0.0005)  # [s]
 FEW_TIMESTEPS = (0.005, 0.002, 0.001)  # [s] of an error that does not depend on the timestep
 ROUNDING = 1e-9  # the largest error that counts as exact, unless a case says another
 SLACK = 1.25  # what another make of processor or another compiler may add to an error
+# What a step may change a number by, relative to its size, that is stored in single precision: one
+# unit in the last place. A rounding is half of that; speed and place are both rounded.
+SINGLE = 2.0**-23
+_ROUNDING = (
+    "A step rounds numbers by at most 1.2e-7 of the largest, in single precision; the error is "
+    "within what that makes of all steps."
+)
 EVERY = "*"  # every engine or integrator that no other key names
 
 
@@ -58,6 +66,10 @@ class Expectation:
             where rounding or chaos hides it.
         cause: What the error comes from.
         note: More of the cause, in a sentence; "" where there is nothing to add.
+        rounded: Of an engine of which only the rounding of single precision is seen: the size of
+            the largest number that is rounded [unit of the error]. An error is then at most
+            `SINGLE` times that for each step, at every timestep, and `within` is not used. None of
+            other records.
     """
 
     verdict: Verdict
@@ -65,6 +77,15 @@ class Expectation:
     order: float | None
     cause: Cause
     note: str = ""
+    rounded: float | None = None
+
+    def bound(self, steps: int) -> float:
+        """Return the largest size of an error that rounding makes in a run [unit of the error].
+
+        Args:
+            steps: Number of steps of the run.
+        """
+        return math.inf if self.rounded is None else self.rounded * SINGLE * steps
 
 
 def exact(within: float = ROUNDING) -> Expectation:
@@ -77,14 +98,25 @@ def exact_steps(within: float, order: float | None = 1.0) -> Expectation:
     return Expectation("exact discrete form", within * SLACK, order, "discretisation")
 
 
-def converges(order: float, within: float, cause: Cause = "discretisation") -> Expectation:
+def converges(
+    order: float, within: float, cause: Cause = "discretisation", note: str = ""
+) -> Expectation:
     """Return the expectation of an error that vanishes with a power of the timestep."""
-    return Expectation("converges", within * SLACK, order, cause)
+    return Expectation("converges", within * SLACK, order, cause, note)
 
 
-def bounded(within: float, cause: Cause) -> Expectation:
+def bounded(within: float, cause: Cause, note: str = "") -> Expectation:
     """Return the expectation of a small error that does not vanish with the timestep."""
-    return Expectation("bounded", within * SLACK, None, cause)
+    return Expectation("bounded", within * SLACK, None, cause, note)
+
+
+def rounded(size: float = 1.0) -> Expectation:
+    """Return the expectation of an engine of which only the rounding of single precision is seen.
+
+    Args:
+        size: Of the largest number that is rounded [unit of the error].
+    """
+    return Expectation("bounded", math.inf, None, "single precision", _ROUNDING, size)
 
 
 def wrong(within: float, cause: Cause, order: float | None = None, note: str = "") -> Expectation:
@@ -200,13 +232,18 @@ class Case:
     def expectation(self, backend: str, integrator: Integrator) -> Expectation | None:
         """Return what is known of a backend and an integrator; None if that is nothing.
 
+        Nothing is known of an engine that reads no integrator and has no record of its own. An
+        engine as it comes has that of its name where none is of it as it comes.
+
         Args:
             backend: As it is typed behind --backend.
             integrator: How it steps.
         """
-        names = dict.fromkeys((backend, engine_of(backend)))
+        names = dict.fromkeys((backend, backend.partition(":")[0], engine_of(backend)))
         keys = [f"{name} {way}" for name in names for way in (integrator, EVERY)]
-        for key in (*keys, integrator, EVERY):
+        if integrator != "own":
+            keys += [integrator, EVERY]
+        for key in keys:
             if key in self.expected:
                 return self.expected[key]
         return None

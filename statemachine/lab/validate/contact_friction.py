@@ -11,6 +11,7 @@ from .case import GRAVITY, Case, bounded, converges, exact, exact_steps, wrong
 from .contact_incline import DIAGONAL, FRICTION, SLIDING, STICKS, Incline, block
 from .contact_steps import skid
 from .contact_tools import PYRAMIDAL, ROUND, on_engines
+from .known_causes import DEPTH, HARD_FRICTION, SQUARE
 from .run import Run
 from .soft_contact import SoftContact
 
@@ -99,6 +100,7 @@ CASES: tuple[Case, ...] = (
             pybullet=converges(0.7, 0.006),
             own=wrong(0.9, "engine's own"),
             rk4=bounded(0.001, "contact model"),
+            motrix=converges(1.0, 0.0124),
         ),
         option=ROUND,
         relative=True,
@@ -119,6 +121,7 @@ CASES: tuple[Case, ...] = (
             mujoco=wrong(0.415, "contact model"),
             pybullet=converges(0.8, 0.0084),
             own=wrong(0.9, "engine's own"),
+            motrix=wrong(0.306, "contact model", note=SQUARE),
         ),
         option=PYRAMIDAL,
         relative=True,
@@ -141,6 +144,7 @@ CASES: tuple[Case, ...] = (
             pybullet=wrong(1.0, "contact model"),
             own=wrong(1.0, "contact model"),
             discrete=converges(1.5, 0.04),
+            motrix=wrong(1.0, "contact model", note=HARD_FRICTION),
         ),
         gravity=STICKS.gravity,
         option=ROUND,
@@ -166,6 +170,7 @@ CASES: tuple[Case, ...] = (
             own=wrong(0.106, "engine's own"),
             rk4=converges(1.5, 1.4e-5, "contact model"),
             discrete=converges(1.0, 0.00102),
+            motrix=converges(0.7, 0.00122, "contact model", DEPTH),
         ),
         gravity=_SKIDS.gravity,
         option=ROUND,

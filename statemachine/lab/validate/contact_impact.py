@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from ...interface import Data
-from .case import GRAVITY, Case, converges, exact, exact_steps, wrong
+from .case import GRAVITY, Case, converges, exact, exact_steps, rounded, wrong
 from .contact_steps import Step, each_step, on_spring
 from .contact_tools import on_engines
+from .known_causes import IMPLICIT_DAMPING
 from .run import Run, zero
 from .soft_contact import spring_of_restitution
 
@@ -120,7 +121,12 @@ CASES: tuple[Case, ...] = (
         truth=momentum,
         unit="kg·m/s",
         source=_IMPULSE,
-        expected=on_engines(mujoco=exact(), pybullet=exact(), own=wrong(0.037, "engine's own")),
+        expected=on_engines(
+            mujoco=exact(),
+            pybullet=exact(),
+            own=wrong(0.037, "engine's own"),
+            motrix=rounded(),
+        ),
         gravity=(0.0, 0.0, 0.0),
         relative=True,
     ),
@@ -142,6 +148,7 @@ CASES: tuple[Case, ...] = (
             own=wrong(0.54, "engine's own"),
             rk4=exact_steps(0.0016),
             discrete=converges(0.8, 0.024),
+            motrix=converges(1.0, 0.0028, "discretisation", IMPLICIT_DAMPING),
         ),
         gravity=(0.0, 0.0, 0.0),
         tolerance=0.004,
@@ -167,6 +174,7 @@ CASES: tuple[Case, ...] = (
             own=wrong(0.2982, "engine's own"),
             rk4=exact_steps(0.094),
             discrete=wrong(0.2, "discretisation"),
+            motrix=converges(1.5, 0.107, "discretisation", IMPLICIT_DAMPING),
         ),
         discrete=each_step(_stepwise_bounce),
         timesteps=(0.005, 0.002, 0.001, 0.0005, 0.00025),
@@ -189,6 +197,7 @@ CASES: tuple[Case, ...] = (
             own=exact(),
             rk4=exact(),
             discrete=exact(),
+            motrix=exact(),
         ),
     ),
 )

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...interface.records import Array
-from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, rounded, wrong
 from .contact_tools import PYRAMIDAL, ROUND, net_force, on_engines, one, tilted_gravity
+from .known_causes import DEPTH, HARD_FRICTION, SQUARE
 from .run import Run, zero
 
 FRICTION = 0.5
@@ -136,6 +137,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.0012, "contact model"),
             pybullet=bounded(0.0005, "engine's own"),
             own=wrong(2.48, "engine's own"),
+            motrix=bounded(3.1e-6, "contact model", HARD_FRICTION),
         ),
         gravity=STICKS.gravity,
         option=ROUND,
@@ -155,6 +157,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.0046, "contact model"),
             pybullet=bounded(0.0005, "engine's own"),
             own=wrong(2.48, "engine's own"),
+            motrix=bounded(3.1e-6, "contact model", HARD_FRICTION),
         ),
         gravity=STICKS.gravity,
         option=PYRAMIDAL,
@@ -174,6 +177,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.0012, "contact model"),
             pybullet=bounded(0.0005, "engine's own"),
             own=wrong(2.48, "engine's own"),
+            motrix=bounded(3.8e-6, "contact model", HARD_FRICTION),
         ),
         gravity=_STICKS_DIAGONALLY.gravity,
         option=ROUND,
@@ -193,6 +197,7 @@ CASES: tuple[Case, ...] = (
             mujoco=wrong(1.3, "contact model"),
             pybullet=bounded(0.0005, "engine's own"),
             own=wrong(2.48, "engine's own"),
+            motrix=bounded(3.8e-6, "contact model", HARD_FRICTION),
         ),
         gravity=_STICKS_DIAGONALLY.gravity,
         option=PYRAMIDAL,
@@ -211,7 +216,12 @@ CASES: tuple[Case, ...] = (
         truth=one,
         unit="",
         source=_COULOMB,
-        expected=on_engines(mujoco=exact(), pybullet=exact(), own=wrong(0.05, "engine's own")),
+        expected=on_engines(
+            mujoco=exact(),
+            pybullet=exact(),
+            own=wrong(0.05, "engine's own"),
+            motrix=exact(),
+        ),
         gravity=STICKS.gravity,
         option=ROUND,
         tolerance=0.006,
@@ -236,6 +246,7 @@ CASES: tuple[Case, ...] = (
             pybullet=converges(1.0, 0.033),
             own=wrong(2.2, "engine's own"),
             rk4=converges(0.9, 1.3e-4, "contact model"),
+            motrix=converges(0.8, 0.00264, "contact model", DEPTH),
         ),
         gravity=_SLIDES.gravity,
         option=ROUND,
@@ -257,6 +268,7 @@ CASES: tuple[Case, ...] = (
             pybullet=converges(1.0, 0.033),
             own=wrong(2.2, "engine's own"),
             discrete=converges(1.0, 0.0028, "contact model"),
+            motrix=wrong(1.0, "contact model", note=SQUARE),
         ),
         gravity=_SLIDES_DIAGONALLY.gravity,
         option=ROUND,
@@ -277,6 +289,7 @@ CASES: tuple[Case, ...] = (
             mujoco=wrong(1.48, "contact model"),
             pybullet=converges(1.0, 0.033),
             own=wrong(2.2, "engine's own"),
+            motrix=wrong(1.0, "contact model", note=SQUARE),
         ),
         gravity=_SLIDES_DIAGONALLY.gravity,
         option=PYRAMIDAL,
@@ -295,7 +308,10 @@ CASES: tuple[Case, ...] = (
         unit="",
         source=_COULOMB,
         expected=on_engines(
-            mujoco=exact(), pybullet=converges(1.5, 0.0039), own=wrong(0.5, "engine's own")
+            mujoco=exact(),
+            pybullet=converges(1.5, 0.0039),
+            own=wrong(0.5, "engine's own"),
+            motrix=rounded(),
         ),
         gravity=_SLIDES.gravity,
         option=ROUND,
@@ -317,6 +333,7 @@ CASES: tuple[Case, ...] = (
             mujoco=wrong(0.293, "contact model"),
             pybullet=converges(1.5, 0.0039),
             own=wrong(0.5, "engine's own"),
+            motrix=wrong(0.2, "contact model", note=SQUARE),
         ),
         gravity=_SLIDES_DIAGONALLY.gravity,
         option=PYRAMIDAL,

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Data
 from ...interface.records import Array
-from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
+from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, rounded, wrong
 from .contact_tools import ROUND, on_engines, one, tilted_gravity, turned_about
 from .run import Run, Samples
 
@@ -187,6 +187,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.001, "contact model"),
             pybullet=exact(),
             own=wrong(0.21, "engine's own"),
+            motrix=rounded(),
         ),
         gravity=tilted_gravity(ANGLE),
         option=ROUND,
@@ -209,6 +210,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.0046, "contact model"),
             pybullet=exact(),
             own=wrong(1.0, "engine's own"),
+            motrix=rounded(),
         ),
         option=ROUND,
         tolerance=0.006,
@@ -230,6 +232,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.001, "contact model"),
             pybullet=exact(),
             own=wrong(0.034, "engine's own"),
+            motrix=rounded(),
         ),
         option=ROUND,
         relative=True,
@@ -252,6 +255,7 @@ CASES: tuple[Case, ...] = (
             pybullet=converges(0.9, 0.026),
             own=wrong(0.167, "engine's own"),
             rk4=bounded(0.0026, "contact model"),
+            motrix=converges(1.0, 0.0255),
         ),
         option=ROUND,
         relative=True,
@@ -274,6 +278,7 @@ CASES: tuple[Case, ...] = (
             pybullet=converges(0.9, 0.0123),
             own=wrong(1.34, "engine's own"),
             rk4=bounded(0.0022, "contact model"),
+            motrix=converges(1.0, 0.0124),
         ),
         option=ROUND,
         relative=True,
@@ -294,6 +299,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.0047, "contact model"),
             pybullet=converges(0.9, 0.0099),
             own=wrong(0.85, "engine's own"),
+            motrix=converges(1.1, 0.00176),
         ),
         option=ROUND,
         relative=True,

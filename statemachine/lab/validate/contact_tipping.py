@@ -10,6 +10,7 @@ from ...interface import Data
 from ...interface.records import Array
 from .case import FEW_TIMESTEPS, GRAVITY, Case, bounded, converges, exact, wrong
 from .contact_tools import ROUND, on_engines, one, tilted_gravity
+from .known_causes import CORNERS
 from .run import Run, Samples, zero, zero_crossings
 
 SLOPE = 0.3  # [rad] of the incline on which blocks stand
@@ -147,6 +148,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.03, "contact model"),
             pybullet=exact(),
             own=wrong(0.05, "engine's own"),
+            motrix=wrong(0.046, "contact model", note=CORNERS),
         ),
         gravity=tilted_gravity(SLOPE),
         option=ROUND,
@@ -171,6 +173,7 @@ CASES: tuple[Case, ...] = (
             pybullet=converges(0.9, 0.0107),
             own=converges(0.7, 0.0094),
             rk4=bounded(0.0014, "contact model"),
+            motrix=converges(1.1, 0.0098),
         ),
         option=ROUND,
         relative=True,
@@ -192,6 +195,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.081, "contact model"),
             pybullet=converges(0.6, 0.027),
             own=converges(0.6, 0.031),
+            motrix=bounded(0.0875, "contact model", CORNERS),
         ),
         option=ROUND,
         tolerance=0.09,
@@ -212,6 +216,7 @@ CASES: tuple[Case, ...] = (
             mujoco=bounded(0.031, "contact model"),
             pybullet=bounded(0.013, "engine's own"),
             own=wrong(0.221, "engine's own"),
+            motrix=bounded(0.0163, "contact model", CORNERS),
         ),
         option=ROUND,
         relative=True,

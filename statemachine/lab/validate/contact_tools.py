@@ -21,6 +21,7 @@ def on_engines(
     own: Expectation,
     rk4: Expectation | None = None,
     discrete: Expectation | None = None,
+    motrix: Expectation | None = None,
 ) -> dict[str, Expectation]:
     """Return what is expected of the engines; nothing is of others, whose contacts are unknown.
 
@@ -30,12 +31,15 @@ def on_engines(
         own: Of PyBullet as its own users meet it.
         rk4: Of MuJoCo with RK4, where that differs.
         discrete: Of MuJoCo with its integrator discrete, where that differs.
+        motrix: Of MotrixSim, which has one integrator.
     """
     expected = {"mujoco *": mujoco, "pybullet *": pybullet, "pybullet:engine own": own}
     if rk4 is not None:
         expected["mujoco RK4"] = rk4
     if discrete is not None:
         expected["mujoco discrete"] = discrete
+    if motrix is not None:
+        expected["motrix *"] = motrix
     return expected
 
 

@@ -82,7 +82,8 @@ class ValidatePage(PageContent):
 
     Attributes:
         result: What was measured.
-        nearest: Who is nearest to the truth; None where nothing was measured.
+        nearest: Who is nearest to the truth; None where nothing was measured, and where one engine
+            with one integrator was asked alone.
         engines: Table with a row for each engine and integrator.
         worst: Table of the largest errors.
         parts: One for each case; empty without details.
@@ -207,10 +208,11 @@ def _nearest(results: Sequence[CaseResult]) -> _Nearest | None:
 
     The last is the median over its cases of the error, in parts of what a case tolerates.
     """
-    if all(row.worst is None for row in results):
+    ways = dict.fromkeys(row.way for row in results)
+    if len(ways) == 1 or all(row.worst is None for row in results):
         return None
     marks: dict[_Nearest, tuple[int, int, float]] = {}
-    for way in dict.fromkeys(row.way for row in results):
+    for way in ways:
         mine = [row for row in results if row.way == way]
         exact = _count(mine, _EXACT)
         not_right = _count(mine, (*_WRONG, "refused", "failed"))

@@ -97,7 +97,7 @@ def judgement_of(
         measurements: From the longest timestep to the shortest; empty if it was refused.
         expectation: The record; None if there is none.
     """
-    order = observed_order(case, measurements)
+    order = _order(case, measurements, expectation)
     verdict = _verdict(case, measurements, order)
     return CaseJudgement(verdict, order, _status_of_own(case, measurements, expectation))
 
@@ -132,6 +132,15 @@ def _verdict(case: Case, measurements: Sequence[CaseMeasurement], order: float |
     return "wrong"
 
 
+def _order(
+    case: Case, measurements: Sequence[CaseMeasurement], expectation: Expectation | None
+) -> float | None:
+    """Return the observed order; None where the record says that rounding is all that is seen."""
+    if expectation is not None and expectation.rounded is not None:
+        return None
+    return observed_order(case, measurements)
+
+
 def _status_of_own(
     case: Case, measurements: Sequence[CaseMeasurement], expectation: Expectation | None
 ) -> Status:
@@ -139,7 +148,7 @@ def _status_of_own(
     own = [each for each in measurements if each.timestep in case.timesteps]
     if expectation is not None and measurements and not own:
         return "other timestep"
-    order = observed_order(case, own)
+    order = _order(case, own, expectation)
     return _status(case, own, expectation, _verdict(case, own, order), order)
 
 
@@ -153,6 +162,8 @@ def _status(
     """Tell whether an engine does as its record says."""
     if expectation is None:
         return "not on record"
+    if expectation.rounded is not None:
+        return _status_of_rounding(measurements, expectation)
     expected = expectation.verdict
     shows_no_order = len(measurements) == 1 and expected in ("converges", "wrong", "bounded")
     if shows_no_order and verdict in ("bounded", "wrong"):
@@ -171,6 +182,19 @@ def _status(
     much_smaller = _largest(measurements) < expectation.within / _MUCH_SMALLER
     if is_comparable and expected != "exact" and much_smaller:
         return "better"
+    return "as expected"
+
+
+def _status_of_rounding(
+    measurements: Sequence[CaseMeasurement], expectation: Expectation
+) -> Status:
+    """Tell whether each error is within what the rounding of its steps can make."""
+    if not measurements:
+        return "worse"
+    for measurement in measurements:
+        error = measurement.error
+        if error is None or not abs(error) <= expectation.bound(measurement.steps):
+            return "worse"
     return "as expected"
 
 

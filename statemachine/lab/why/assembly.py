@@ -10,6 +10,7 @@ import numpy as np
 from ...engines import raw_engine_of
 from ...engines.records import DifferingQuantity, ModelDifference
 from ...interface import JointType, Model
+from ...measures import rotation_angles
 from ...measures.text import milliseconds
 from ...release_names import engine_of
 from ..compare.instead import instead_of
@@ -20,6 +21,7 @@ from ..runs.provenance import provenance
 from .causes import Cause, readable_of
 from .explained_gap import ExplainedGap
 from .explanation import Explanation, FailedSet, Share
+from .gap import BALLS
 from .locate import Localisation
 from .request import WhyRequest, is_one_engine
 from .run_differences import orders_of
@@ -100,8 +102,28 @@ def explanation_of(search: Search) -> Explanation:
         renamed=matched.renamed,
         call_periods=request.periods,
         split=search.split,
+        joint=_farthest_joint(trials, gap.quantity),
         changes=trials.known_changes if gap.size > gap.negligible else (),
     )
+
+
+_KINDS = {"joints": JointType.HINGE, "slides": JointType.SLIDE, BALLS: JointType.BALL}
+
+
+def _farthest_joint(trials: Trials, quantity: str) -> str:
+    """Return the joint that is farthest apart, of a quantity of several as they come; else ""."""
+    left, right = (trials.curves_as_they_come(side) for side in (0, 1))
+    if quantity not in _KINDS or left is None or right is None:
+        return ""
+    matched, labels = trials.setup.matched, trials.traces[0].header.joint_labels
+    names = [
+        labels[joint]
+        for joint, _ in matched.joints
+        if matched.left.jnt_type[joint] == _KINDS[quantity]
+    ]
+    one, other = left[quantity], right[quantity]
+    sizes = rotation_angles(one, other) if quantity == BALLS else np.abs(one - other)
+    return names[int(sizes.max(axis=0).argmax())]
 
 
 def _motion(trials: Trials, matched: Matched) -> MotionExtent:

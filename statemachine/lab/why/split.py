@@ -2,7 +2,8 @@
 
 Import is the gap on one engine, the installed MuJoCo: as it runs the figures that either side's
 import read. Joint dynamics is the gap between the engines with the same figures, where nothing
-touches. Contact is the rest. So the three add up to the gap, and none of them is clipped: without
+touches: those of the side that does not run on the installed MuJoCo, or where neither does those of
+the left. Contact is the rest. So the three add up to the gap, and none of them is clipped: without
 contact two sides may be farther apart than with it.
 """
 
@@ -24,6 +25,7 @@ from .setup import RunKey
 from .trials import Trials
 
 PartName = Literal["import", "joint dynamics", "contact"]
+SideName = Literal["left", "right"]
 Obstacle = Literal["", "start or commands", "not run", "contacts", "figures"]
 
 _OF_NO_FILE = ("run", "engine")  # kinds of causes
@@ -52,6 +54,10 @@ class GapSplit:
         reads_alike: Whether there is nothing to separate, since one reader read one file for both
             sides, or two read the same figures.
         parts: Import, joint dynamics and contact. Where all shares are known they add up to 1.
+        figures_of: The side whose figures both engines have where joint dynamics is measured; None
+            where they have the same in any case, or where it cannot be separated.
+        touches: Whether something touches in the runs as they come. Where nothing does, the part of
+            contact is what import and joint dynamics make together.
         obstacle: Why a part cannot be separated; "" where all can.
 
             - "start or commands": the sides also differ in what is none of the three;
@@ -65,6 +71,8 @@ class GapSplit:
     readers: tuple[str, str]
     reads_alike: bool
     parts: tuple[SplitPart, ...]
+    figures_of: SideName | None = None
+    touches: bool = True
     obstacle: Obstacle = ""
     detail: str = ""
 
@@ -83,10 +91,12 @@ class _Route:
         imported: The two runs that differ by what was read; None where they read alike.
         moved: The two runs that differ by the engine; None where there are none with the same
             figures.
+        figures_of: Whose these are; None where both sides have them as they come.
     """
 
     imported: tuple[RunKey, RunKey] | None
     moved: tuple[RunKey, RunKey] | None
+    figures_of: SideName | None = None
 
 
 def split_of(trials: Trials, gap: ExplainedGap, causes: tuple[Cause, ...]) -> GapSplit | None:
@@ -117,10 +127,12 @@ class _Splitting:
         self._reads_alike = self._read_alike()
         self._obstacle: Obstacle = ""
         self._detail = ""
+        self._figures_of: SideName | None = None
 
     def split(self) -> GapSplit:
         """Return the parts, as far as they can be separated."""
         imported, moved, contact = self._shares()
+        touch = self._trials.touch(self._gap.quantity)
         return GapSplit(
             readers=self._readers,
             reads_alike=self._reads_alike,
@@ -129,6 +141,8 @@ class _Splitting:
                 SplitPart("joint dynamics", moved),
                 SplitPart("contact", contact),
             ),
+            figures_of=self._figures_of,
+            touches=touch is not None,
             obstacle=self._obstacle,
             detail=self._detail,
         )
@@ -154,6 +168,7 @@ class _Splitting:
         moved = self._share_without_contact(*route.moved)
         if moved is None:
             return imported, None, None
+        self._figures_of = route.figures_of
         return imported, moved, self._without_rounding(1.0 - imported - moved)
 
     def _contact_of_all(self) -> float | None:
@@ -181,13 +196,13 @@ class _Splitting:
             return _Route(None, (left, right))
         of_left, of_right = RunKey(0, imported=True), RunKey(1, imported=True)
         if self._left.backend == DEFAULT:
-            return _Route((left, of_right), (of_right, right))
+            return _Route((left, of_right), (of_right, right), "right")
         if self._right.backend == DEFAULT:
-            return _Route((of_left, right), (left, of_left))
+            return _Route((of_left, right), (left, of_left), "left")
         if self._refused():
             return _Route((of_left, of_right), None)
         names = frozenset(cause.name for cause in self._causes if _is_of_a_file(cause))
-        return _Route((of_left, of_right), self._trials.setup.runs_of(names))
+        return _Route((of_left, of_right), self._trials.setup.runs_of(names), "left")
 
     def _refused(self) -> list[str]:
         """Return the names of what was read otherwise and cannot be made the same."""

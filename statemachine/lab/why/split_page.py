@@ -41,6 +41,11 @@ class SplitParagraphs(PageContent):
         return tuple(part.name for part in self.split.parts if part.share is None)
 
     @property
+    def is_without_contact(self) -> bool:
+        """Tell whether nothing touches, and a part of the gap is left beside the other two."""
+        return not self.split.touches and bool(self.split.parts[-1].share)
+
+    @property
     def readers(self) -> tuple[str, ...]:
         """Return what read the files, each once."""
         return tuple(dict.fromkeys(self.split.readers))

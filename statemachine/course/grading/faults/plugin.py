@@ -21,7 +21,7 @@ import pytest
 
 import statemachine as sm
 
-from ....engines import raw_engines_with
+from ....backends import backend_names
 from ....installed import DEFAULT
 from ..inside.guard import Guard
 from . import FAULT, IMPORT
@@ -35,9 +35,7 @@ SCENE = "so101/scene_box"
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options with which `run` starts pytest."""
     group = parser.getgroup("statemachine")
-    group.addoption(
-        "--engine", choices=raw_engines_with("backend"), default=DEFAULT, help="backend of `model`"
-    )
+    group.addoption("--engine", choices=backend_names(), default=DEFAULT, help="backend of `model`")
     group.addoption("--record", metavar="FILE", help="write down there what happens")
     group.addoption("--watched", action="store_true", help="with --record: refuse other files, too")
 

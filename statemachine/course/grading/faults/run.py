@@ -21,7 +21,9 @@ from ....engines import raw_engines_with
 from ....errors import BadInputError, MissingEngineError, ModelFileError, check_name, unknown_name
 from ....installed import DEFAULT, engine_version, require
 from ....installing import install_command
+from ....interface.checks import unsupported_by
 from ....lab.runs.drive import Progress, no_progress
+from ....measures.text import listed
 from ....models import AnyPath
 from ....processes import checked_jobs, sandbox
 from ....processes.parallel import in_parallel, unwinding
@@ -62,6 +64,7 @@ def examine(
         ModelFileError: There is no such file.
         BadInputError: It is a link, it cannot be imported, or there are no tests in it.
         UnknownNameError: There is no such fault or backend.
+        UnsupportedError: No fault can be put into this backend.
         MissingEngineError: The engine, or pytest, is not here.
         EngineError: pytest did not come as far as the tests.
     """
@@ -140,9 +143,8 @@ def _ready(backend: str) -> str:
     if backend not in backend_names():
         raise unknown_name("backend", backend, known)
     if backend not in known:
-        raise BadInputError(
-            f"the faults are made for {' and '.join(known)}, not for backend {backend!r}"
-        )
+        reason = f"the faults are put into what the backends of {listed(known)} compile"
+        raise unsupported_by(backend, "check --faults", reason)
     require(backend)
     if importlib.util.find_spec("pytest") is None:
         raise MissingEngineError(

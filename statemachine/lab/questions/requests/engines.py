@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import ClassVar, Literal
 
-from ....backends.chosen import chosen_backends
+from ....backends.chosen import ALL, chosen_backends
 from ....backends.installed_backends import installed_backends
-from ....errors import BadInputError, EndedEarlyError, StateMachineError
+from ....errors import BadInputError, EndedEarlyError, MissingEngineError, StateMachineError
 from ....measures.text import listed
 from ...compare.agreement import Comparison, compare
 from ...compare.odd_side import LEAST_SIDES
@@ -41,7 +41,7 @@ from .gap import CompareRequest
 
 SEARCH_SECONDS = 30.0  # [s] by the clock: a hint needs the largest cause, and --why finds all
 # "too few": of fewer than three sides a run reaches its end.
-EnginesState = Literal["odd", "none", "alike", "nothing moved", "too few"]
+EnginesState = Literal["odd", "unclear", "none", "alike", "nothing moved", "too few"]
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,10 @@ class EnginesResult(ShownResult):
         unit: Its SI unit.
         gaps: Between each two sides whose runs reach the end.
         groups: Which sides agree, and which one is odd: over the whole run, and at its end.
-        state: "odd" where a side is; "none" where no side is, and some are told apart; "alike"
-            where no two are; "nothing moved" where there was nothing to compare; "too few" where
-            fewer than three runs reach the end.
+        state: "odd" where a side is; "unclear" where one is with the steps as given, and not with
+            some finer ones; "none" where no side is, and some are told apart; "alike" where no two
+            are; "nothing moved" where there was nothing to compare; "too few" where fewer than
+            three runs reach the end.
         ended: The sides whose runs do not.
         finer: The same with finer steps; None where no side is odd, or where one does not run so.
         origin: What the gap between the odd side and the nearest other one comes from; None where
@@ -180,6 +181,7 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
     for error in missing:
         reporter.note(f"{error}; it is left out")
     names = labels_of_sides(sides) if request.sides else [str(backend) for backend in backends]
+    _load_each(request, sides, names)
     labels = dict(enumerate(names))
     compared: dict[Two, gap.CompareResult] = {}
     for left, right in combinations(labels, 2):
@@ -221,11 +223,10 @@ def answer(request: EnginesRequest, reporter: Reporter = QUIET) -> EnginesResult
     )
     if result.odd is None:
         return result
-    return replace(
-        result,
-        finer=_finer(result, sides, comparisons, quantities, complete, reporter),
-        origin=_origin(result, sides, reporter),
-    )
+    finer = _finer(result, sides, comparisons, quantities, complete, reporter)
+    if finer is not None and finer.state == "changes":
+        result = replace(result, state="unclear")
+    return replace(result, finer=finer, origin=_origin(result, sides, reporter))
 
 
 def labels_of_sides(sides: Sequence[Side]) -> list[str]:
@@ -248,6 +249,26 @@ def sides_of(request: EnginesRequest) -> tuple[Side, ...]:
     return tuple(
         Side(model, backend.name, backend.defaults, {}, run.menagerie) for backend in backends
     )
+
+
+def _load_each(request: EnginesRequest, sides: Sequence[Side], names: Sequence[str]) -> None:
+    """Load each side once, so that one that cannot be loaded is told before anything runs.
+
+    Raises:
+        BadInputError: An engine of "all" cannot load the file; which ones to name instead.
+        StateMachineError: Another side cannot be loaded.
+    """
+    options = {**request.run.scenario().options, **request.run.options}
+    for side, name in zip(sides, names, strict=True):
+        try:
+            side.load(**options)
+        except MissingEngineError:
+            continue  # its recorded run may take its place
+        except StateMachineError as error:
+            if ALL not in request.backends:
+                raise
+            others = " ".join(f"--backend {other}" for other in names if other != name)
+            raise BadInputError(f"{error}; without {name}: {others}") from error
 
 
 def _ended(

@@ -1,11 +1,25 @@
-"""Faults of a contract, as they are written into its file."""
+"""Put each fault into a contract, and print which change of the contract is named for it.
+
+python -m tools.policy_faults POLICY.onnx CONTRACT.yaml MODEL --backend mujoco --backend pybullet
+"""
 
 from __future__ import annotations
 
+import argparse
 import copy
-from collections.abc import Callable, Mapping
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import yaml
+
+from statemachine.errors import EngineWarning
+from statemachine.lab.policy.command import Command
+from statemachine.lab.policy.diagnosis import EngineDiagnosis, diagnose
+from statemachine.lab.policy.request import PolicyRequest
 
 Contract = dict[str, Any]
 Fault = Callable[[Contract], None]
@@ -78,7 +92,7 @@ def _slow_clock(contract: Contract) -> None:
     term_of(contract, "gait_phase")["params"]["period"] *= 2
 
 
-# Each fault of the issue's table: the term that a contract must have for it ("" for any), the name
+# The term that a contract must have for it ("" for any), the name
 # of the change that mends it, and how it is written.
 FAULTS: Mapping[str, tuple[str, str, Fault]] = {
     "xyzw": ("", "quaternion order", _imu("quat_order", "xyzw")),
@@ -116,8 +130,51 @@ def applies(contract: Contract, fault: str) -> bool:
 
 def written_with(contract: Contract, fault: str, folder: Path) -> Path:
     """Write a contract with a fault, and return its file."""
-    import yaml
-
     file = folder / "contract.yaml"
     file.write_text(yaml.safe_dump(faulty(contract, fault)), "utf-8")
     return file
+
+
+def is_named(engine: EngineDiagnosis, fault: str) -> bool:
+    """Tell whether the best change is the one that mends a fault; "" for none at all."""
+    if not fault:
+        return not engine.named
+    return bool(engine.named) and engine.named[0].kind == FAULTS[fault][1]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print a line for each backend and fault; return how many are not named."""
+    parser = argparse.ArgumentParser("python -m tools.policy_faults", description=__doc__)
+    parser.add_argument("policy")
+    parser.add_argument("contract", type=Path)
+    parser.add_argument("model")
+    parser.add_argument("--backend", action="append")
+    parser.add_argument("--command", type=float, nargs=3, default=(0.3, 0.0, 0.5))
+    parser.add_argument("--seconds", type=float, default=10.0)
+    options = parser.parse_args(arguments)
+    warnings.simplefilter("ignore", EngineWarning)
+    contract = yaml.safe_load(options.contract.read_text("utf-8"))
+    missed = 0
+    for backend in options.backend or ["mujoco"]:
+        for fault in ("", *(name for name in FAULTS if applies(contract, name))):
+            with tempfile.TemporaryDirectory() as folder:
+                request = PolicyRequest(
+                    policy=options.policy,
+                    contract=written_with(contract, fault, Path(folder)),
+                    model=options.model,
+                    backends=(backend,),
+                    commands=(Command(*options.command),),
+                    seconds=options.seconds,
+                )
+                (engine,) = diagnose(request).engines
+            found = is_named(engine, fault)
+            missed += not found
+            kinds = ", ".join(dict.fromkeys(each.kind for each in engine.named)) or "none"
+            costs = f"{engine.cost:.2f} -> {engine.tried[0].cost:.2f}"
+            mark = " " if found else "!"
+            print(f"{mark} {backend:10}{fault or 'sound':26}{costs:16}{kinds}", flush=True)
+    return missed
+
+
+if __name__ == "__main__":
+    sys.exit(main())
