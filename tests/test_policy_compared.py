@@ -328,7 +328,7 @@ def test_outcomes_of_a_policy_are_told_of_a_policy_alone() -> None:
 
 
 def test_a_speed_has_a_tolerance_that_can_be_typed() -> None:
-    assert parse_tolerances(["speed=0.05m/s"]) == {"speed": 0.05}
+    assert parse_tolerances(["forward-speed=0.05m/s"]) == {"forward speed": 0.05}
 
 
 @pytest.fixture(scope="module")

@@ -131,7 +131,7 @@ _KINDS = (
     ),
     Quantity("distance", "m", "distances travelled", is_outcome=True),
     Quantity(
-        "speed",
+        "forward speed",
         "m/s",
         "forward speeds",
         is_outcome=True,

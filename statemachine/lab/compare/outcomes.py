@@ -33,7 +33,7 @@ OF_POLICY = (FORWARD, LATERAL, WORK)
 # The kind of each, which says unit and tolerance.
 OUTCOMES: Mapping[str, str] = {
     FELL: "fall",
-    FORWARD: "speed",
+    FORWARD: "forward speed",
     LATERAL: "lateral way",
     WORK: "work",
     DISTANCE: "distance",
