@@ -107,7 +107,8 @@ class _Result(VersionsResult):
         """Ask nothing."""
         vars(self).update(pairs=(SimpleNamespace(comparison="a"), SimpleNamespace(comparison="b")))
 
-    def page(self) -> Any:
+    def page(self, details: bool = False) -> Any:
+        del details
         return SimpleNamespace(blocks=("one", "two"))
 
 
