@@ -57,7 +57,7 @@ def board(tmp_path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         f'quat="{np.cos(turn / 2)} 0 0 {np.sin(turn / 2)}"/>'
     )
     size = (120, 120)
-    camera = seen_from_above(size[1] / CELL, at)
+    camera = seen_from_above(size[1] / CELL, at.tolist())
     seen = shot("pybullet", Scene(mjcf(plane + BALL), camera, [(9, 9, 0)], size=size), tmp_path)
     offset = 5.0 * corners_of_pixels(camera, size)[..., :2]
     c, s = np.cos(turn), np.sin(turn)

@@ -68,7 +68,9 @@ class Notes:
         self.fractions: list[float] = []
 
     @contextmanager
-    def stage(self, _what: str, *_more: Any, **_named: Any) -> Iterator[Any]:
+    def stage(
+        self, what: str, runs_at_once: int = 0, expected_seconds: float | None = None
+    ) -> Iterator[Any]:
         yield self.fractions.append
 
     def note(self, text: str) -> None:
@@ -168,7 +170,7 @@ def test_poses_that_are_not_numbers_cannot_be_drawn(hold: Trace, arm: sm.Model) 
     for name in ("xpos", "xquat"):
         broken = hold[name].copy()
         broken[-1:, -1] = np.nan
-        trace = changed(hold, **{name: broken})
+        trace = changed(hold, None, **{name: broken})
         assert motion_of(trace, arm, times).xpos.shape[0] == 2
         with pytest.raises(TraceError):
             motion_of(trace, arm, np.array([0.0, 0.1]))

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from statemachine import load
+from statemachine.lab.policy.command import Command
 from statemachine.lab.policy.contract_file import read_contract
 from statemachine.lab.policy.network import Network
 from statemachine.lab.policy.on_model import PolicyOnModel
-from statemachine.lab.policy.walk import Command, Walk, all_walked
+from statemachine.lab.policy.walk import Walk, all_walked
 from statemachine.models import models_dir
 
 from .support.policies import contract_file

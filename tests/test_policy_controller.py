@@ -10,7 +10,8 @@ import pytest
 from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.interface import Array, Model
-from statemachine.lab.policy.walk import Command, set_start, walked
+from statemachine.lab.policy.command import Command
+from statemachine.lab.policy.walk import set_start, walked
 
 from .support.backends import BOTH
 from .support.policies import (

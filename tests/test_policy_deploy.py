@@ -8,12 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from statemachine import load
 from statemachine.errors import BadInputError
+from statemachine.lab.policy.command import Command
 from statemachine.lab.policy.contract import Clock, Contract
 from statemachine.lab.policy.contract_file import read_contract
+from statemachine.lab.policy.network import Network
+from statemachine.lab.policy.on_model import PolicyOnModel
 from statemachine.lab.policy.unitree_deploy import ORDERS
+from statemachine.lab.policy.walk import walked
 
 from .support.policies import contract_file
+from .support.requirements import SHARED, need_engine, shared
 
 pytest.importorskip("yaml")
 
@@ -281,3 +287,28 @@ def test_the_robots_that_are_known_are_named_where_none_fits(tmp_path: Path) -> 
 def test_an_observation_that_is_misspelt_is_answered_with_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="Did you mean joint_pos_rel"):
         of_go2(tmp_path, observations={"joint_pos_rell": {"scale": 1.0}})
+
+
+@pytest.mark.slow
+def test_a_public_policy_walks_by_such_a_file(tmp_path: Path) -> None:
+    """A Go1, whose motors are numbered as those of a Go2; its pose and gains are of its scene."""
+    need_engine("mujoco")
+    pytest.importorskip("onnxruntime")
+    folder = shared(SHARED / "policies" / "go1")
+    pose = [0.1, 0.9, -1.8, -0.1, 0.9, -1.8] * 2
+    names = ["base_lin_vel", "base_ang_vel", "projected_gravity", "joint_pos_rel"]
+    names += ["joint_vel_rel", "last_action", "velocity_commands"]
+    model = load(folder / "scene.xml")
+    fields = deploy(
+        list(range(12)),
+        12,
+        stiffness=model.actuator_kp.tolist(),
+        damping=model.actuator_kv.tolist(),
+        default_joint_pos=pose,
+        actions={"JointPositionAction": {"scale": [0.5] * 12, "offset": pose}},
+        observations={name: {"history_length": 1} for name in names},
+    )
+    policy = PolicyOnModel.of(read(tmp_path, fields), Network(folder / "policy.onnx"), model)
+    walk = walked(policy, Command(0.8), 4.0).walk
+    assert walk.verdict == "walks"
+    assert policy.driven.changes == ()

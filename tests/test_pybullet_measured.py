@@ -156,7 +156,7 @@ def test_a_row_of_the_pile_is_three_poses_and_a_joint(pile: type) -> None:
     boxes = row[:21].reshape(3, 7)
     np.testing.assert_allclose(boxes[:, :2], np.array(PLACES)[:, :2], atol=1e-6)
     turn = np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT)
-    np.testing.assert_allclose(boxes[:, 3:], [turn, (0, 0, 0, 1), (0, 0, 0, 1)], atol=1e-5)
+    np.testing.assert_allclose(boxes[:, 3:], [turn.tolist(), (0, 0, 0, 1), (0, 0, 0, 1)], atol=1e-5)
     assert row.shape == (22,)
 
 

@@ -28,7 +28,7 @@ from statemachine.lab.why.deadline import Deadline
 from statemachine.lab.why.explained_gap import explained_gap
 from statemachine.lab.why.page import page
 from statemachine.lab.why.setup import NONE
-from statemachine.lab.why.split import GapSplit, split_of
+from statemachine.lab.why.split import GapSplit, SplitPart, split_of
 from statemachine.lab.why.split_page import SplitParagraphs, split_blocks
 from statemachine.lab.why.trials import Trials
 from statemachine.show.blocks import Page
@@ -213,6 +213,22 @@ def softer(lost: Path) -> Path:
     """Return the arm's file with softer servos, and dampers of their own."""
     text = lost.read_text("utf-8").replace("<position ", '<position kp="500" kv="2.731" ')
     return written(lost.parent / "softer.xml", text)
+
+
+@pytest.mark.parametrize(
+    ("located", "otherwise"), [(None, False), (-0.01, False), (0.05, False), (0.53, True)]
+)
+def test_another_part_of_contact_in_the_table_is_explained(
+    located: float | None, otherwise: bool
+) -> None:
+    """As of MotrixSim beside MuJoCo 3.3.7 in `hold`."""
+    shares = (
+        SplitPart("import", 0.0),
+        SplitPart("joint dynamics", 1.014),
+        SplitPart("contact", -0.014),
+    )
+    split = GapSplit(("motrix 0.10.1", "mujoco 3.3.7"), True, shares)
+    assert SplitParagraphs(split, "6.12°", "short", located).is_located_otherwise is otherwise
 
 
 @pytest.mark.parametrize(

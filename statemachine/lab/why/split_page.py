@@ -10,8 +10,10 @@ from ...measures.text import quantity
 from ...show.blocks import Block
 from ...show.templates import PageContent, render_blocks
 from .explanation import Explanation
+from .settings import CONTACT
 from .split import GapSplit, SplitPart
 
+_CLOSE = 0.1  # of a gap: parts that are less far apart are no contradiction
 SplitWording = Literal["short", "read alike", "read otherwise"]
 
 
@@ -23,12 +25,14 @@ class SplitParagraphs(PageContent):
         split: The parts.
         gap: The gap, with its unit.
         wording: How the three words are explained.
+        located: The part of the gap that the table of causes gives contact; None where it has none.
     """
 
     template = "why_split.md.j2"
     split: GapSplit
     gap: str
     wording: SplitWording
+    located: float | None = None
 
     @property
     def separated(self) -> tuple[SplitPart, ...]:
@@ -44,6 +48,14 @@ class SplitParagraphs(PageContent):
     def is_without_contact(self) -> bool:
         """Tell whether nothing touches, and a part of the gap is left beside the other two."""
         return not self.split.touches and bool(self.split.parts[-1].share)
+
+    @property
+    def is_located_otherwise(self) -> bool:
+        """Tell whether the table of causes gives contact quite another part."""
+        contact = self.split.parts[-1].share
+        if contact is None or self.located is None:
+            return False
+        return abs(contact - self.located) > _CLOSE
 
     @property
     def readers(self) -> tuple[str, ...]:
@@ -67,4 +79,5 @@ def split_blocks(result: Explanation, details: bool = False) -> Sequence[Block]:
     if details:
         wording = "read alike" if split.reads_alike else "read otherwise"
     gap = quantity(result.gap, result.unit)
-    return render_blocks(SplitParagraphs(split, gap, wording))
+    located = next((part.share for part in result.found_in if part.name == CONTACT.name), None)
+    return render_blocks(SplitParagraphs(split, gap, wording, located))
