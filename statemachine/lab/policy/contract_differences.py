@@ -36,8 +36,8 @@ def field_differences(first: Contract, second: Contract) -> tuple[FieldDifferenc
 def _differences(first: Contract, second: Contract) -> Iterator[FieldDifference]:
     yield from _one("joints", first.joints, second.joints)
     yield from _one("default_joint_pos", first.default_joint_pos, second.default_joint_pos)
-    names, others = ([term.name for term in each.terms] for each in (first, second))
-    yield from _one("terms", tuple(names), tuple(others))
+    names = tuple(term.name for term in first.terms)
+    yield from _one("terms", names, tuple(term.name for term in second.terms))
     for term in first.terms:
         other = next((known for known in second.terms if known.name == term.name), None)
         if other is not None:

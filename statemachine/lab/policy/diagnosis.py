@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import BadInputError, UnsupportedError
 from ...interface import Model
+from ...show.blocks import only_on_pages
 from ..runs.drive import Progress
 from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
@@ -80,6 +81,12 @@ class EngineDiagnosis:
     tried: tuple[TriedHypothesis, ...]
     named: tuple[TriedHypothesis, ...]
 
+    @property
+    @only_on_pages
+    def walks_well(self) -> bool:
+        """Tell whether it walks as it is asked in each run, with the contract as it is."""
+        return all(walk.verdict == "walks" for walk in self.walks)
+
 
 @dataclass(frozen=True)
 class DiagnosisResult:
@@ -102,10 +109,7 @@ class DiagnosisResult:
     @property
     def holds(self) -> bool:
         """Tell whether no change makes it better on any engine, and it walks on each."""
-        return all(
-            not engine.named and all(walk.verdict == "walks" for walk in engine.walks)
-            for engine in self.engines
-        )
+        return all(engine.walks_well and not engine.named for engine in self.engines)
 
 
 def cost_of(walks: Sequence[Walk], seconds: float) -> float:

@@ -33,12 +33,7 @@ class _EnginePart:
     @property
     def is_sound(self) -> bool:
         """Tell whether it walks as it is asked, and no change makes it better."""
-        return not self.engine.named and self.walks
-
-    @property
-    def walks(self) -> bool:
-        """Tell whether it walks as it is asked, with the contract as it is."""
-        return all(walk.verdict == "walks" for walk in self.engine.walks)
+        return self.engine.walks_well and not self.engine.named
 
     @property
     def best(self) -> TriedHypothesis:

@@ -260,12 +260,10 @@ def _clocks(contract: Contract) -> Iterator[Hypothesis]:
         if clock is None or not term.scale.any():
             continue
         half = round(0.5 * clock.period / contract.timing.policy_dt)
-        clocks = (
-            (f"{0.5 * clock.period:g} s", replace(clock, period=0.5 * clock.period)),
-            (f"{2.0 * clock.period:g} s", replace(clock, period=2.0 * clock.period)),
-            ("half a period later", replace(clock, offset_steps=clock.offset_steps + half)),
-        )
-        for after, changed_clock in clocks:
+        clocks = {"half a period later": replace(clock, offset_steps=clock.offset_steps + half)}
+        for period in (0.5 * clock.period, 2.0 * clock.period):
+            clocks[f"{period:g} s"] = replace(clock, period=period)
+        for after, changed_clock in clocks.items():
             changed = with_term(contract, term, replace(term, clock=changed_clock))
             yield Hypothesis("clock", term.name, f"{clock.period:g} s", after, changed)
 

@@ -103,9 +103,13 @@ def compare_contracts(
         for number, policy in enumerate(policies):
             stage = progress_of_stage(progress, 0.5 * number, 0.5)
             runs.append(all_walked(policy, commands, request.seconds, request.keyframe, stage))
-        walks = [tuple(run.walk for run in each) for each in runs]
-        gaps = _largest_gaps(policies[0], policies[1], runs[0])
-        return EngineContracts(backend, model.engine_version, walks[0], walks[1], gaps)
+        return EngineContracts(
+            backend=backend,
+            version=model.engine_version,
+            first=tuple(run.walk for run in runs[0]),
+            second=tuple(run.walk for run in runs[1]),
+            gaps=_largest_gaps(policies[0], policies[1], runs[0]),
+        )
 
     engines = on_each_backend(
         request.backends,
