@@ -106,8 +106,8 @@ def compare_contracts(
         return EngineContracts(
             backend=backend,
             version=model.engine_version,
-            first=tuple(run.walk for run in runs[0]),
-            second=tuple(run.walk for run in runs[1]),
+            first=_walks_of(runs[0]),
+            second=_walks_of(runs[1]),
             gaps=_largest_gaps(policies[0], policies[1], runs[0]),
         )
 
@@ -130,6 +130,10 @@ def compare_contracts(
         kinds=_kinds(first, second),
         engines=tuple(engines.values()),
     )
+
+
+def _walks_of(runs: Sequence[RecordedWalk]) -> tuple[Walk, ...]:
+    return tuple(run.walk for run in runs)
 
 
 def _largest_gaps(
