@@ -6,8 +6,8 @@ Each was tried on the engine: `tests/test_validate_motrix.py` does it again.
 from __future__ import annotations
 
 QUATERNION = (
-    "A step turns a body by 2 atan(ω h / 2) and not by ω h: it adds half of ω h to the "
-    "quaternion, and makes that of length one."
+    "A step of length h turns a body at the speed w by 2 atan(w h / 2) and not by w h: it adds "
+    "half of w h to the quaternion, and makes that of length one."
 )
 INSTABILITY = (
     "A turn about the middle axis is unstable, which magnifies rounding: MuJoCo is as far off "
