@@ -116,16 +116,3 @@ def test_another_reference_of_a_slide_moves_the_body(tmp_path: Path) -> None:
     row = _named(causes_of_texts(tmp_path, *sides))["place"]
     edits = {field: np.asarray(to) for field, _, to in row.edits}
     np.testing.assert_allclose(edits["body_pos"], (0.3, 0, 1), atol=1e-9)
-
-
-TIED = """<mujoco><worldbody><body><joint name="x"/><geom size=".1"/></body><body pos="1 0 0">
-<joint name="y"/><geom size=".1"/></body></worldbody><equality>
-<joint name="e" joint1="{}" joint2="{}" polycoef="{}"/></equality></mujoco>"""
-
-
-def test_a_tie_that_is_written_the_other_way_round_is_turned_round(tmp_path: Path) -> None:
-    sides = TIED.format("x", "y", "0.3 4 0 0 0"), TIED.format("y", "x", "0.1 2 0 0 0")
-    rows = causes_of_texts(tmp_path, *sides)
-    edits = {field: np.asarray(to) for row in rows for field, _, to in row.edits}
-    # x = 0.3 + 4 y is y = -0.3/4 + x/4.
-    np.testing.assert_allclose(edits["eq_data"][:5], (-0.075, 0.25, 0, 0, 0), atol=1e-12)

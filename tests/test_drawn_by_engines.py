@@ -17,7 +17,7 @@ RADIUS = 0.1
 BALL = f'<body pos="0 0 5"><freejoint/><geom size="{RADIUS}" rgba="1 0.5 0 1"/></body>'
 FLOOR = '<geom type="plane" size="0 0 1" rgba="0.8 0.6 0.4 1"/>'
 BAR = (
-    '<body><freejoint/><geom type="box" size="0.3 0.04 0.02"/></body>'
+    '<body><freejoint/><geom type="box" size="0.02 0.04 0.3" euler="0 90 0"/></body>'
     '<body pos="0 0 5"><freejoint/>'
     '<geom type="box" size="0.05 0.05 0.05" pos="0.3 0 0"/></body>'
 )

@@ -33,7 +33,7 @@ def test_mujoco_draws_the_first_three_groups_and_neither_sites_nor_tendons(tmp_p
 
 
 def test_mujoco_draws_what_only_touches_where_there_is_nothing_else(tmp_path: Path) -> None:
-    text = mjcf('<body><freejoint/><geom size="0.1" group="4"/></body>')
+    text = mjcf('<body><freejoint/><geom size="0.1" group="3"/></body>')
     seen = shot("mujoco", Scene(text, seen_from_above(1.0), [(0, 0, 0)]), tmp_path)
     assert np.isfinite(seen.depth).any()
 

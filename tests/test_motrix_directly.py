@@ -92,7 +92,9 @@ def test_what_is_written_back_in_a_contact_has_another_future(motrix: Any) -> No
 def test_what_meets_nothing_has_the_same_future_when_it_is_written_back(
     tmp_path: Path, motrix: Any
 ) -> None:
-    file = written(tmp_path / "cart.xml", CART.format(actuators=SERVO))
+    key = '<keyframe><key qpos="0.3 0" qvel="0.5 0.1" ctrl="0.2"/></keyframe></mujoco>'
+    text = CART.format(actuators=SERVO).replace("</mujoco>", key)
+    file = written(tmp_path / "cart.xml", text)
     ways = motrix.restore_methods(sm.load(file, backend="motrix"))
     assert [way.difference for way in ways] == [0.0, 0.0, 0.0]
 

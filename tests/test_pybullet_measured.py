@@ -179,6 +179,7 @@ def test_after_a_reset_the_boxes_stand_where_they_stood(way: str, pile: type) ->
     with pile.fresh() as scene:
         before = scene.run(1)[0]
         scene.run(40)
+        scene.quantities["joint position"][0](scene, 0.5)
         scene.resets[way](scene)
         after = scene.refilled().run(1)[0]
     places = np.r_[0:2, 3:7, 7:9, 10:14, 14:16, 17:21]
