@@ -43,6 +43,7 @@ from statemachine.measures import parse_tolerances
 from statemachine.measures.text import quantity
 from statemachine.models import models_dir
 
+from .support.policies import GO1_CONTRACT
 from .support.requirements import SHARED, need_engine, shared
 
 FOLDER = models_dir() / "quadruped"
@@ -430,37 +431,12 @@ def test_a_gain_that_differs_is_named_the_cause() -> None:
 
 # A public policy: that of the Go1, of MuJoCo Playground.
 
-_GO1 = """
-schema: gaitkeeper/contract/v3
-timing: {policy_dt: 0.02, sim_dt: 0.004}
-policy_io:
-  joints:
-    names: [FR_hip_joint, FR_thigh_joint, FR_calf_joint, FL_hip_joint, FL_thigh_joint,
-            FL_calf_joint, RR_hip_joint, RR_thigh_joint, RR_calf_joint, RL_hip_joint,
-            RL_thigh_joint, RL_calf_joint]
-  imu: {site: imu, frame: body}
-  observation_groups:
-    policy:
-      terms:
-        - {id: base_lin_vel, params: {site: imu}}
-        - {id: base_ang_vel}
-        - {id: projected_gravity}
-        - {id: joint_pos_rel}
-        - {id: joint_vel_rel}
-        - {id: last_action}
-        - {id: velocity_commands}
-control:
-  default_joint_pos: [0.1, 0.9, -1.8, -0.1, 0.9, -1.8, 0.1, 0.9, -1.8, -0.1, 0.9, -1.8]
-  actions: {joint_pos: {scale: 0.5}}
-  actuators: {kind: implicit_pd}
-"""
-
 
 def _go1(folder: Path, backend: str, timestep: float | None = None) -> dict[str, float | None]:
     """Return what comes of the Go1's policy in 2 s, asked for 0.8 m/s forward."""
     go1 = shared(SHARED / "policies" / "go1" / "policy.onnx")
     contract = folder / "go1.yaml"
-    contract.write_text(_GO1, "utf-8")
+    contract.write_text(GO1_CONTRACT, "utf-8")
     asked = RecordRequest(
         str(go1),
         go1.with_name("scene.xml"),

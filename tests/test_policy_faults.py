@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,8 @@ from statemachine.lab.policy.two_contracts import ContractsResult, compare_contr
 from statemachine.lab.policy.walk import Ending, Walk
 from tools.policy_faults import FAULTS, applies, is_named, written_with
 
-from .support.requirements import need_engine
+from .support.policies import GO1_CONTRACT
+from .support.requirements import SHARED, need_engine, shared
 
 yaml = pytest.importorskip("yaml")
 pytest.importorskip("onnxruntime")
@@ -164,21 +166,43 @@ def test_what_the_contract_does_not_have_is_no_fault_of_it() -> None:
     assert not applies(text, "slow clock")
 
 
-def diagnosed(folder: Path, fault: str, backend: str) -> EngineDiagnosis:
-    """Return which change is named where the quadruped turns with a faulty contract for 10 s."""
+@dataclass(frozen=True)
+class Walker:
+    """A policy, its contract as text, its robot, and what it is asked for."""
+
+    policy: Path
+    contract: dict[str, Any]
+    model: str
+    turning: Command
+    seconds: float
+
+
+def quadruped() -> Walker:
+    policy, turning = QUADRUPED / "policy.onnx", Command(0.3, 0.0, 0.5)
+    return Walker(policy, contract_text(), "quadruped/scene", turning, 10.0)
+
+
+def go1() -> Walker:
+    policy = shared(SHARED / "policies" / "go1" / "policy.onnx")
+    scene = str(policy.with_name("scene.xml"))
+    return Walker(policy, yaml.safe_load(GO1_CONTRACT), scene, Command(0.5, 0.0, 0.8), 5.0)
+
+
+def diagnosed(walker: Walker, folder: Path, fault: str, backend: str) -> EngineDiagnosis:
+    """Return which change is named where a robot turns by a contract with a fault."""
     need_engine(backend)
-    turning = (Command(0.3, 0.0, 0.5),)
-    contract = written_with(contract_text(), fault, folder)
-    policy = QUADRUPED / "policy.onnx"
-    request = PolicyRequest(policy, contract, "quadruped/scene", (backend,), turning, 10.0)
-    (engine,) = diagnose(request).engines
+    contract = written_with(walker.contract, fault, folder)
+    asked = PolicyRequest(
+        walker.policy, contract, walker.model, (backend,), (walker.turning,), walker.seconds
+    )
+    (engine,) = diagnose(asked).engines
     return engine
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["", *sorted(FAULTS)])
 def test_a_fault_is_named_by_what_mends_the_walk(tmp_path: Path, fault: str) -> None:
-    assert is_named(diagnosed(tmp_path, fault, "mujoco"), fault)
+    assert is_named(diagnosed(quadruped(), tmp_path, fault, "mujoco"), fault)
 
 
 # All of them take minutes there: python -m tools.policy_faults tries each.
@@ -188,4 +212,16 @@ ELSEWHERE = ("", "gyroscope in world axes", "velocity in world axes", "swapped l
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ELSEWHERE)
 def test_a_fault_is_named_on_the_second_engine_too(tmp_path: Path, fault: str) -> None:
-    assert is_named(diagnosed(tmp_path, fault, "pybullet"), fault)
+    assert is_named(diagnosed(quadruped(), tmp_path, fault, "pybullet"), fault)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", [*ELSEWHERE, "no last action", "action x4"])
+def test_a_fault_of_a_public_policy_is_named(tmp_path: Path, fault: str) -> None:
+    assert is_named(diagnosed(go1(), tmp_path, fault, "mujoco"), fault)
+
+
+@pytest.mark.slow
+def test_the_public_policy_does_not_mind_a_delay_of_one_call(tmp_path: Path) -> None:
+    engine = diagnosed(go1(), tmp_path, "delay of 1", "mujoco")
+    assert (engine.walks_well, engine.named) == (True, ())

@@ -236,3 +236,30 @@ def run(policy: PolicyOnModel, steps: int, command: Sequence[float] = (0.0, 0.0,
         end = np.array(data.qpos)
     ctrls, positions, speeds = (np.array(column) for column in zip(*rows, strict=True))
     return PolicyRun(controller, ctrls, positions, speeds, end)
+
+
+# What the public policy of the Go1 expects, that of MuJoCo Playground.
+GO1_CONTRACT = """
+schema: gaitkeeper/contract/v3
+timing: {policy_dt: 0.02, sim_dt: 0.004}
+policy_io:
+  joints:
+    names: [FR_hip_joint, FR_thigh_joint, FR_calf_joint, FL_hip_joint, FL_thigh_joint,
+            FL_calf_joint, RR_hip_joint, RR_thigh_joint, RR_calf_joint, RL_hip_joint,
+            RL_thigh_joint, RL_calf_joint]
+  imu: {site: imu, frame: body}
+  observation_groups:
+    policy:
+      terms:
+        - {id: base_lin_vel, params: {site: imu}}
+        - {id: base_ang_vel}
+        - {id: projected_gravity}
+        - {id: joint_pos_rel}
+        - {id: joint_vel_rel}
+        - {id: last_action}
+        - {id: velocity_commands}
+control:
+  default_joint_pos: [0.1, 0.9, -1.8, -0.1, 0.9, -1.8, 0.1, 0.9, -1.8, -0.1, 0.9, -1.8]
+  actions: {joint_pos: {scale: 0.5}}
+  actuators: {kind: implicit_pd}
+"""
