@@ -136,10 +136,10 @@ def written_with(contract: Contract, fault: str, folder: Path) -> Path:
 
 
 def is_named(engine: EngineDiagnosis, fault: str) -> bool:
-    """Tell whether the best change is the one that mends a fault; "" for none at all."""
+    """Tell whether the change that mends a fault is among the best; "" for none at all."""
     if not fault:
         return not engine.named
-    return bool(engine.named) and engine.named[0].kind == FAULTS[fault][1]
+    return FAULTS[fault][1] in [each.kind for each in engine.named]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
