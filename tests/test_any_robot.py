@@ -270,6 +270,7 @@ _QUICK: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", list(ROBOTS))
 @pytest.mark.parametrize(
     "name",

@@ -134,6 +134,7 @@ def profiled(engine: str, heard: Callable[[Any, str], None]) -> Any:
         sys.setprofile(None)
 
 
+@pytest.mark.slow
 def test_every_call_is_recorded(engine: str) -> None:
     """Against Python's own account of the same code, run without the recorder."""
     code = WHOLE.format(engine=engine)

@@ -539,6 +539,7 @@ def test_a_file_that_is_saved_as_utf_16_is_told_as_any_other_encoding(
     assert judgement.judged
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", slow_on("pybullet"), indirect=True)
 def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:
     done = here("check", str(SOLUTION), "--backend", backend, "--json", code=0)

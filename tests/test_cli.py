@@ -17,7 +17,7 @@ from rich.cells import cell_len
 from statemachine.course.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .support.backends import BOTH, slow_on
+from .support.backends import BOTH
 from .support.claims import assert_has, assert_in, assert_not_in
 from .support.explained import with_changes
 from .support.files import written
@@ -33,8 +33,9 @@ def _json(cli: Cli, *arguments: str) -> Any:
     return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lesson", LESSONS)
-@pytest.mark.parametrize("backend", slow_on("pybullet", BOTH), indirect=True)
+@pytest.mark.parametrize("backend", BOTH, indirect=True)
 def test_every_lesson_runs_and_reads_well_piped(here: Cli, lesson: str, backend: str) -> None:
     need_engines_of(lesson)
     done = here("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()), code=0)

@@ -25,6 +25,7 @@ from statemachine.errors import (
     UnknownNameError,
     UnsupportedError,
 )
+from statemachine.installed import DEFAULT
 from statemachine.interface import Behaviour
 
 from .support.backends import registered
@@ -33,6 +34,12 @@ from .support.hidden_world import ExampleModel, ExampleWorld
 from .support.hidden_world import load as load_hidden
 from .support.motions import opened
 from .support.requirements import need_engine
+
+# The primary engine and one that is all ours in the quick part, the others in the slow one.
+LABS = [
+    pytest.param(name, marks=[pytest.mark.slow] * (name != DEFAULT)) for name in backend_names()
+]
+LABS.append(pytest.param("hidden"))
 
 
 @pytest.fixture
@@ -47,7 +54,7 @@ def lab(request: pytest.FixtureRequest) -> Iterator[conformance.Lab]:
         yield lab
 
 
-@pytest.mark.parametrize("lab", [*backend_names(), "hidden"], indirect=True)
+@pytest.mark.parametrize("lab", LABS, indirect=True)
 @pytest.mark.parametrize("check", conformance.CHECKS)
 def test_a_backend_keeps_what_the_contract_asks(lab: conformance.Lab, check: str) -> None:
     if "witness" in check:

@@ -429,6 +429,7 @@ def test_the_notebook_of_questions_compares_a_model_and_names_a_stage(
     assert "mass matrix" in answers["one-step"][0]["data"]["text/plain"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", slow_on("pybullet"), indirect=True)
 def test_a_lesson_in_a_notebook_is_of_the_engine_that_is_asked_for(backend: str) -> None:
     result = lesson("forward", backend)

@@ -21,7 +21,10 @@ BAR = (
     '<body pos="0 0 5"><freejoint/>'
     '<geom type="box" size="0.05 0.05 0.05" pos="0.3 0 0"/></body>'
 )
-ENGINES = pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+# MuJoCo draws in a process of its own, which takes a second to begin.
+ENGINES = pytest.mark.parametrize(
+    "engine", [pytest.param("mujoco", marks=pytest.mark.slow), "pybullet"]
+)
 QUARTER = (0.5**0.5, 0.0, 0.0, 0.5**0.5)  # about z
 
 

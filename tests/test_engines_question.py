@@ -191,6 +191,7 @@ def test_a_side_that_is_odd_at_some_steps_alone_is_not_steady(damped: EnginesRes
     assert not replace(damped.finer, odd=("damping=0.3", "", "")).is_steady
 
 
+@pytest.mark.slow
 def test_where_finer_steps_change_the_odd_side_which_one_is_odd_is_unclear(
     drifting: EnginesResult,
 ) -> None:

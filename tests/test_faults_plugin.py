@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from statemachine.backends import backend_names
 from statemachine.course.grading.faults import FAULT, FAULTS, IMPORT, patches, plugin
 from statemachine.course.grading.faults.plugin import PytestRecorder
-from statemachine.engines import raw_engines_with
 
 
 class Config:
@@ -134,7 +134,7 @@ def test_the_options_of_a_session_are_the_engine_and_the_record() -> None:
     plugin.pytest_addoption(parser)
     assert groups == ["statemachine"]
     assert list(added) == ["--engine", "--record", "--watched"]
-    assert tuple(added["--engine"]["choices"]) == tuple(raw_engines_with("backend"))
+    assert tuple(added["--engine"]["choices"]) == tuple(backend_names())
     assert added["--engine"]["default"] == "mujoco"
     assert added["--watched"]["action"] == "store_true"
 

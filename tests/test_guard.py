@@ -477,7 +477,7 @@ CODE = (
     (str(PACKAGE / "rotations.py"), True, False),
     (str(PACKAGE / "rotations.py"), False, True),
     (str(PACKAGE / "course" / "grading" / "inside" / "calls.py"), False, False),
-    ("/home/student/answer.py", True, True),
+    ("/class/student/answer.py", True, True),
     ("<string>", False, True),
 )
 

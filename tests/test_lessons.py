@@ -668,6 +668,7 @@ def _quick_of_state(cases: Sequence[tuple[Any, ...]]) -> list[Any]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 @pytest.mark.parametrize(
     ("words", "typed", "options", "shown", "absent"),

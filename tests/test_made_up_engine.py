@@ -94,7 +94,11 @@ COMMANDS = [
     ("conventions --calls --json", 0, f'"{NAME}": []'),
     _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, f"step_loop.py on {NAME}"),
     _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, "4 not written yet"),
-    (f"check --faults {ROOT}/tests/test_arm.py", BAD_INPUT, "are made for mujoco and pybullet"),
+    (
+        f"check --faults {ROOT}/tests/test_arm.py",
+        BAD_INPUT,
+        "what the backends of mujoco and pybullet compile",
+    ),
 ]
 
 

@@ -82,7 +82,7 @@ def distributions_of(requirements: list[str]) -> set[str]:
     """Return the names of requirements as they stand in pyproject.toml, lower case."""
     found: set[str] = set()
     for requirement in requirements:
-        match = re.match(r"([\w.-]+)(?:\[([\w,]+)\])?", requirement)
+        match = re.match(r"([\w.-]+)(?:\[([\w,-]+)\])?", requirement)
         assert match
         if match[1] == project_table()["name"]:
             for extra in match[2].split(","):

@@ -87,6 +87,7 @@ def gap(left: Any, right: Any) -> float:
 # The contract
 
 
+@pytest.mark.slow
 def test_51_checks_of_the_contract_pass_and_7_are_of_forces_that_it_does_not_tell() -> None:
     with warnings.catch_warnings(action="ignore", category=EngineWarning):
         outcomes = conformance.run("motrix")

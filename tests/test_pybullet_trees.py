@@ -32,7 +32,9 @@ from .support.small_models import (
 pytestmark = pytest.mark.usefixtures("bullet")
 
 
-@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
+@pytest.mark.parametrize(
+    "integrator", ["implicitfast", pytest.param("Euler", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("tie", TIES)
 def test_a_tree_moves_as_on_mujoco(tmp_path: Path, tie: str, base: str, integrator: str) -> None:

@@ -245,7 +245,7 @@ LONG = ("docs/gym.md",)  # what runs for seconds
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
+        pytest.param(name, marks=pytest.mark.slow)
         for name, code in PYTHON.items()
         if code and name != "README.md"
     ],

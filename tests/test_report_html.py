@@ -201,6 +201,7 @@ def go(tab: Tab, row: int) -> None:
 # What it is as a file.
 
 
+@pytest.mark.slow
 def test_it_asks_for_nothing_and_nothing_is_wrong(page: Path) -> None:
     with looking(page, offline=True) as tab:
         assert tab.requests[0] == page.as_uri()

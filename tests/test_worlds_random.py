@@ -111,6 +111,7 @@ def test_a_model_without_actuators(tmp_path: Any) -> None:
         np.testing.assert_allclose(many.qvel[:, 2], [-0.981, -0.324], rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("scene", ["box", "box, substeps and times", "asleep"])
 def test_worlds_of_any_latency_live_as_data_of_replaced_models(
