@@ -17,7 +17,7 @@ from tools.policy_training.network import Network, write_onnx
 from tools.policy_training.observation import FAULTS, Fault
 from tools.policy_training.stored import read_gains, write_gains
 from tools.policy_training.training import search
-from tools.policy_training.walking import change
+from tools.policy_training.walking import Walked, change
 
 from .support.requirements import need_engine
 
@@ -68,7 +68,10 @@ def test_the_same_seed_searches_the_same() -> None:
     assert not np.array_equal(first[1], next(search(THE_CONTRACT, 1, seed=4))[1])
 
 
-@pytest.mark.parametrize("command", [STRAIGHT, (0.5, 0.0, 0.0), (0.0, 0.0, 0.6), TURNING])
+SLOWLY = [pytest.param(command, marks=pytest.mark.slow) for command in (STRAIGHT, (0.0, 0.0, 0.6))]
+
+
+@pytest.mark.parametrize("command", [TURNING, *SLOWLY])
 def test_it_walks_as_it_is_asked(network: Network, command: tuple[float, float, float]) -> None:
     """Within a fifth, and within a tenth of the highest speed where none is asked."""
     walked = outcome(THE_CONTRACT, network, "mujoco", command)
@@ -106,18 +109,23 @@ def test_it_walks_on_another_engine(
 SHOWING = [fault for fault in FAULTS if fault.name != "clock twice as fast"]
 
 
+@pytest.fixture(scope="module")
+def sound(network: Network) -> Walked:
+    need_engine("mujoco")
+    return outcome(THE_CONTRACT, network, "mujoco", TURNING)
+
+
+# `python -m tools.policy_training faults` shows it on PyBullet, too.
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
 @pytest.mark.parametrize("fault", SHOWING, ids=lambda fault: fault.name)
 def test_a_fault_changes_the_walk_when_it_turns(
-    network: Network, backend: str, fault: Fault
+    network: Network, sound: Walked, fault: Fault
 ) -> None:
-    need_engine(backend)
-    sound = outcome(THE_CONTRACT, network, backend, TURNING)
-    spoiled = outcome(THE_CONTRACT, network, backend, TURNING, fault)
+    spoiled = outcome(THE_CONTRACT, network, "mujoco", TURNING, fault)
     assert spoiled.upright[0] < 10 or change(sound, spoiled, np.array([TURNING]))[0] > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gyro in world axes", "velocity in world axes"])
 def test_wrong_axes_do_not_show_while_it_walks_straight_on(network: Network, name: str) -> None:
     sound = outcome(THE_CONTRACT, network, "mujoco", STRAIGHT)
