@@ -68,10 +68,7 @@ def test_the_same_seed_searches_the_same() -> None:
     assert not np.array_equal(first[1], next(search(THE_CONTRACT, 1, seed=4))[1])
 
 
-SLOWLY = [pytest.param(command, marks=pytest.mark.slow) for command in (STRAIGHT, (0.0, 0.0, 0.6))]
-
-
-@pytest.mark.parametrize("command", [TURNING, *SLOWLY])
+@pytest.mark.parametrize("command", [STRAIGHT, (0.5, 0.0, 0.0), (0.0, 0.0, 0.6), TURNING])
 def test_it_walks_as_it_is_asked(network: Network, command: tuple[float, float, float]) -> None:
     """Within a fifth, and within a tenth of the highest speed where none is asked."""
     walked = outcome(THE_CONTRACT, network, "mujoco", command)
@@ -125,7 +122,6 @@ def test_a_fault_changes_the_walk_when_it_turns(
     assert spoiled.upright[0] < 10 or change(sound, spoiled, np.array([TURNING]))[0] > 0.1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gyro in world axes", "velocity in world axes"])
 def test_wrong_axes_do_not_show_while_it_walks_straight_on(network: Network, name: str) -> None:
     sound = outcome(THE_CONTRACT, network, "mujoco", STRAIGHT)
