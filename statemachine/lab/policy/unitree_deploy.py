@@ -1,6 +1,6 @@
 """A contract from `deploy.yaml`, which Unitree's robots are deployed with.
 
-`unitree_rl_lab` and `unitree_rl_mjlab` write this file after a training, and their program on the
+unitree_rl_lab and unitree_rl_mjlab write this file after a training, and their program on the
 robot takes all its numbers from there. What it does with them is as gaitkeeper 0.5.4 found it in
 the sources (`readers/unitree_deploy.py`, Apache-2.0): a term is clipped, then scaled; a target is
 offset + scale · action, then clipped; `stiffness` and `damping` stand in the order of the motors,
