@@ -430,11 +430,12 @@ def test_what_is_typed_runs(here: Cli, pendulum: Path) -> None:
 def test_the_arm_on_engines_as_they_come(here: Cli) -> None:
     """Against the course's text: with its own motors PyBullet is far from both."""
     backends = [word for name in (*BOTH, "pybullet:engine") for word in ("--backend", name)]
-    done = here("compare", "hold", *backends, "--no-chaos", "--json", code=1)
+    words = ("--seconds", "0.5", "--no-chaos", "--json")
+    done = here("compare", "hold", *backends, *words, code=1)
     found = json.loads(done.stdout)
     assert found["odd"]["side"] == "pybullet:engine"
     assert found["odd"]["gap"] > np.radians(40)
-    two = lab.compare(what="hold", chaos=False).to_dict()
+    two = lab.compare(what="hold", seconds=0.5, chaos=False).to_dict()
     (pair,) = (gap for gap in found["gaps"] if gap["right"] == "pybullet")
     assert pair["largest"] == pytest.approx(max(two["max"][: two["kind"].count("joint")]))
 
