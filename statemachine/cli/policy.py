@@ -18,7 +18,6 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..lab.policy.command import Command
     from ..lab.policy.request import PolicyRequest
 
 _SECONDS = 10.0
@@ -84,6 +83,7 @@ def request_of(options: argparse.Namespace) -> PolicyRequest:
         BadInputError: A command is no three numbers, or the time is out of range.
         UnknownNameError: There is no such backend.
     """
+    from ..lab.policy.command import Command, speeds_of
     from ..lab.policy.request import PolicyRequest
 
     return PolicyRequest(
@@ -91,21 +91,11 @@ def request_of(options: argparse.Namespace) -> PolicyRequest:
         contract=options.contract,
         model=options.model,
         backends=tuple(options.backend or [DEFAULT]),
-        commands=tuple(_command_of(numbers) for numbers in options.command or ()),
+        commands=tuple(Command(*speeds_of(numbers)) for numbers in options.command or ()),
         seconds=options.seconds,
         keyframe=options.keyframe,
         menagerie=options.menagerie,
     )
-
-
-def _command_of(numbers: list[float]) -> Command:
-    """Return the speeds of one run."""
-    from ..errors import BadInputError
-    from ..lab.policy.command import Command
-
-    if len(numbers) != 3:
-        raise BadInputError(f"a command is vx,vy,wz, three numbers; got {len(numbers)}")
-    return Command(*numbers)
 
 
 def run(options: argparse.Namespace) -> int:

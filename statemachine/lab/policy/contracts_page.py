@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from ...measures.text import significant
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
+from .page import speed_cells
 from .term_gaps import TermGap
 from .two_contracts import ContractsResult, EngineContracts
 from .walk import Walk
 
-_NO_NUMBER = "–"
 _ACTION = "action"
 
 
@@ -114,8 +114,5 @@ def _walks(result: ContractsResult, engine: EngineContracts) -> Table:
 
 def _cells(walk: Walk) -> list[str]:
     """Return the speeds of a run, and what came of it."""
-    speeds = [_NO_NUMBER] * 3
-    if walk.reached is not None:
-        speeds = [f"{speed:z.2f}" for speed in walk.reached]
     verdict = "agrees" if walk.verdict == "walks" else "differs"
-    return [*speeds, TableCell(walk.verdict, verdict=verdict)]
+    return [*speed_cells(walk), TableCell(walk.verdict, verdict=verdict)]

@@ -61,11 +61,11 @@ class PolicyController:
         self._last_action = np.zeros(n)
         # What acts before the first action has come through its delay: the offset alone.
         self._pending = [np.zeros(n)] * contract.action.delay_steps
-        self._targets = contract.action.targets(np.zeros(n))
         low, high = driven.model.actuator_ctrlrange[binding.ctrl].T
         if driven.kind == "explicit_pd":
             low, high = np.full(n, -np.inf), np.full(n, np.inf)
         self._low, self._high = low, high
+        self._targets = self._targets_of(np.zeros(n))
         self._gain = np.ones(n)
         if driven.kind == "explicit_pd":
             self._gain = driven.model.actuator_gain[binding.ctrl]
@@ -85,8 +85,7 @@ class PolicyController:
             self._call(data)
         self.steps += 1
         joint_pos, joint_vel = data.qpos[self._binding.qpos], data.qvel[self._binding.qvel]
-        targets = np.clip(self._targets, self._low, self._high)
-        driven = self._driven
+        driven, targets = self._driven, self._targets
         wanted = driven.kp * (targets - joint_pos) - driven.kd * joint_vel
         torque = np.clip(wanted, -driven.limit, driven.limit)
         self.saturated += torque != wanted
@@ -118,4 +117,8 @@ class PolicyController:
         self.calls.append(call)
         self._last_action = action
         self._pending.append(action)
-        self._targets = contract.action.targets(self._pending.pop(0))
+        self._targets = self._targets_of(self._pending.pop(0))
+
+    def _targets_of(self, action: Array) -> Array:
+        """Return the targets (n,) [rad] of an action, within what the servos take."""
+        return np.clip(self._contract.action.targets(action), self._low, self._high)

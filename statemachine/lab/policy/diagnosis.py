@@ -13,16 +13,14 @@ from ...errors import BadInputError, UnsupportedError
 from ...interface import Model
 from ...show.blocks import only_on_pages
 from ..runs.drive import Progress
-from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
-from .checks import check_network
 from .command import Command, usual_commands
 from .contract import Contract
 from .contract_file import read_contract
 from .hypotheses import Hypothesis, HypothesisKind, hypotheses_of
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
-from .request import PolicyRequest
+from .request import PolicyRequest, on_each_engine, opened_network
 from .term_gaps import TermGap, term_gaps
 from .walk import RecordedWalk, Walk, all_walked
 
@@ -141,28 +139,21 @@ def diagnose(request: PolicyRequest, reporter: Reporter = QUIET) -> DiagnosisRes
         StateMachineError: The model cannot be loaded.
     """
     contract = read_contract(request.contract)
-    network = Network(request.policy)
-    check_network(contract, network.facts)
+    network = opened_network(request, contract)
     commands = request.commands or usual_commands(contract)
 
     def compute(model: Model, backend: str, progress: Progress) -> EngineDiagnosis:
         runs = _Runs(network, model, commands, request.seconds, request.keyframe)
         return _diagnosed(contract, runs, backend, progress)
 
-    engines = on_each_backend(
-        request.backends,
-        f"changes of {Path(request.contract).name}",
-        request.model,
-        request.menagerie,
-        compute,
-        reporter,
-    )
+    what = f"changes of {Path(request.contract).name}"
+    engines = on_each_engine(request, what, compute, reporter)
     return DiagnosisResult(
         request=request,
         contract=contract,
         network=network.facts,
         commands=commands,
-        engines=tuple(engines.values()),
+        engines=engines,
     )
 
 

@@ -11,6 +11,7 @@ from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
 from .adapted import ContractChange
 from .checks import ContractNote
+from .contract import AXES
 from .request import EngineWalks, PolicyResult, words_of_request
 from .walk import Walk
 
@@ -48,7 +49,7 @@ class _Trouble:
     def reached(self) -> float:
         """Return the speed that was reached on it."""
         assert self.walk.reached is not None
-        return self.walk.reached[("vx", "vy", "wz").index(self.axis)]
+        return self.walk.reached[AXES.index(self.axis)]
 
     @property
     def unit(self) -> str:
@@ -201,10 +202,14 @@ def _table_of_walks(result: PolicyResult, details: bool) -> Table:
 
 def _speeds(walk: Walk) -> list[str]:
     """Return what a row shows of a run."""
-    speeds = [_NO_NUMBER] * 3
-    if walk.reached is not None:
-        speeds = [f"{speed:z.2f}" for speed in walk.reached]
-    return [*speeds, _outcome(walk), percent(walk.at_limit)]
+    return [*speed_cells(walk), _outcome(walk), percent(walk.at_limit)]
+
+
+def speed_cells(walk: Walk) -> list[str]:
+    """Return the speeds that a run reached, a cell each; dashes where it ended before."""
+    if walk.reached is None:
+        return [_NO_NUMBER] * len(AXES)
+    return [f"{speed:z.2f}" for speed in walk.reached]
 
 
 def _details(walk: Walk) -> list[str]:

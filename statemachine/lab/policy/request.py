@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -28,6 +30,7 @@ from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
 from .walk import Walk, all_walked
 
+R = TypeVar("R")  # what is computed on an engine
 SECONDS = 10.0  # of a run
 _LONGEST = 600.0  # [s]
 
@@ -126,8 +129,7 @@ def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
         StateMachineError: The model cannot be loaded.
     """
     contract = read_contract(request.contract)
-    network = Network(request.policy)
-    check_network(contract, network.facts)
+    network = opened_network(request, contract)
     commands = request.commands or usual_commands(contract)
     notes: list[ContractNote] = []
 
@@ -144,22 +146,41 @@ def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
         walks = tuple(run.walk for run in recorded)
         return EngineWalks(backend, source, policy.driven.changes, walks)
 
-    engines = on_each_backend(
-        request.backends,
-        Path(request.policy).name,
-        request.model,
-        request.menagerie,
-        compute,
-        reporter,
-    )
+    engines = on_each_engine(request, Path(request.policy).name, compute, reporter)
     return PolicyResult(
         request=request,
         contract=contract,
         network=network.facts,
         commands=commands,
         notes=tuple(notes),
-        engines=tuple(engines.values()),
+        engines=engines,
     )
+
+
+def opened_network(request: PolicyRequest, *contracts: Contract) -> Network:
+    """Return the network of a question, which takes what each contract observes.
+
+    Raises:
+        BadInputError: It cannot be read, or it does not fit a contract.
+        MissingEngineError: The extra `policy` is not installed.
+    """
+    network = Network(request.policy)
+    for contract in contracts:
+        check_network(contract, network.facts)
+    return network
+
+
+def on_each_engine(
+    request: PolicyRequest,
+    what: str,
+    compute: Callable[[Model, str, Progress], R],
+    reporter: Reporter,
+) -> tuple[R, ...]:
+    """Return what is computed on each engine of a question; the rest as of `on_each_backend`."""
+    results = on_each_backend(
+        request.backends, what, request.model, request.menagerie, compute, reporter
+    )
+    return tuple(results.values())
 
 
 def _start_of(model: Model, keyframe: str | None) -> np.ndarray | None:

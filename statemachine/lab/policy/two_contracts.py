@@ -9,17 +9,15 @@ from pathlib import Path
 from ...interface import Model
 from ...models import AnyPath
 from ..runs.drive import Progress, progress_of_stage
-from ..runs.each_backend import on_each_backend
 from ..runs.reporter import QUIET, Reporter
-from .checks import check_network
 from .command import Command, usual_commands
 from .contract import Contract
 from .contract_differences import FieldDifference, field_differences
 from .contract_file import read_contract
 from .hypotheses import HypothesisKind, hypotheses_of
-from .network import Network, NetworkFacts
+from .network import NetworkFacts
 from .on_model import PolicyOnModel
-from .request import PolicyRequest
+from .request import PolicyRequest, on_each_engine, opened_network
 from .term_gaps import TermGap, term_gaps
 from .walk import RecordedWalk, Walk, all_walked
 
@@ -92,9 +90,7 @@ def compare_contracts(
         StateMachineError: The model cannot be loaded.
     """
     first, second = read_contract(request.contract), read_contract(against)
-    network = Network(request.policy)
-    for contract in (first, second):
-        check_network(contract, network.facts)
+    network = opened_network(request, first, second)
     commands = request.commands or usual_commands(first)
 
     def compute(model: Model, backend: str, progress: Progress) -> EngineContracts:
@@ -111,14 +107,8 @@ def compare_contracts(
             gaps=_largest_gaps(policies[0], policies[1], runs[0]),
         )
 
-    engines = on_each_backend(
-        request.backends,
-        f"{Path(request.contract).name} and {Path(against).name}",
-        request.model,
-        request.menagerie,
-        compute,
-        reporter,
-    )
+    what = f"{Path(request.contract).name} and {Path(against).name}"
+    engines = on_each_engine(request, what, compute, reporter)
     return ContractsResult(
         request=request,
         against=against,
@@ -128,7 +118,7 @@ def compare_contracts(
         commands=commands,
         differences=field_differences(first, second),
         kinds=_kinds(first, second),
-        engines=tuple(engines.values()),
+        engines=engines,
     )
 
 

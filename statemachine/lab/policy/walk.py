@@ -59,18 +59,18 @@ class Walk:
     @property
     def error(self) -> float:
         """Return how far the speeds are from those asked for, in parts of what is tolerated."""
-        if self.reached is None:
-            return np.inf
-        apart = np.abs(np.array(self.reached) - self.command.vector)
-        return float(apart.max() / self.command.tolerance)
+        return float(self._apart().max() / self.command.tolerance)
 
     @property
     def worst_axis(self) -> str:
         """Return the axis whose speed is farthest from the one asked for."""
+        return AXES[int(self._apart().argmax())]
+
+    def _apart(self) -> Array:
+        """Return how far each speed (3,) is from the one asked for; infinite where none is."""
         if self.reached is None:
-            return AXES[0]
-        apart = np.abs(np.array(self.reached) - self.command.vector)
-        return AXES[int(apart.argmax())]
+            return np.full(len(AXES), np.inf)
+        return np.abs(np.array(self.reached) - self.command.vector)
 
     @property
     def verdict(self) -> WalkVerdict:
