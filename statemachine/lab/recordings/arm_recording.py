@@ -1,0 +1,48 @@
+"""Recording of a real arm: commands and measured joint angles, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...interface import Array
+from .joint_units import JointUnit
+
+
+@dataclass(frozen=True, eq=False)
+class ArmRecording:
+    """Commands and measured joint angles of an arm.
+
+    State k is read before action k is sent; action k holds until action k + 1.
+
+    Attributes:
+        source: As it is typed, such as "lerobot:DIR#3".
+        episode: Its number in the data set.
+        fps: Frames per second [1/s]. Times are k / fps: they were not measured.
+        joints: (n,) names of the model's joints, in the order of the columns.
+        action: (K, n) commanded angles [rad], in the model's zero.
+        state: (K, n) measured angles [rad], in the model's zero.
+        resolution: (n,) angle of one count of the servos [rad].
+        units: What the numbers of the file mean, one for each joint.
+    """
+
+    source: str
+    episode: int
+    fps: float
+    joints: tuple[str, ...]
+    action: Array
+    state: Array
+    resolution: Array
+    units: tuple[JointUnit, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ArmRecordings:
+    """The episode that is fitted, and one that is not.
+
+    Attributes:
+        fitted: The episode that was named.
+        held_out: Another one of the same data set; None where there is none.
+    """
+
+    fitted: ArmRecording
+    held_out: ArmRecording | None
