@@ -1,1 +1,1 @@
-"""Is it the arm or the simulator: a recording of a real arm against its model, and a fit of the model."""
+"""Is it the arm or the simulator? A recording of a real arm against its model, and a fit of it."""
