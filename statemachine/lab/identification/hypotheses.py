@@ -1,4 +1,4 @@
-"""Other readings of a recording, each fitted anew: signs of joints, and where viscous force acts."""
+"""Other readings of a recording, fitted anew: signs of joints, where viscous friction acts."""
 
 from __future__ import annotations
 

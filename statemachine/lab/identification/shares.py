@@ -16,7 +16,7 @@ from ...interface import Array
 from ..runs.drive import Progress, no_progress
 from ..why.shapley import shapley
 from .fit import fit
-from .results import CAUSES, CauseShare
+from .results import CAUSES, Cause, CauseShare
 from .simulation import ArmSimulation
 from .starts import Fits
 
@@ -61,7 +61,7 @@ def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str])
     """Return the gap where these causes are fitted; None where the simulation diverges."""
     best = fits.best
     nothing = np.zeros(len(best.vector))
-    chosen = [cause for cause in CAUSES if cause in causes]
+    chosen: list[Cause] = [cause for cause in CAUSES if cause in causes]
     if not chosen:
         return gap_of(elsewhere, nothing)
     free = best.objective.parameters.of_causes(chosen)

@@ -53,7 +53,7 @@ class ArmSimulation:
 
     @classmethod
     def of_motion(cls, parameters: ArmParameters, action: Array, fps: float) -> ArmSimulation:
-        """Return the simulation of commands (K, n) [rad] that start at rest, and nobody recorded."""
+        """Return the simulation of commands (K, n) [rad] that start at rest."""
         at_rest = np.tile(action[:1], (len(action), 1))
         resolution = np.full(action.shape[1], math.tau / COUNTS)
         recording = ArmRecording(

@@ -32,9 +32,7 @@ def fitted_parameters(
     values = fits.best.vector[objective.free]
     low, high = values - _QUANTILE * deviations, values + _QUANTILE * deviations
     ends = np.array([fit.vector[objective.free] for fit in fits.as_good])
-    agree = ((ends >= low) & (ends <= high)).all(axis=0)
-    if len(ends) < _FEWEST_AS_GOOD:
-        agree[:] = False
+    agree = np.all((ends >= low) & (ends <= high), axis=0).tolist()
     low = np.maximum(np.minimum(low, ends.min(axis=0)), objective.parameters.low[objective.free])
     high = np.maximum(high, ends.max(axis=0))
     told = deviations / prior
@@ -46,7 +44,7 @@ def fitted_parameters(
             reasons.append("too little information")
         if not fits.residuals.at_floor:
             reasons.append("residual above the floor")
-        if not agree[place]:
+        if not agree[place] or len(ends) < _FEWEST_AS_GOOD:
             reasons.append("starts disagree")
         if not holds:
             reasons.append("does not hold elsewhere")
