@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,38 @@ SYNTHETIC = "synthetic"  # the recording that comes with the package
 _SYNTHETIC_FOLDER = Path(__file__).resolve().parent / "synthetic"
 _MOST_EPISODES = 100  # whose values are looked at for their quantum
 _MOVES = 12 * COUNT  # rad, about 1°: an arm whose joints all stay within that does not move
+
+
+@dataclass(frozen=True, eq=False)
+class _Arm:
+    """A data set, and what its numbers mean.
+
+    Attributes:
+        data_set: What is read.
+        joints: What was measured of each joint.
+        units: What the numbers of each mean.
+    """
+
+    data_set: LerobotDataSet
+    joints: tuple[MeasuredJoint, ...]
+    units: tuple[JointUnit, ...]
+
+    def sent(self, action: Array) -> Array:
+        """Return what the servos are told, (K, n): LeRobot truncates it to counts.
+
+        So does `_unnormalize` of its `motors/motors_bus.py`, after it clamps what is not in
+        degrees to the range. Of a joint that does not move the counts are not known.
+        """
+        sent = action.copy()
+        for column, (joint, unit) in enumerate(zip(self.joints, self.units, strict=True)):
+            values = action[:, column]
+            if unit.unit != "degrees":
+                values = np.clip(values, 100.0 - joint.width, 100.0)
+            if joint.grid is not None:
+                is_inverted = unit.unit != "degrees" and unit.radians < 0.0  # by drive_mode
+                values = joint.grid.ceil(values) if is_inverted else joint.grid.floor(values)
+            sent[:, column] = values
+        return sent
 
 
 def read_arm_recordings(
@@ -52,16 +85,15 @@ def read_arm_recordings(
     if calibration is not None:
         motors = {joint_name(name): each for name, each in read_calibration(calibration).items()}
     episode = data_set.episode(number)
-    units = infer_units(
-        _measured_joints(data_set, number, model, joints), motors, data_set.has_old_zero
-    )
-    fitted = _recording(source, data_set, episode, units)
+    measured = tuple(_measured_joints(data_set, number, model, joints))
+    arm = _Arm(data_set, measured, infer_units(measured, motors, data_set.has_old_zero))
+    fitted = _recording(source, arm, episode)
     if not _moves(fitted):
         raise BadInputError(
             f"the arm does not move in episode {number} of {folder}: no joint by more than "
             f"{np.degrees(_MOVES):.0f}°; name another episode as {PREFIX}{folder}#NUMBER"
         )
-    return ArmRecordings(fitted, _held_out(source, data_set, number, units))
+    return ArmRecordings(fitted, _held_out(source, arm, number))
 
 
 def folder_and_episode(source: str) -> tuple[Path, int | None]:
@@ -136,23 +168,18 @@ def _measured_joints(
     return measured
 
 
-def _recording(
-    source: str,
-    data_set: LerobotDataSet,
-    episode: LerobotEpisode,
-    units: tuple[JointUnit, ...],
-) -> ArmRecording:
-    joints = tuple(unit.joint for unit in units)
-    resolution = np.full(len(units), COUNT)
+def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
+    joints = tuple(unit.joint for unit in arm.units)
+    resolution = np.full(len(arm.units), COUNT)
     return ArmRecording(
         source=source,
         episode=episode.number,
-        fps=data_set.fps,
+        fps=arm.data_set.fps,
         joints=joints,
-        action=_angles(episode.action, units),
-        state=_angles(episode.state, units),
+        action=_angles(arm.sent(episode.action), arm.units),
+        state=_angles(episode.state, arm.units),
         resolution=resolution,
-        units=units,
+        units=arm.units,
     )
 
 
@@ -167,16 +194,14 @@ def _moves(recording: ArmRecording) -> bool:
     return bool(np.ptp(recording.state, axis=0).max() > _MOVES)
 
 
-def _held_out(
-    source: str, data_set: LerobotDataSet, number: int, units: tuple[JointUnit, ...]
-) -> ArmRecording | None:
+def _held_out(source: str, arm: _Arm, number: int) -> ArmRecording | None:
     """Return the next episode in which the arm moves; after the last comes the first."""
-    episodes = data_set.episodes
+    episodes = arm.data_set.episodes
     here = episodes.index(number)
     for other in (*episodes[here + 1 :], *episodes[:here]):
-        if data_set.place(other).length < FEWEST_FRAMES:
+        if arm.data_set.place(other).length < FEWEST_FRAMES:
             continue
-        recording = _recording(source, data_set, data_set.episode(other), units)
+        recording = _recording(source, arm, arm.data_set.episode(other))
         if _moves(recording):
             return recording
     return None
