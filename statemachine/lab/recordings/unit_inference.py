@@ -117,8 +117,7 @@ def infer_units(
         return _by_calibration(joints, calibration, degree)
     units: list[JointUnit] = []
     for joint in joints:
-        in_degrees = degree is not None and not joint.is_gripper
-        unit = _degrees(joint, degree) if in_degrees else _by_quantum(joint)
+        unit = _told_by_quanta(joint, degree)
         units.append(_with_old_zero(unit, joint.name) if has_old_zero else unit)
     return tuple(units)
 
@@ -156,6 +155,13 @@ def _by_calibration(
         unit = replace(_of_counts(joint, motor.counts), source="calibration")
         units.append(_inverted(unit, joint) if motor.drive_mode else unit)
     return tuple(units)
+
+
+def _told_by_quanta(joint: MeasuredJoint, degree: float | None) -> JointUnit:
+    """Return the unit of a joint without a calibration."""
+    if degree is None or joint.is_gripper:
+        return _by_quantum(joint)
+    return _degrees(joint, degree)
 
 
 def _degrees(joint: MeasuredJoint, degree: float) -> JointUnit:
