@@ -14,6 +14,7 @@ from ..recordings.arm_recording import ArmRecordings
 from ..recordings.joint_units import JointUnit
 from ..runs.provenance import Provenance
 from ..shown_result import Column, ShownResult
+from ..why.rewriting import RewrittenFile
 
 Kind = Literal["kp", "viscous", "friction", "armature", "offset", "delay", "payload"]
 Cause = Literal["delay", "gains", "friction", "offsets", "inertia"]
@@ -263,7 +264,7 @@ class IdentificationResult(ShownResult):
         recordings: Both episodes; not in JSON.
         arm: The Model as it is; not in JSON.
         fitted_arm: The Model with the fitted figures (offset and delay are not in it); not in JSON.
-        written: The file that was written; "" for none.
+        rewritten: The model's file with the fitted figures; None where that was not asked.
     """
 
     page_function: ClassVar[str] = "identification.identification_page:page"
@@ -285,7 +286,7 @@ class IdentificationResult(ShownResult):
     recordings: ArmRecordings = field(metadata={"json": False})
     arm: Model = field(metadata={"json": False})
     fitted_arm: Model = field(metadata={"json": False})
-    written: str = ""
+    rewritten: RewrittenFile | None = None
 
     def to_dict(self) -> dict[str, Column]:
         """Return what the recording tells of each parameter as columns."""
