@@ -147,7 +147,11 @@ def parameters() -> tuple[FittedParameter, ...]:
 def fitted_arm(arm: Model) -> Model:
     """Return the arm with those figures."""
     kp: Array = np.full(6, 8.5)
-    return arm.replace(kp=kp, kv=np.full(6, 0.7), damping=np.full(6, 0.2), frictionloss=0.11)
+    mass = arm.body_mass.copy()
+    mass[arm.body_id("gripper")] += 0.060
+    return arm.replace(
+        kp=kp, kv=np.full(6, 0.7), damping=np.full(6, 0.2), frictionloss=0.11, mass=mass
+    )
 
 
 def identification_result(**others: object) -> IdentificationResult:

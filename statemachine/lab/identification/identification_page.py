@@ -13,7 +13,6 @@ from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits, with_answer
 from ...show.templates import PageContent, render, render_blocks
 from ..runs.provenance import Provenance
-from ..why.rewritten_page import rewritten_blocks
 from .identification_details import IdentificationDetails
 from .parameter_table import joint_table, ranked_shares
 from .parameter_texts import figure_text, interval_text
@@ -21,6 +20,7 @@ from .results import CauseShare, FittedParameter, IdentificationResult, Recordin
 from .typed_question import recording_name, typed_question
 from .units_page import units_blocks
 from .unknown import Motion, motions_of
+from .written_page import written_blocks
 
 _OVERLAP = 0.01  # of the gap: less is rounding
 _FIXED = "fitted.xml"
@@ -146,7 +146,7 @@ class IdentificationPage(PageContent):
         """Return what was written of the model's file; empty where that was not asked."""
         if self.result.rewritten is None:
             return []
-        return rewritten_blocks(self.result.rewritten, None if self.further else 0)
+        return written_blocks(self.result.rewritten, details=bool(self.further))
 
     @property
     def next_command(self) -> str:

@@ -29,7 +29,7 @@ def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
         most: How many joints have a row; how many more there are stands below.
     """
     of_joints = [each for each in parameters if each.joint is not None]
-    kinds = list(dict.fromkeys(e.kind for e in of_joints if e.verdict == "determined"))
+    kinds: list[Kind] = list(dict.fromkeys(e.kind for e in of_joints if e.verdict == "determined"))
     joints = list(dict.fromkeys(e.joint for e in of_joints if e.verdict == "determined"))
     cells = {(each.joint, each.kind): _cell_of(each) for each in of_joints}
     rows: list[list[str]] = []

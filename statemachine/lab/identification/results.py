@@ -124,7 +124,7 @@ class RecordingGap:
     fitted: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RecordingResult(ShownResult):
     """How far a model is from a recording of a real arm.
 
@@ -241,7 +241,7 @@ class StartOutcome:
     evaluations: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class IdentificationResult(ShownResult):
     """What a recording of a real arm tells of the parameters of its model.
 
