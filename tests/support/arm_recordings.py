@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -59,13 +60,13 @@ def recording(seconds: float = 1.0, episode: int = 3) -> ArmRecording:
         fps=FPS,
         joints=SO101_JOINTS,
         action=action,
-        state=np.roll(action, 2, axis=0),
+        state=np.concatenate([action[:1], action[:1], action[:-2]]),
         resolution=np.full(6, COUNT),
         units=units(),
     )
 
 
-def gap(fitted: bool, part: str = "all") -> RecordingGap:
+def gap(fitted: bool, part: str = "all", episode: int = 3) -> RecordingGap:
     """Return how far model and commands are from the arm, in figures of a real one."""
     factors = (0.4, 1.6, 1.5, 0.8, 0.3, 0.2)
     values = {name: math.radians(value) for name, value in ALL.items()}
@@ -79,7 +80,7 @@ def gap(fitted: bool, part: str = "all") -> RecordingGap:
         for joint, factor in zip(SO101_JOINTS, factors, strict=True)
     ]
     return RecordingGap(
-        episode=3,
+        episode=episode,
         part="last third" if part == "last third" else "all",
         seconds=12.4,
         joints=tuple(joints),
@@ -144,6 +145,24 @@ def parameters() -> tuple[FittedParameter, ...]:
     return tuple(found)
 
 
+def with_verdicts(
+    parameters: Iterable[FittedParameter], is_determined: Callable[[FittedParameter], bool]
+) -> tuple[FittedParameter, ...]:
+    """Return parameters of which those are determined, and the others are not."""
+    found: list[FittedParameter] = []
+    for each in parameters:
+        determined = is_determined(each)
+        found.append(
+            replace(
+                each,
+                verdict="determined" if determined else "cannot tell",
+                reasons=() if determined else ("residual above the floor",),
+                motion="" if determined else each.motion,
+            )
+        )
+    return tuple(found)
+
+
 def fitted_arm(arm: Model) -> Model:
     """Return the arm with those figures."""
     kp: Array = np.full(6, 8.5)
@@ -166,7 +185,7 @@ def identification_result(**others: object) -> IdentificationResult:
         units=units(),
         fps=FPS,
         fitted_gap=gap(fitted=True),
-        gap=gap(fitted=True),
+        gap=gap(fitted=True, episode=4),
         residual=math.radians(0.057),
         floor=math.radians(0.056),
         holds=True,

@@ -10,27 +10,32 @@ from .parameter_texts import (
     REASON_WORDS,
     factor_text,
     figure_text,
+    half_width_text,
     interval_text,
     name_of_parameter,
     number_text,
     unit_text,
 )
-from .results import CauseShare, FittedParameter, IdentificationResult, Kind
+from .results import UNITS, CauseShare, FittedParameter, IdentificationResult, Kind
 
 _UNKNOWN = "?"
 _OF_MODEL = "the model"
+_MOST_KINDS = 4  # columns for which there is room
 
 
 def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
     """Return what is determined: a row for each joint, a column for each kind.
+
+    Of five kinds the last, offsets, has no column: it is no figure of the model.
 
     Args:
         parameters: All of them.
         most: How many joints have a row; how many more there are stands below.
     """
     of_joints = [each for each in parameters if each.joint is not None]
-    kinds: list[Kind] = list(dict.fromkeys(e.kind for e in of_joints if e.verdict == "determined"))
-    joints = list(dict.fromkeys(e.joint for e in of_joints if e.verdict == "determined"))
+    determined = [each for each in of_joints if each.verdict == "determined"]
+    kinds = [kind for kind in UNITS if any(each.kind == kind for each in determined)][:_MOST_KINDS]
+    joints = list(dict.fromkeys(each.joint for each in determined if each.kind in kinds))
     cells = {(each.joint, each.kind): _cell_of(each) for each in of_joints}
     rows: list[list[str]] = []
     for joint in joints[:most]:
@@ -50,8 +55,8 @@ def _cell_of(parameter: FittedParameter) -> str:
     if parameter.verdict != "determined":
         return _UNKNOWN
     half = 0.5 * (parameter.high - parameter.low)
-    value, width = (number_text(parameter.kind, size) for size in (parameter.fitted, half))
-    return f"{value} ± {width}"
+    width = half_width_text(parameter.kind, half)
+    return f"{number_text(parameter.kind, parameter.fitted)} ± {width}"
 
 
 def _model_text(parameters: Sequence[FittedParameter]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...measures.text import NO_NUMBER, figure, significant, unit_suffix
+from ...measures.text import NO_NUMBER, figure, rough, significant, unit_suffix
 from .results import UNITS, FittedParameter, Kind, Reason
 
 # From the unit of a result to the one that is read, and that.
@@ -40,6 +40,11 @@ def number_text(kind: Kind, value: float) -> str:
         value: Its figure, in the unit of `UNITS`.
     """
     return figure(value * _SHOWN.get(kind, (1.0, ""))[0])
+
+
+def half_width_text(kind: Kind, width: float) -> str:
+    """Return half of an interval with two digits, without its unit; the rest as `number_text`."""
+    return rough(width * _SHOWN.get(kind, (1.0, ""))[0])
 
 
 def figure_text(kind: Kind, value: float) -> str:
