@@ -74,7 +74,7 @@ def identify(
     write: AnyPath | None = None,
     reporter: Reporter = QUIET,
 ) -> IdentificationResult:
-    """Fit the model of an arm to a recording of it, and return what that tells of each parameter.
+    """Return what a recording of an arm tells of each parameter of its model.
 
         result = lab.identify("lerobot:pushes#3", "so101")
         table = pandas.DataFrame(result.to_dict())

@@ -16,6 +16,8 @@ from .results import IdentificationResult, RecordingResult
 
 MEASURED, AS_IT_IS, FITTED = "the arm", "the model as it is", "the fitted model"
 _WHOLE = 1e-9  # of a step: rounding
+_INPUTS = ("qpos", "qvel", "ctrl")
+_POSES = ("xpos", "xquat", "site_xpos")
 
 
 def traces_of(result: RecordingResult | IdentificationResult) -> tuple[Trace, Trace]:
@@ -99,19 +101,12 @@ def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: 
         angles: (K, n) [rad].
         name: What a page calls the run.
     """
-    places = [scalar_joint(model, joint) for joint in recording.joints]
-    qpos, dofs = ([place[k] for place in places] for k in (0, 1))
-    frames = len(angles)
-    columns: dict[str, Array] = {
-        "time": np.arange(frames) / recording.fps,
-        "qpos": np.zeros((frames, model.nq)),
-        "qvel": np.zeros((frames, model.nv)),
-        "ctrl": np.zeros((frames, model.nu)),
-        "xpos": np.zeros((frames, model.nbody, 3)),
-        "xquat": np.zeros((frames, model.nbody, 4)),
-        "site_xpos": np.zeros((frames, model.nsite, 3)),
-        "site_xmat": np.zeros((frames, model.nsite, 9)),
-    }
+    header = _header(model, recording, name)
+    qpos = [scalar_joint(model, joint)[0] for joint in recording.joints]
+    dofs = [scalar_joint(model, joint)[1] for joint in recording.joints]
+    columns: dict[str, Array] = {"time": np.arange(len(angles)) / recording.fps}
+    for column in (*_INPUTS, *_POSES, "site_xmat"):
+        columns[column] = np.zeros((len(angles), *header.shape(column)))
     columns["ctrl"][:, _commands_of(model, recording)] = recording.action
     columns["qvel"][:, dofs] = np.gradient(angles, 1.0 / recording.fps, axis=0)
     with make_data(model) as data:
@@ -119,10 +114,10 @@ def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: 
             data.qpos[qpos] = frame
             forward(model, data)
             columns["qpos"][k] = data.qpos
-            for column in ("xpos", "xquat", "site_xpos"):
+            for column in _POSES:
                 columns[column][k] = getattr(data, column)
             columns["site_xmat"][k] = np.reshape(data.site_xmat, (model.nsite, 9))
-    return Trace(_header(model, recording, name), columns)
+    return Trace(header, columns)
 
 
 def _header(model: Model, recording: ArmRecording, name: str) -> Header:

@@ -12,7 +12,7 @@ from .parameter_table import determined_table, share_table, undetermined_table
 from .parameter_texts import name_of_parameter
 from .recording_page import gap_table
 from .results import IdentificationResult, StartOutcome
-from .unknown import Motion, motions_of, undeterminable
+from .unknown import TellingMotion, motions_of, undeterminable
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class IdentificationDetails(PageContent):
         return bool(self.undetermined.rows)
 
     @property
-    def motions(self) -> Sequence[Motion]:
+    def motions(self) -> Sequence[TellingMotion]:
         """Return the motions that would tell what this recording cannot."""
         return motions_of(self.result.parameters)
 

@@ -19,7 +19,7 @@ from .parameter_texts import figure_text, interval_text
 from .results import CauseShare, FittedParameter, IdentificationResult, RecordingGap
 from .typed_question import recording_name, typed_question
 from .units_page import units_blocks
-from .unknown import Motion, motions_of
+from .unknown import TellingMotion, motions_of
 from .written_page import written_blocks
 
 _OVERLAP = 0.01  # of the gap: less is rounding
@@ -137,7 +137,7 @@ class IdentificationPage(PageContent):
         return [f"{reason} {len(those)}" for reason, those in ranked]
 
     @property
-    def motions(self) -> list[Motion]:
+    def motions(self) -> list[TellingMotion]:
         """Return the motions that would tell the most of what this recording cannot."""
         return motions_of(self.result.parameters)[: self.most_motions]
 

@@ -34,18 +34,18 @@ def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
     """
     of_joints = [each for each in parameters if each.joint is not None]
     determined = [each for each in of_joints if each.verdict == "determined"]
-    kinds = [kind for kind in UNITS if any(each.kind == kind for each in determined)][:_MOST_KINDS]
+    known = {each.kind for each in determined}
+    every: Sequence[Kind] = tuple(UNITS)
+    kinds = [kind for kind in every if kind in known][:_MOST_KINDS]
     joints = list(dict.fromkeys(each.joint for each in determined if each.kind in kinds))
     cells = {(each.joint, each.kind): _cell_of(each) for each in of_joints}
     rows: list[list[str]] = []
     for joint in joints[:most]:
-        row = [joint or "", *(cells.get((joint, kind), NO_NUMBER) for kind in kinds)]
-        rows.append(row)
+        rows.append([joint or "", *(cells.get((joint, kind), NO_NUMBER) for kind in kinds)])
     if len(joints) > most:
         rows.append([f"{len(joints) - most} more", *[NO_NUMBER] * len(kinds)])
     if rows:
-        models = [_model_text([e for e in of_joints if e.kind == kind]) for kind in kinds]
-        rows.append([_OF_MODEL, *models])
+        rows.append([_OF_MODEL, *(_model_text(of_joints, kind) for kind in kinds)])
     headers = ["fitted", *(f"{kind}, {unit_text(kind)}" for kind in kinds)]
     return Table(headers, rows)
 
@@ -59,10 +59,9 @@ def _cell_of(parameter: FittedParameter) -> str:
     return f"{number_text(parameter.kind, parameter.fitted)} ± {width}"
 
 
-def _model_text(parameters: Sequence[FittedParameter]) -> str:
-    """Return the figures that the model has, from the least to the largest."""
-    kind: Kind = parameters[0].kind
-    values = [each.model for each in parameters]
+def _model_text(parameters: Sequence[FittedParameter], kind: Kind) -> str:
+    """Return the figures of a kind that the model has, from the least to the largest."""
+    values = [each.model for each in parameters if each.kind == kind]
     ends = dict.fromkeys(number_text(kind, value) for value in (min(values), max(values)))
     return " to ".join(ends)
 

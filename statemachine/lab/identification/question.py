@@ -9,7 +9,7 @@ from .written_model import check_written, with_written
 
 
 def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> IdentificationResult:
-    """Fit the model to a recording, and write its file with the fitted figures if that is asked.
+    """Return what a recording tells of its model, and write its file with that if it is asked.
 
     Raises:
         BadInputError: The recording cannot be read, or the file cannot be written.

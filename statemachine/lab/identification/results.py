@@ -13,7 +13,7 @@ from ...models import AnyPath
 from ..recordings.arm_recording import ArmRecordings
 from ..recordings.joint_units import JointUnit
 from ..runs.provenance import Provenance
-from ..shown_result import Column, ShownResult
+from ..shown_result import Column, ShownResult, columns_of
 from ..why.rewriting import RewrittenFile
 
 Kind = Literal["kp", "viscous", "friction", "armature", "offset", "delay", "payload"]
@@ -291,7 +291,7 @@ class IdentificationResult(ShownResult):
     def to_dict(self) -> dict[str, Column]:
         """Return what the recording tells of each parameter as columns."""
         names = ("kind", "joint", "unit", "model", "fitted", "low", "high", "verdict")
-        return {name: [getattr(each, name) for each in self.parameters] for name in names}
+        return columns_of(self.parameters, names)
 
 
 def is_arm_recording(what: object) -> bool:

@@ -11,7 +11,7 @@ from .results import FittedParameter
 
 
 @dataclass(frozen=True)
-class Motion:
+class TellingMotion:
     """A motion that would determine parameters.
 
     Attributes:
@@ -23,10 +23,10 @@ class Motion:
     names: Sequence[str]
 
 
-def motions_of(parameters: Sequence[FittedParameter]) -> list[Motion]:
+def motions_of(parameters: Sequence[FittedParameter]) -> list[TellingMotion]:
     """Return the motions that would tell what a recording cannot, those that tell most first."""
     named = [(each.motion, name_of_parameter(each)) for each in parameters if each.motion]
-    motions = [Motion(*pair) for pair in grouped(named).items()]
+    motions = [TellingMotion(*pair) for pair in grouped(named).items()]
     return sorted(motions, key=lambda motion: -len(motion.names))
 
 
