@@ -34,9 +34,8 @@ def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
     """
     of_joints = [each for each in parameters if each.joint is not None]
     determined = [each for each in of_joints if each.verdict == "determined"]
-    known = {each.kind for each in determined}
-    every: Sequence[Kind] = tuple(UNITS)
-    kinds = [kind for kind in every if kind in known][:_MOST_KINDS]
+    known: set[Kind] = {each.kind for each in determined}
+    kinds = sorted(known, key=list(UNITS).index)[:_MOST_KINDS]
     joints = list(dict.fromkeys(each.joint for each in determined if each.kind in kinds))
     cells = {(each.joint, each.kind): _cell_of(each) for each in of_joints}
     rows: list[list[str]] = []
