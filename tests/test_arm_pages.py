@@ -164,6 +164,14 @@ def test_the_largest_cause_comes_first(fitted: IdentificationResult) -> None:
     assert [share.cause for share in content(fitted).ranked][:2] == ["gains", "delay"]
 
 
+def test_a_reading_that_fits_better_is_on_the_first_screen(fitted: IdentificationResult) -> None:
+    sign, other = fitted.hypotheses
+    better = replace(fitted, hypotheses=(replace(sign, verdict="fits better"), other))
+    assert content(better).better[0].name == "the sign of elbow_flex"
+    assert "the sign of elbow_flex" in shown(page(better))
+    assert "the sign of elbow_flex" not in shown(page(fitted))
+
+
 def test_only_joints_of_which_something_is_determined_have_a_row(
     fitted: IdentificationResult,
 ) -> None:

@@ -16,7 +16,13 @@ from ..runs.provenance import Provenance
 from .identification_details import IdentificationDetails
 from .parameter_table import joint_table, ranked_shares
 from .parameter_texts import figure_text, interval_text
-from .results import CauseShare, FittedParameter, IdentificationResult, RecordingGap
+from .results import (
+    CauseShare,
+    FittedParameter,
+    Hypothesis,
+    IdentificationResult,
+    RecordingGap,
+)
 from .typed_question import recording_name, typed_question
 from .units_page import units_blocks
 from .unknown import TellingMotion, motions_of
@@ -98,6 +104,11 @@ class IdentificationPage(PageContent):
         if alone <= together + _OVERLAP:
             return []
         return [share for share in self.ranked if share.alone > share.share + _OVERLAP]
+
+    @property
+    def better(self) -> list[Hypothesis]:
+        """Return the other readings that fit better."""
+        return [each for each in self.result.hypotheses if each.verdict == "fits better"]
 
     @property
     def determined(self) -> list[FittedParameter]:
