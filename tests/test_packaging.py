@@ -61,6 +61,8 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
             for name in ("stage.html", "stage.js", "scene.js")
         ),
         "statemachine/lab/recordings/recorded/hold.pybullet.npz",
+        "statemachine/lab/recordings/synthetic/meta/info.json",
+        "statemachine/lab/recordings/synthetic/data/chunk-000/file-000.parquet",
     )
     tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
     assert tops == {"statemachine", "statemachine_sim.py"}
@@ -115,7 +117,7 @@ def test_no_machine_path_and_no_address_is_committed() -> None:
     paths = re.compile(r"(?<![\w.])/(home|root|Users|work)/\w")
     for name in listed.stdout.splitlines():
         path = ROOT / name
-        if path.suffix in (".png", ".stl", ".npz", ".onnx") or not path.is_file():
+        if path.suffix in (".png", ".stl", ".npz", ".onnx", ".parquet") or not path.is_file():
             continue
         text = path.read_text()
         assert not paths.search(text), name

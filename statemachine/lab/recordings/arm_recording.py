@@ -19,7 +19,8 @@ class ArmRecording:
         episode: Its number in the data set.
         fps: Frames per second [1/s]. Times are k / fps: they were not measured.
         joints: (n,) names of the model's joints, in the order of the columns.
-        action: (K, n) commanded angles [rad], in the model's zero.
+        action: (K, n) commanded angles [rad], in the model's zero, truncated to counts as they
+            were sent.
         state: (K, n) measured angles [rad], in the model's zero.
         resolution: (n,) angle of one count of the servos [rad].
         units: What the numbers of the file mean, one for each joint.

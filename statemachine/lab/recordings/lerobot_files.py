@@ -1,0 +1,156 @@
+"""Files of a data set of LeRobot: JSON, and columns of parquet files."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import BadInputError, printable, shown
+from ...installed import require_extra
+from ...interface import Array, Ints
+
+_LFS_POINTER = b"version https://git-lfs"
+_LARGEST = 2**31  # bytes of the columns that are read of a file
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of a parquet file.
+
+    Attributes:
+        path: Of the file.
+        rows: How many it has.
+        values: The numbers of each column, one after the other; lists are unfolded.
+    """
+
+    path: Path
+    rows: int
+    values: Mapping[str, NDArray[np.generic]]
+
+    def integers(self, name: str) -> Ints:
+        """Return a column of whole numbers, (rows,).
+
+        Raises:
+            BadInputError: It holds something else.
+        """
+        array = self.values[name]
+        if array.dtype.kind not in "iu" or len(array) != self.rows:
+            raise BadInputError(f"{self.path}: column {name} does not hold whole numbers")
+        return array.astype(np.int64)
+
+    def numbers(self, name: str) -> Array:
+        """Return a column of numbers, (rows,).
+
+        Raises:
+            BadInputError: It holds something else.
+        """
+        return self.lists(name, 1)[:, 0]
+
+    def lists(self, name: str, width: int) -> Array:
+        """Return a column of lists of as many numbers each, (rows, width).
+
+        Raises:
+            BadInputError: It holds something else.
+        """
+        array = self.values[name]
+        if array.dtype.kind not in "fiu":
+            raise BadInputError(f"{self.path}: column {name} does not hold numbers")
+        if len(array) != width * self.rows:
+            raise BadInputError(
+                f"{self.path}: column {name} does not hold {width} numbers in every frame, as "
+                "meta/info.json states"
+            )
+        return array.astype(np.float64).reshape(-1, width)
+
+
+def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
+    """Return some columns of a parquet file.
+
+    Raises:
+        BadInputError: It is not there, or a pointer of git-lfs, or damaged, or lacks a column.
+        MissingEngineError: pyarrow is not installed.
+    """
+    if not path.is_file():
+        raise BadInputError(f"there is no file {path}, which the data set's meta/ names")
+    with path.open("rb") as start:
+        is_pointer = start.read(len(_LFS_POINTER)) == _LFS_POINTER
+    if is_pointer:
+        raise _pointer_error(path)
+    require_extra("pyarrow.parquet", "a recording of LeRobot", "pyarrow", "parquet")
+    try:
+        columns = _columns_of(path, names)
+    except BadInputError:
+        raise
+    except Exception as error:  # damaged bytes may raise anything in pyarrow
+        reason = (str(error) or type(error).__name__).splitlines()[0][:200]
+        raise BadInputError(f"{path} is not a whole parquet file: {printable(reason)}") from None
+    return columns
+
+
+def _columns_of(path: Path, names: tuple[str, ...]) -> Columns:
+    parquet = importlib.import_module("pyarrow.parquet")
+    with parquet.ParquetFile(path) as file:
+        for name in names:
+            if name not in file.schema_arrow.names:
+                raise BadInputError(f"{path} has no column {name}")
+        groups = (file.metadata.row_group(k) for k in range(file.metadata.num_row_groups))
+        size = sum(group.total_byte_size for group in groups)
+        if size > _LARGEST:
+            raise BadInputError(
+                f"{path} unfolds into {size:,} bytes; at most {_LARGEST:,} are read"
+            )
+        table = file.read(columns=list(names))
+    values = {name: _numbers_of(table[name].combine_chunks(), name, path) for name in names}
+    return Columns(path, table.num_rows, values)
+
+
+def _numbers_of(column: Any, name: str, path: Path) -> NDArray[np.generic]:
+    """Return the numbers of a column of pyarrow, those of its lists if it has lists."""
+    has_lists = hasattr(column.type, "value_type")
+    values = column.flatten() if has_lists else column
+    if column.null_count or values.null_count:
+        raise BadInputError(f"{path}: column {name} has rows without a number")
+    return np.asarray(values.to_numpy(zero_copy_only=False))
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file.
+
+    Raises:
+        BadInputError: It cannot be read, or is a pointer of git-lfs.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInputError(f"{path} cannot be read: {printable(error)}") from None
+    if text.startswith(_LFS_POINTER.decode()):
+        raise _pointer_error(path)
+    return text
+
+
+def parse_object(text: str, path: Path) -> dict[str, object]:
+    """Return an object of JSON.
+
+    Raises:
+        BadInputError: The text is something else.
+    """
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"{path} is not JSON: {printable(error)}") from None
+    if not isinstance(value, dict):
+        raise BadInputError(f"{path} holds {shown(value)}, not an object of JSON")
+    return cast("dict[str, object]", value)
+
+
+def _pointer_error(path: Path) -> BadInputError:
+    return BadInputError(
+        f"{path} is a pointer of git-lfs in place of the file: type `git lfs pull` in its folder"
+    )
