@@ -198,7 +198,10 @@ def test_what_is_not_determined_of_such_a_joint_is_a_question_mark(
 def test_delay_and_payload_are_told_in_the_units_that_people_use(
     fitted: IdentificationResult,
 ) -> None:
-    assert content(fitted).of_arm == ["delay 106 ms (104 to 108)", "payload 60.0 g (58.8 to 61.2)"]
+    assert content(fitted).of_arm == [
+        "delay 106.0 ms (103.9 to 108.1)",
+        "payload 60.0 g (58.8 to 61.2)",
+    ]
 
 
 def test_reasons_are_counted(fitted: IdentificationResult) -> None:

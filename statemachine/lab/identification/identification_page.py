@@ -14,7 +14,7 @@ from ...show.first_screen import first_that_fits, with_answer
 from ...show.templates import PageContent, render, render_blocks
 from ..runs.provenance import Provenance
 from .identification_details import IdentificationDetails
-from .parameter_table import joint_table, ranked_shares
+from .parameter_table import UNKNOWN, joint_table, ranked_shares
 from .parameter_texts import figure_text, interval_text
 from .results import (
     CauseShare,
@@ -127,8 +127,16 @@ class IdentificationPage(PageContent):
 
     @property
     def by_joint(self) -> Table:
-        """Return a table of what is determined: a row for each joint, a column for each kind."""
-        return joint_table(self.result.parameters, self.most_rows)
+        """Return a table of what is determined: a row for each joint, a column for each kind.
+
+        Empty under `--details`, which has a row for each parameter.
+        """
+        return joint_table(() if self.further else self.result.parameters, self.most_rows)
+
+    @property
+    def mark(self) -> str:
+        """Return how that table marks what cannot be told; "" where the table is empty."""
+        return f" ({UNKNOWN})" if self.by_joint.rows else ""
 
     @property
     def of_arm(self) -> list[str]:
