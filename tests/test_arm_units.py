@@ -178,6 +178,13 @@ def test_raw_counts_are_refused() -> None:
         infer_units(joints_of(moved_counts(servos("degrees")).astype(float)))
 
 
+def test_a_value_beyond_all_turns_is_refused() -> None:
+    state = frames_of(servos("degrees"), moved_counts(servos("degrees"))).state
+    state[7, 2] = 1e30
+    with pytest.raises(BadInputError, match="measured values of elbow_flex"):
+        infer_units(joints_of(state))
+
+
 def test_a_few_odd_values_do_not_matter() -> None:
     state = frames_of(servos("-100 to 100"), moved_counts(servos("-100 to 100"))).state
     state[[3, 77]] += 0.0312

@@ -67,7 +67,8 @@ class Columns:
                 f"{self.path}: column {name} does not hold {width} numbers in every frame, as "
                 "meta/info.json states"
             )
-        return array.astype(np.float64).reshape(-1, width)
+        with np.errstate(invalid="ignore"):  # of a damaged NaN, which is refused later
+            return array.astype(np.float64).reshape(-1, width)
 
 
 def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
