@@ -312,6 +312,6 @@ def test_fewer_than_eight_values_tell_no_grid() -> None:
 
 def test_values_between_two_places_are_truncated_to_the_lower_or_the_upper() -> None:
     grid = grid_of(np.arange(20.0), 0.05)
-    values = np.array([2.5, 2.999, 3.001, -0.5])
+    values = np.array([2.5, 2.9999, 3.0001, -0.5])
     np.testing.assert_allclose(grid.floor(values), [2, 3, 3, -1], atol=1e-9)
     np.testing.assert_allclose(grid.ceil(values), [3, 3, 3, 0], atol=1e-9)

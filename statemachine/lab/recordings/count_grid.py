@@ -15,7 +15,7 @@ import numpy as np
 from ...interface import Array
 
 FEWEST_LEVELS = 8  # different values from which a quantum is told
-_ROUNDED = 0.01  # of a quantum: what float32 may have rounded
+_ROUNDED = 0.002  # of a quantum: what float32 may have rounded
 _MISFIT = 0.02  # of a quantum: float32 rounds to 0.0001 of one
 _WITHIN = 0.95  # of the values are that near to the grid
 _COHERENT = 0.9  # length of the mean above which a quantum is looked at
