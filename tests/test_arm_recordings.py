@@ -117,6 +117,29 @@ def test_an_episode_that_is_too_short_is_not_held_out(arm: sm.Model, tmp_path: P
     assert recordings(written(tmp_path, made), arm).held_out.episode == 2
 
 
+def test_an_episode_that_was_not_downloaded_is_not_held_out(arm: sm.Model, tmp_path: Path) -> None:
+    source = written(tmp_path, data_set(DEGREES, episodes=3), "v2.1")
+    (tmp_path / V2_DATA).unlink()
+    found = recordings(source, arm)
+    assert (found.fitted.episode, found.held_out.episode) == (0, 2)
+
+
+def test_lists_of_any_length_are_read_as_those_of_a_fixed_length(
+    arm: sm.Model, tmp_path: Path
+) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    source = written(tmp_path, data_set(DEGREES))
+    expected = recordings(source, arm).fitted.state
+    table = parquet.read_table(tmp_path / V3_DATA)
+    for name in ("action", "observation.state"):
+        lists = table[name].cast(pa.list_(pa.float32()))
+        table = table.set_column(table.column_names.index(name), name, lists)
+    parquet.write_table(table, tmp_path / V3_DATA)
+    np.testing.assert_array_equal(recordings(source, arm).fitted.state, expected)
+
+
 def test_old_names_of_columns_are_those_of_the_joints(arm: sm.Model, tmp_path: Path) -> None:
     old = tuple(f"main_{joint}" for joint in JOINTS)
     source = written(tmp_path, replace(data_set(DEGREES), columns=old), "v2.1")

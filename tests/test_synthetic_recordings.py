@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import statemachine as sm
 from statemachine.lab.recordings.arm_source import read_arm_recordings
+from tools.arm_recordings.__main__ import main
 from tools.arm_recordings.arm_truth import Fault, drawn_truth
 from tools.arm_recordings.plans import SHIPPED, SHIPPED_FOLDER, thirty
 from tools.arm_recordings.recordings import NOISE, Plan, SyntheticRecording, make, write
@@ -141,6 +142,18 @@ def test_the_payload_is_on_the_body_gripper(arm: sm.Model) -> None:
     added = np.array(truth.applied_to(arm).body_mass) - np.array(arm.body_mass)
     assert added[arm.body_id("gripper")] == pytest.approx(truth.payload)
     assert np.count_nonzero(np.abs(added) > 1e-12) == 1
+
+
+def test_the_command_writes_what_its_words_say(
+    arm: sm.Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = f"x {tmp_path} --motion hand --seconds 2 --episodes 3 --seed 9 --zero elbow_flex 5"
+    monkeypatch.setattr("sys.argv", words.split())
+    main()
+    found = read_arm_recordings(f"lerobot:{tmp_path}#2", arm, None, {})
+    assert found.fitted.state.shape == (60, 6)
+    told = json.loads((tmp_path / "truth.json").read_text("utf-8"))
+    assert told["plan"]["fault"]["zero"] == [["elbow_flex", pytest.approx(np.radians(5))]]
 
 
 # Faults.
