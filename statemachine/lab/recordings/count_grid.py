@@ -23,7 +23,6 @@ _STEPS_PER_TURN = 10  # between two quanta that are tried, over the span of the 
 _WIDEST = 1000.0  # units that no joint turns: 2.7 turns in degrees
 _AT_ONCE = 2048  # quanta that are tried together, for their memory
 _MOST_LEVELS = 60  # that all quanta are compared with
-_REFINEMENTS = 4
 
 
 @dataclass(frozen=True)
@@ -79,14 +78,11 @@ def _refined(levels: Array, quantum: float) -> CountGrid | None:
     """Return the grid near a quantum that the values fit best, if most lie on it."""
     turns = np.exp(2j * np.pi * (levels - levels[0]) / quantum)
     start = float(levels[0] + quantum * np.angle(turns.mean()) / (2.0 * np.pi))
-    for _ in range(_REFINEMENTS):
-        places = np.round((levels - start) / quantum)
-        if np.ptp(places) < 1.0:
-            return None
-        near = np.abs(levels - start - quantum * places) <= 0.25 * quantum
-        quantum, start = (float(each) for each in np.polyfit(places[near], levels[near], 1))
-        if quantum <= 0.0:
-            return None
+    places = np.round((levels - start) / quantum)
+    near = np.abs(levels - start - quantum * places) <= 0.25 * quantum
+    if np.ptp(places[near]) < 1.0:
+        return None
+    quantum, start = (float(each) for each in np.polyfit(places[near], levels[near], 1))
     places = (levels - start) / quantum
     misfit = np.quantile(np.abs(places - np.round(places)), _WITHIN)
     return CountGrid(quantum, start) if misfit <= _MISFIT else None
