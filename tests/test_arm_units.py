@@ -183,7 +183,7 @@ def test_raw_counts_are_refused() -> None:
 def test_fewer_counts_than_a_servo_has_in_a_joint_are_refused() -> None:
     each = servos("-100 to 100", (250,) * 5 + (1250,))
     with pytest.raises(BadInputError, match="measured values of shoulder_pan"):
-        units_of(each, travel=150)
+        units_of(each, travel=80)
 
 
 @pytest.mark.parametrize(("column", "shift"), [(5, -60.0), (0, 100.0), (0, -100.0)])
