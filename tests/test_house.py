@@ -299,6 +299,7 @@ _NO_PAGES = {
     "cli/__init__.py": "hints that end an error",
     "cli/commands.py": "the help of each command",
     "cli/common.py": "the help of options",
+    "cli/compare/recordings.py": "an error that names the option",
     "cli/compare/requests.py": "an error that names the option",
     "cli/experiments.py": "the help of what can be run",
     "cli/help_all.py": "the help of an option",

@@ -88,7 +88,7 @@ def arguments_of(*functions: Callable[..., Any]) -> set[str]:
 
 def test_every_option_of_compare_can_be_written_in_python() -> None:
     asked = (lab.compare, lab.why, lab.one_step, lab.converge, lab.versions, lab.models)
-    known = arguments_of(*asked) | set(FUNCTIONS)
+    known = arguments_of(*asked, lab.recording, lab.identify) | set(FUNCTIONS)
     missing = [
         name
         for name in options_of("compare")
@@ -113,7 +113,11 @@ def test_an_option_that_is_elsewhere_is_still_one() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["compare", "why", "one_step", "converge", "engines", "versions", "models", "sweep"]
+    "name",
+    [
+        *("compare", "why", "one_step", "converge", "engines", "versions", "models", "sweep"),
+        *("recording", "identify"),
+    ],
 )
 def test_every_argument_is_documented(name: str) -> None:
     function = getattr(lab, name)

@@ -20,7 +20,7 @@ from statemachine.lab.policy.diagnosis import (
     diagnose,
     named_of,
 )
-from statemachine.lab.policy.hypotheses import Hypothesis, hypotheses_of
+from statemachine.lab.policy.hypotheses import ContractHypothesis, hypotheses_of
 from statemachine.lab.policy.request import PolicyRequest
 from statemachine.lab.policy.two_contracts import ContractsResult, compare_contracts
 from statemachine.lab.policy.walk import Ending, Walk
@@ -44,7 +44,7 @@ def faulty_contract(folder: Path, fault: str) -> Contract:
     return read_contract(written_with(contract_text(), fault, folder))
 
 
-def mending(contract: Contract, sound: Contract) -> list[Hypothesis]:
+def mending(contract: Contract, sound: Contract) -> list[ContractHypothesis]:
     """Return the changes after which a contract says what the sound one says."""
     changes = hypotheses_of(contract)
     return [each for each in changes if not field_differences(each.contract, sound)]

@@ -32,7 +32,7 @@ from statemachine.lab.sweep import Sweep
 from statemachine.lab.sweep.questions import SweepEffectsRequest, SweepReportRequest, SweepRequest
 from statemachine.lab.sweep.questions import answer as answer_sweep
 from statemachine.lab.validate.fingertip_request import FingertipRequest
-from statemachine.view.request import RecordingRequest, ServerSettings, SimulationRequest
+from statemachine.view.request import ServerSettings, SimulationRequest, TracesRequest
 
 from .support.processes import of_python
 
@@ -61,7 +61,7 @@ TYPED: list[tuple[str, Callable[[], object]]] = [
         lambda: SweepRequest(Sweep("hold", ["kp=1,2"]), "d", jobs=2),
     ),
     ("view --keyframe held", lambda: SimulationRequest(keyframe="held")),
-    ("view a.npz b.npz so101", lambda: RecordingRequest(("a.npz", "b.npz"), "so101")),
+    ("view a.npz b.npz so101", lambda: TracesRequest(("a.npz", "b.npz"), "so101")),
     ("compare hold", lambda: CompareRequest(HOLD)),
     ("compare hold --tolerance tip=2mm", lambda: CompareRequest(HOLD, {"tip": 0.002})),
     ("compare hold --no-chaos", lambda: CompareRequest(HOLD, uncertainty=None)),
@@ -117,7 +117,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: answer_sweep(SweepRequest(Sweep("hold"), None)), "--out DIR"),
     (lambda: SweepReportRequest("d", backends=("a", "b", "c")), "of one engine"),
     (lambda: SimulationRequest(backends=("mujoco",) * 3), "one engine or two"),
-    (lambda: RecordingRequest(()), "one trace or two"),
+    (lambda: TracesRequest(()), "one trace or two"),
     (lambda: ServerSettings(seconds=0.0), "seconds must"),
     (lambda: ServerSettings(speed=0.0), "speed must be from"),
     (lambda: ExplainRequest(HOLD, time_limit=0.0), "--time-limit wants"),

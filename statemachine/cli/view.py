@@ -16,7 +16,7 @@ from ..typed_numbers import typed_float, typed_int
 from .common import PROGRAM, TerminalReporter, add_backend, add_menagerie, flag_of, is_given
 
 if TYPE_CHECKING:
-    from ..view.request import BrowserView, RecordingRequest, ServerSettings, SimulationRequest
+    from ..view.request import BrowserView, ServerSettings, SimulationRequest, TracesRequest
 
 _SAY = TableLabels(__name__, "view_labels.md.j2")
 _PORT = 8080
@@ -89,7 +89,7 @@ def settings_of(options: argparse.Namespace) -> ServerSettings:
     )
 
 
-def request_of(options: argparse.Namespace) -> SimulationRequest | RecordingRequest:
+def request_of(options: argparse.Namespace) -> SimulationRequest | TracesRequest:
     """Return what is to be shown.
 
     Raises:
@@ -97,7 +97,7 @@ def request_of(options: argparse.Namespace) -> SimulationRequest | RecordingRequ
         UnknownNameError: There is no such backend.
     """
     from ..lab.compare.what import is_trace
-    from ..view.request import RecordingRequest, SimulationRequest
+    from ..view.request import SimulationRequest, TracesRequest
 
     traces = [word for word in options.words if is_trace(word)]
     models = [word for word in options.words if not is_trace(word)]
@@ -115,7 +115,7 @@ def request_of(options: argparse.Namespace) -> SimulationRequest | RecordingRequ
     for name in ("backend", "keyframe", "site"):
         if is_given(options, name):
             raise BadInputError(f"{flag_of(name)} is for a simulation, and a trace is a recording")
-    return RecordingRequest(tuple(traces), model, options.menagerie)
+    return TracesRequest(tuple(traces), model, options.menagerie)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from .ask.gaps import compare as compare
     from .ask.gaps import why as why
     from .ask.pages import write as write
+    from .ask.recordings import identify as identify
+    from .ask.recordings import recording as recording
     from .ask.releases import versions as versions
     from .ask.steps import converge as converge
     from .ask.steps import one_step as one_step
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from .ask.sweeps import sweep_report as sweep_report
     from .compare.sides import Request as Request
     from .compare.sides import Side as Side
+    from .identification.results import RecordingRequest as RecordingRequest
     from .questions.requests.causes import ExplainRequest as ExplainRequest
     from .questions.requests.converge import ConvergeRequest as ConvergeRequest
     from .questions.requests.engines import EnginesRequest as EnginesRequest
@@ -45,8 +48,10 @@ _QUESTIONS = {
     "compare": "ask.gaps",
     "converge": "ask.steps",
     "engines": "ask.engines",
+    "identify": "ask.recordings",
     "models": "ask.descriptions",
     "one_step": "ask.steps",
+    "recording": "ask.recordings",
     "sweep": "ask.sweeps",
     "sweep_report": "ask.sweeps",
     "versions": "ask.releases",
@@ -60,6 +65,7 @@ _REQUESTS = {
     "ExplainRequest": "questions.requests.causes",
     "ModelsRequest": "questions.requests.models",
     "OneStepRequest": "questions.requests.one_step",
+    "RecordingRequest": "identification.results",
     "Request": "compare.sides",
     "Side": "compare.sides",
     "VersionsRequest": "questions.requests.versions",

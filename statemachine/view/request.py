@@ -53,7 +53,7 @@ class SimulationRequest:
 
 
 @dataclass(frozen=True)
-class RecordingRequest:
+class TracesRequest:
     """Recorded runs that are to be shown.
 
     Attributes:
@@ -119,7 +119,7 @@ class BrowserView:
 
 @contextmanager
 def open_view(
-    request: SimulationRequest | RecordingRequest, reporter: Reporter = QUIET
+    request: SimulationRequest | TracesRequest, reporter: Reporter = QUIET
 ) -> Iterator[BrowserView]:
     """Open what is to be shown, and close it at the end of the block.
 
@@ -127,7 +127,7 @@ def open_view(
         TraceError: A file is not a trace, or a trace is not of the model.
         StateMachineError: The model cannot be loaded, or has no such keyframe or site.
     """
-    if isinstance(request, RecordingRequest):
+    if isinstance(request, TracesRequest):
         yield _recording(request, reporter)
         return
     chosen = chosen_backends(request.backends)
@@ -140,7 +140,7 @@ def open_view(
         yield BrowserView(session, drawing_of(models[0]), keyframe, f"{request.model} on {engines}")
 
 
-def _recording(request: RecordingRequest, reporter: Reporter) -> BrowserView:
+def _recording(request: TracesRequest, reporter: Reporter) -> BrowserView:
     """Open recorded runs."""
     session = TraceSession([read(path) for path in request.files])
     header = session.header

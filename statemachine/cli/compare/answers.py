@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import EndedEarlyError
 from ..common import INTERRUPTED, TerminalReporter, print_error, show
 from .options import check_options
+from .recordings import names_recording, run_recording
 from .requests import explain_request_of, request_of
+from .stopping import stop_is_said
 
 if TYPE_CHECKING:
     from ...engines.pictures import Renderer
@@ -45,6 +45,8 @@ def run(options: argparse.Namespace) -> int:
     from ...lab.questions.requests.one_step import OneStepRequest
     from ...lab.questions.requests.versions import VersionsRequest
 
+    if names_recording(options):
+        return run_recording(options)
     check_options(options)
     match request_of(options):
         case ModelsRequest() as request:
@@ -63,27 +65,11 @@ def run(options: argparse.Namespace) -> int:
             return _run_compare(options, request)
 
 
-@contextmanager
-def _stop_is_said() -> Iterator[None]:
-    """Compute an answer; of a Ctrl-C before anything is known that is said.
-
-    Raises:
-        SystemExit: A Ctrl-C came.
-        InterruptedExplanation: A Ctrl-C came, and something is known.
-    """
-    try:
-        yield
-    except KeyboardInterrupt as stop:
-        if type(stop) is not KeyboardInterrupt:
-            raise
-        raise SystemExit(print_error("stopped before anything is known", INTERRUPTED)) from None
-
-
 def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     """Compare two files."""
     from ...lab.questions.requests.models import answer
 
-    with _stop_is_said():
+    with stop_is_said():
         result = answer(request, TerminalReporter())
     return show(result.page(options.details), result, options.json)
 
@@ -93,7 +79,7 @@ def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     from ...lab.questions import one_step
     from ...lab.questions.requests.one_step import answer
 
-    with _stop_is_said():
+    with stop_is_said():
         result = answer(request, TerminalReporter())
     return show(one_step.page(result, options.details), result, options.json)
 
@@ -103,7 +89,7 @@ def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     from ...lab.questions import convergence
     from ...lab.questions.requests.converge import answer
 
-    with _stop_is_said():
+    with stop_is_said():
         result = answer(request, TerminalReporter())
     return show(convergence.page(result, options.details), result, options.json)
 
@@ -113,7 +99,7 @@ def _run_engines(options: argparse.Namespace, request: EnginesRequest) -> int:
     from ...lab.questions import engines
     from ...lab.questions.requests.engines import answer
 
-    with _stop_is_said():
+    with stop_is_said():
         result = answer(request, TerminalReporter())
     return show(engines.page(result, options.details), result, options.json)
 
@@ -126,7 +112,7 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     from ...show.charts import write_pictures
 
     _files_of(options).check(TerminalReporter())
-    with _stop_is_said():
+    with stop_is_said():
         result = answer(request, TerminalReporter())
     if options.junit is not None:
         write_tests(options.junit, result.comparisons)
@@ -148,7 +134,7 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
 
     interrupted = False
     try:
-        with _stop_is_said():
+        with stop_is_said():
             result = answer(request, TerminalReporter())
     except InterruptedExplanation as stop:
         result, interrupted = stop.result, True
@@ -175,7 +161,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     asked = None
     if files.html is not None and not options.no_why:
         asked = explain_request_of(options, request.run)
-    with _stop_is_said():
+    with stop_is_said():
         result = answer(request, reporter)
     page = comparison.page(result, options.details)
     if files.html is not None:

@@ -43,12 +43,15 @@ def add(parser: argparse.ArgumentParser) -> None:
         f"  {PROGRAM} compare hold so101 timestep=0.002 so101 timestep=0.001\n"
         f"  {PROGRAM} compare walk.py:policy A.xml B.xml --every 5 --keyframe home\n"
         f"  {PROGRAM} compare walk.onnx A.xml A.xml@pybullet --contract C.yaml\n"
-        f"  {PROGRAM} compare run.npz A.xml B.xml"
+        f"  {PROGRAM} compare run.npz A.xml B.xml\n"
+        f"  {PROGRAM} compare lerobot:DIR#3 so101 --why"
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
         "Exit code 1: something differs, or a run ends before its time; with --why, but\n"
-        "without --html: something stays unexplained, or is only a weak hint."
+        "without --html: something stays unexplained, or is only a weak hint. Of a\n"
+        "recorded arm: the model is no nearer to it than its commands are; with --why: the\n"
+        "fitted model stays above the floor of resolution and unmeasured time."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(
@@ -56,7 +59,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="WHAT",
         help="what is run: an experiment, FILE.py:FUNCTION, POLICY.onnx or a recorded TRACE; then "
-        "nothing, a model for all engines, two sides or more, or a second trace",
+        "nothing, a model for all engines, two sides or more, or a second trace; or a recording of "
+        "a real arm, lerobot:DIR#EPISODE, and its model",
     )
     add_backend(
         parser,
@@ -142,6 +146,11 @@ def _add_sides(group: argparse._ArgumentGroup) -> None:
         help="for how long what FUNCTION(model, data) returned holds: steps (1), or 5ms",
     )
     group.add_argument("--keyframe", metavar="NAME", help="where it starts, on both sides")
+    group.add_argument(
+        "--calibration",
+        metavar="FILE",
+        help="LeRobot's calibration of a recorded arm (default: unit and scale from the numbers)",
+    )
     add_policy(group)
 
 
@@ -246,6 +255,7 @@ def check_options(options: argparse.Namespace) -> None:
     _exclude(options, "write", ("html",))
     _need(options, ("no_why",), ("html",))
     _need(options, ("frame",), ("models",))
+    refuse_options(options, ("calibration",), "{} goes with a recording of an arm, lerobot:DIR#3")
     _exclude(options, "uncertainty", ("no_chaos",))
     other_answers = ("why", "html", "plot", "film", "models", "uncertainty", "tolerance")
     _exclude(options, "one_step", other_answers)

@@ -26,7 +26,7 @@ _SAY = TableLabels(__name__, "hold_labels.md.j2")
 
 
 @dataclass(frozen=True)
-class JointGap:
+class TargetGap:
     """How far a joint is from its target.
 
     Attributes:
@@ -93,12 +93,12 @@ class HoldPage(PageContent):
         return 2 if self.away == len(self.result.joints) else 1
 
     @property
-    def worst(self) -> JointGap:
+    def worst(self) -> TargetGap:
         """Return the joint that is farthest from its target at the end."""
         return _farthest(self.result, self.result.qpos[-1])
 
     @property
-    def free_worst(self) -> JointGap | None:
+    def free_worst(self) -> TargetGap | None:
         """Return that of the run in which nothing can touch; None without such a run."""
         if self.result.without_contacts is None:
             return None
@@ -133,10 +133,10 @@ class HoldPage(PageContent):
         return sum(self.result.older.gap > limit for limit in _OLDER_LIMITS)
 
 
-def _farthest(result: HoldResult, pose: Array) -> JointGap:
+def _farthest(result: HoldResult, pose: Array) -> TargetGap:
     """Return the joint that is farthest from its target in a pose (k,) [rad; of a slide, m]."""
     gap, joint = largest(np.abs(pose - result.target))
-    return JointGap(result.joints[joint], gap, result.slides[joint])
+    return TargetGap(result.joints[joint], gap, result.slides[joint])
 
 
 def contents(results: Results[HoldResult], frame: LessonFrame) -> dict[str, HoldPage]:

@@ -7,6 +7,8 @@ from pathlib import Path
 from ...errors import BadInputError
 from ...models import AnyPath
 from ...show.charts import write_pictures
+from ..identification.arm_report import check_page, write_arm_page
+from ..identification.results import IdentificationResult, RecordingResult
 from ..questions import plot
 from ..questions.compare_report import whole_page
 from ..questions.page_command import page_command
@@ -27,7 +29,7 @@ _PAGES, _FIGURES, _FILM, _TESTS = (".html", ".htm"), (".svg", ".png", ".pdf"), "
 
 
 def write(
-    result: CompareResult | VersionsResult,
+    result: CompareResult | VersionsResult | RecordingResult | IdentificationResult,
     file: AnyPath,
     *,
     why: bool = True,
@@ -38,7 +40,8 @@ def write(
         lab.write(lab.compare("a.xml", "b.xml", what="hold"), "hold.html")
 
     Args:
-        result: Of `compare`; of `versions` for a figure or a report for CI.
+        result: Of `compare`; of `versions` for a figure or a report for CI; of `recording` or
+            `identify` for a page.
         file: "NAME.html" for a page that stands alone, with both runs in 3D; .svg, .png or .pdf for
             a figure; .webp for a film of both sides; .xml for each quantity as a test of JUnit.
         why: Whether causes are looked for, which a page then says.
@@ -53,6 +56,9 @@ def write(
     suffix = target.suffix.lower()
     if isinstance(result, VersionsResult):
         _write_of_versions(result, target, suffix)
+    elif isinstance(result, RecordingResult | IdentificationResult):
+        check_page(target, reporter)
+        write_arm_page(target, result)
     elif suffix in _PAGES:
         _write_page(result, target, why, reporter)
     elif suffix in _FIGURES:

@@ -13,7 +13,8 @@ from ...models import AnyPath
 from ..recordings.arm_recording import ArmRecordings
 from ..recordings.joint_units import JointUnit
 from ..runs.provenance import Provenance
-from ..shown_result import Column, ShownResult
+from ..shown_result import Column, ShownResult, columns_of
+from ..why.rewriting import RewrittenFile
 
 Kind = Literal["kp", "viscous", "friction", "armature", "offset", "delay", "payload"]
 Cause = Literal["delay", "gains", "friction", "offsets", "inertia"]
@@ -123,7 +124,7 @@ class RecordingGap:
     fitted: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RecordingResult(ShownResult):
     """How far a model is from a recording of a real arm.
 
@@ -240,7 +241,7 @@ class StartOutcome:
     evaluations: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class IdentificationResult(ShownResult):
     """What a recording of a real arm tells of the parameters of its model.
 
@@ -263,7 +264,7 @@ class IdentificationResult(ShownResult):
         recordings: Both episodes; not in JSON.
         arm: The Model as it is; not in JSON.
         fitted_arm: The Model with the fitted figures (offset and delay are not in it); not in JSON.
-        written: The file that was written; "" for none.
+        rewritten: The model's file with the fitted figures; None where that was not asked.
     """
 
     page_function: ClassVar[str] = "identification.identification_page:page"
@@ -285,12 +286,12 @@ class IdentificationResult(ShownResult):
     recordings: ArmRecordings = field(metadata={"json": False})
     arm: Model = field(metadata={"json": False})
     fitted_arm: Model = field(metadata={"json": False})
-    written: str = ""
+    rewritten: RewrittenFile | None = None
 
     def to_dict(self) -> dict[str, Column]:
         """Return what the recording tells of each parameter as columns."""
         names = ("kind", "joint", "unit", "model", "fitted", "low", "high", "verdict")
-        return {name: [getattr(each, name) for each in self.parameters] for name in names}
+        return columns_of(self.parameters, names)
 
 
 def is_arm_recording(what: object) -> bool:

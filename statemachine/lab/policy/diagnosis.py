@@ -17,7 +17,7 @@ from ..runs.reporter import QUIET, Reporter
 from .command import Command, usual_commands
 from .contract import Contract
 from .contract_file import read_contract
-from .hypotheses import Hypothesis, HypothesisKind, hypotheses_of
+from .hypotheses import ContractHypothesis, HypothesisKind, hypotheses_of
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
 from .request import PolicyRequest, on_each_engine, opened_network
@@ -216,7 +216,7 @@ def _diagnosed(
 
 
 def _tried(
-    hypothesis: Hypothesis, policy: PolicyOnModel, runs: _Runs, recorded: RecordedWalk
+    hypothesis: ContractHypothesis, policy: PolicyOnModel, runs: _Runs, recorded: RecordedWalk
 ) -> TriedHypothesis:
     """Return what comes of a change.
 

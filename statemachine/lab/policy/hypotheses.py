@@ -41,7 +41,7 @@ _FRONTS: Final = (("front", "rear"), ("front", "hind"), ("FL", "RL"), ("FR", "RR
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class ContractHypothesis:
     """What may be wrong with a contract, and the contract without it.
 
     Attributes:
@@ -59,7 +59,7 @@ class Hypothesis:
     contract: Contract
 
 
-def hypotheses_of(contract: Contract) -> tuple[Hypothesis, ...]:
+def hypotheses_of(contract: Contract) -> tuple[ContractHypothesis, ...]:
     """Return what may be wrong with a contract, as far as it applies to it."""
     return tuple(
         hypothesis
@@ -87,14 +87,14 @@ def with_term(contract: Contract, term: ObservedTerm, changed: ObservedTerm) -> 
     return replace(contract, terms=terms)
 
 
-def _quaternion_order(contract: Contract) -> Iterator[Hypothesis]:
+def _quaternion_order(contract: Contract) -> Iterator[ContractHypothesis]:
     before = contract.quat_order
     after: Literal["wxyz", "xyzw"] = "xyzw" if before == "wxyz" else "wxyz"
     changed = replace(contract, quat_order=after)
-    yield Hypothesis("quaternion order", "", before, after, changed)
+    yield ContractHypothesis("quaternion order", "", before, after, changed)
 
 
-def _frames(contract: Contract) -> Iterator[Hypothesis]:
+def _frames(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield each velocity in the other axes."""
     for term in contract.terms:
         if term.id not in ("base_lin_vel", "base_ang_vel"):
@@ -104,10 +104,10 @@ def _frames(contract: Contract) -> Iterator[Hypothesis]:
             kind = "gyroscope frame"
         after: Literal["body", "world"] = "world" if term.frame == "body" else "body"
         changed = with_term(contract, term, replace(term, frame=after))
-        yield Hypothesis(kind, term.name, term.frame, after, changed)
+        yield ContractHypothesis(kind, term.name, term.frame, after, changed)
 
 
-def _swapped_legs(contract: Contract) -> Iterator[Hypothesis]:
+def _swapped_legs(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield joints that are read from the other side, or from the other half of the list."""
     encoders = [term for term in contract.terms if term.id in ("joint_pos_rel", "joint_vel_rel")]
     if not encoders:
@@ -125,7 +125,7 @@ def _swapped_legs(contract: Contract) -> Iterator[Hypothesis]:
         changed = contract
         for term in encoders:
             changed = with_term(changed, term, _read_from(contract, term, order))
-        yield Hypothesis("swapped legs", "", "", name, changed)
+        yield ContractHypothesis("swapped legs", "", "", name, changed)
 
 
 def _read_from(contract: Contract, term: ObservedTerm, order: Sequence[str]) -> ObservedTerm:
@@ -171,14 +171,14 @@ def _halves(joints: tuple[str, ...]) -> tuple[str, ...] | None:
     return None if rest else joints[half:] + joints[:half]
 
 
-def _gravity_sign(contract: Contract) -> Iterator[Hypothesis]:
+def _gravity_sign(contract: Contract) -> Iterator[ContractHypothesis]:
     for term in contract.terms:
         if term.id == "projected_gravity":
             changed = with_term(contract, term, replace(term, scale=-term.scale))
-            yield Hypothesis("gravity sign", term.name, "", "the other sign", changed)
+            yield ContractHypothesis("gravity sign", term.name, "", "the other sign", changed)
 
 
-def _absolute_angles(contract: Contract) -> Iterator[Hypothesis]:
+def _absolute_angles(contract: Contract) -> Iterator[ContractHypothesis]:
     for term in contract.terms:
         if term.reference is None:
             continue
@@ -190,7 +190,7 @@ def _absolute_angles(contract: Contract) -> Iterator[Hypothesis]:
         names = ("from the default pose", "from zero")
         before, after = names if is_relative else names[::-1]
         changed = with_term(contract, term, replace(term, reference=reference))
-        yield Hypothesis("absolute angles", term.name, before, after, changed)
+        yield ContractHypothesis("absolute angles", term.name, before, after, changed)
 
 
 def _usual_scale(term: ObservedTerm) -> Array | None:
@@ -206,7 +206,7 @@ def _scale_text(scale: Array) -> str:
     return ", ".join(f"{number:g}" for number in scale)
 
 
-def _terms_left_out(contract: Contract) -> Iterator[Hypothesis]:
+def _terms_left_out(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield each term that is told as zero, as it is or as it is usually scaled.
 
     The last action, which not every policy is told, is also yielded as zero.
@@ -217,13 +217,13 @@ def _terms_left_out(contract: Contract) -> Iterator[Hypothesis]:
             for scale in (ones,) if usual is None else (ones, usual):
                 changed = with_term(contract, term, replace(term, scale=scale))
                 after = f"times {_scale_text(scale)}"
-                yield Hypothesis("term left out", term.name, "zero", after, changed)
+                yield ContractHypothesis("term left out", term.name, "zero", after, changed)
         elif term.id == "last_action":
             changed = with_term(contract, term, replace(term, scale=np.zeros(term.dim)))
-            yield Hypothesis("term left out", term.name, "told", "zero", changed)
+            yield ContractHypothesis("term left out", term.name, "told", "zero", changed)
 
 
-def _speed_scales(contract: Contract) -> Iterator[Hypothesis]:
+def _speed_scales(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield velocities with their usual scale where they have none, and without where they have."""
     for term in contract.terms:
         usual = _usual_scale(term)
@@ -233,27 +233,27 @@ def _speed_scales(contract: Contract) -> Iterator[Hypothesis]:
         scale = usual if is_unscaled else np.ones(term.dim)
         changed = with_term(contract, term, replace(term, scale=scale))
         texts = _scale_text(term.scale), _scale_text(scale)
-        yield Hypothesis("speed scale", term.name, *texts, changed)
+        yield ContractHypothesis("speed scale", term.name, *texts, changed)
 
 
-def _action_scales(contract: Contract) -> Iterator[Hypothesis]:
+def _action_scales(contract: Contract) -> Iterator[ContractHypothesis]:
     for factor in (_ACTION_FACTOR, 1.0 / _ACTION_FACTOR):
         action = replace(contract.action, scale=contract.action.scale * factor)
         changed = replace(contract, action=action)
         before = f"{contract.action.scale[0]:g}"
-        yield Hypothesis("action scale", "", before, f"{action.scale[0]:g}", changed)
+        yield ContractHypothesis("action scale", "", before, f"{action.scale[0]:g}", changed)
 
 
-def _delays(contract: Contract) -> Iterator[Hypothesis]:
+def _delays(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield actions that act one or two calls later, or at once where they are late."""
     before = contract.action.delay_steps
     later = [0] if before else [1, 2]
     for after in later:
         changed = replace(contract, action=replace(contract.action, delay_steps=after))
-        yield Hypothesis("delay", "", str(before), str(after), changed)
+        yield ContractHypothesis("delay", "", str(before), str(after), changed)
 
 
-def _clocks(contract: Contract) -> Iterator[Hypothesis]:
+def _clocks(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield a clock twice as fast, half as fast, and half a period later."""
     for term in contract.terms:
         clock = term.clock
@@ -265,10 +265,10 @@ def _clocks(contract: Contract) -> Iterator[Hypothesis]:
             clocks[f"{period:g} s"] = replace(clock, period=period)
         for after, changed_clock in clocks.items():
             changed = with_term(contract, term, replace(term, clock=changed_clock))
-            yield Hypothesis("clock", term.name, f"{clock.period:g} s", after, changed)
+            yield ContractHypothesis("clock", term.name, f"{clock.period:g} s", after, changed)
 
 
-def _policy_rates(contract: Contract) -> Iterator[Hypothesis]:
+def _policy_rates(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield a policy that is called twice or half as often, at the same timestep."""
     timing = contract.timing
     decimation = timing.decimation
@@ -280,10 +280,10 @@ def _policy_rates(contract: Contract) -> Iterator[Hypothesis]:
         changed_timing = CallTiming(timing.policy_dt * more / less, steps)
         changed = replace(contract, timing=changed_timing)
         before, after = 1.0 / timing.policy_dt, 1.0 / changed_timing.policy_dt
-        yield Hypothesis("policy rate", "", f"{before:g} Hz", f"{after:g} Hz", changed)
+        yield ContractHypothesis("policy rate", "", f"{before:g} Hz", f"{after:g} Hz", changed)
 
 
-def _servos(contract: Contract) -> Iterator[Hypothesis]:
+def _servos(contract: Contract) -> Iterator[ContractHypothesis]:
     """Yield torques that are computed by the other of both ways, where the gains are known."""
     servos: Servos = contract.servos
     if servos.kp is None or servos.kd is None or servos.kind is None:
@@ -292,4 +292,4 @@ def _servos(contract: Contract) -> Iterator[Hypothesis]:
     if servos.kind == "explicit_pd":
         after = "implicit_pd"
     changed = replace(contract, servos=replace(servos, kind=after))
-    yield Hypothesis("servos", "", servos.kind, after, changed)
+    yield ContractHypothesis("servos", "", servos.kind, after, changed)

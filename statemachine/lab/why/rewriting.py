@@ -117,6 +117,13 @@ def _is_same_folder(target: Path, right: Path) -> bool:
     return target.parent.resolve() == right.parent.resolve()
 
 
+def text_at(source: XmlSource, target: Path) -> bytes:
+    """Return the text of a file with its changes, as it stands at another place."""
+    if _is_same_folder(target, source.path):
+        return source.changed_text()
+    return source.moved_text(target.parent)
+
+
 def rewrite(request: RewriteRequest) -> tuple[RewrittenFile, Model]:
     """Write the right's file so that it becomes like the left, and load it.
 
@@ -242,10 +249,7 @@ class _Rewriter:
         for text in texts:
             self._source.set(text)
         request = self._request
-        if _is_same_folder(request.target, request.right.path):
-            part.write_bytes(self._source.changed_text())
-        else:
-            part.write_bytes(self._source.moved_text(request.target.parent))
+        part.write_bytes(text_at(self._source, request.target))
         with warnings.catch_warnings():  # of the right they were given when it was loaded
             warnings.simplefilter("ignore", EngineWarning)
             return request.load(part)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....interface import Array, Ints
-from ....measures.text import display_unit, figure, on_label, short_time
+from ....measures.text import display_unit, figure, on_label, short_time, significant
 from ....show import html
 from ....show.blocks import Interactive, Items, Page, Section
 from ....show.html.geometry import packed
@@ -143,7 +143,7 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
     if scene.data is None:
         still = joined(tag("p", note) for note in scene.notes)
     share = now / until if until else 0.0
-    on_left = non_breaking(f"{until:g} s {on_label(left)}")
+    on_left = non_breaking(f"{significant(until)} s {on_label(left)}")
     on_right = on_label(right)
     spoken_time = short_time(now)
     return {

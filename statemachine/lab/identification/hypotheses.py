@@ -1,0 +1,71 @@
+"""Other readings of a recording, fitted anew: signs of joints, where viscous friction acts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ..runs.drive import Progress, no_progress
+from .fit import Objective, fit
+from .results import Hypothesis
+from .simulation import ArmSimulation
+from .starts import Fits
+
+_RUNS = 10  # simulations of all worlds of each fit
+_EVIDENCE = 5.0  # half the sum of squares: odds of 150 to 1
+_SATURATED = 0.01  # part of the frames at the force limit, below which it does not matter
+
+
+def tried_hypotheses(
+    fits: Fits, saturated: float, progress: Progress = no_progress
+) -> tuple[Hypothesis, ...]:
+    """Return how well other readings fit.
+
+    Signs are tried where the fit leaves more than noise: with the wrong sign gravity pulls a joint
+    the wrong way. Where only noise is left, nothing speaks for another sign.
+
+    Args:
+        fits: With the reading as it is.
+        saturated: Part of the frames in which a servo is at its force limit.
+        progress: Told the fraction that is done.
+    """
+    best = fits.best
+    # What is left is weighed, not the noise: all readings may be wrong.
+    objective = replace(best.objective, deviation=np.maximum(fits.residuals.rms, 1e-9))
+    simulation = objective.simulation
+    readings: list[tuple[str, ArmSimulation]] = []
+    if saturated > _SATURATED:
+        readings.append(
+            (
+                "viscous friction outside of the force limit",
+                replace(simulation, viscous_outside=True),
+            )
+        )
+    if not fits.residuals.at_floor:
+        for place, joint in enumerate(objective.parameters.joints):
+            signs = simulation.signs.copy()
+            signs[place] = -1.0
+            readings.append((f"the other sign of {joint}", replace(simulation, signs=signs)))
+    if not readings:
+        return ()
+    as_it_is = fit(objective, best.vector, fine=False, runs=_RUNS)
+    tried: list[Hypothesis] = []
+    for number, (name, other) in enumerate(readings):
+        tried.append(_tried(name, replace(objective, simulation=other), fits, as_it_is.cost))
+        progress((number + 1) / len(readings))
+    return tuple(tried)
+
+
+def _tried(name: str, objective: Objective, fits: Fits, cost: float) -> Hypothesis:
+    """Return how well another reading fits, from the best fit and from the model as it is."""
+    ends = [fit(objective, each.vector, fine=False, runs=_RUNS) for each in fits.each[:2]]
+    end = min(ends, key=lambda each: each.cost)
+    evidence = cost - end.cost
+    residual = float(np.sqrt(np.square(end.errors).mean()))
+    if not math.isfinite(residual) or evidence < -_EVIDENCE:
+        return Hypothesis(name, residual, evidence, "fits worse")
+    if evidence > _EVIDENCE:
+        return Hypothesis(name, residual, evidence, "fits better")
+    return Hypothesis(name, residual, evidence, "cannot tell")

@@ -1,0 +1,93 @@
+"""What stands under the first screen of an identification: everything that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...measures.text import degrees, fixed
+from ...show.blocks import Table
+from ...show.templates import PageContent
+from .parameter_table import determined_table, share_table, undetermined_table
+from .parameter_texts import name_of_parameter
+from .recording_page import gap_table
+from .results import IdentificationResult, StartOutcome
+from .unknown import TellingMotion, motions_of, undeterminable
+
+
+@dataclass(frozen=True)
+class IdentificationDetails(PageContent):
+    """What stands under the first screen of an identification.
+
+    Attributes:
+        result: What was computed.
+    """
+
+    template = "identification_details.md.j2"
+    result: IdentificationResult
+
+    @property
+    def shares(self) -> Table:
+        """Return a table of the causes."""
+        return share_table(self.result)
+
+    @property
+    def determined(self) -> Table:
+        """Return a table of what the recording determines."""
+        return determined_table(self.result.parameters)
+
+    @property
+    def undetermined(self) -> Table:
+        """Return a table of what the recording cannot tell, and what each lacks."""
+        return undetermined_table(self.result.parameters)
+
+    @property
+    def has_undetermined(self) -> bool:
+        """Tell whether there is something that the recording cannot tell."""
+        return bool(self.undetermined.rows)
+
+    @property
+    def motions(self) -> Sequence[TellingMotion]:
+        """Return the motions that would tell what this recording cannot."""
+        return motions_of(self.result.parameters)
+
+    @property
+    def undeterminable(self) -> list[str]:
+        """Return what no motion would tell."""
+        return undeterminable(self.result.parameters)
+
+    @property
+    def joints(self) -> Table:
+        """Return how far each joint is from the arm on what was not fitted."""
+        return gap_table(self.result.gap)
+
+    @property
+    def hypotheses(self) -> Table:
+        """Return a table of the other readings that were tried."""
+        headers = ("reading", "RMS", "evidence", "verdict")
+        rows: list[tuple[str, ...]] = []
+        for each in self.result.hypotheses:
+            residual, evidence = degrees(each.residual, 3), fixed(each.evidence, 1)
+            rows.append((each.name, residual, evidence, each.verdict))
+        return Table(headers, rows, words=frozenset({0, 3}))
+
+    @property
+    def starts(self) -> Sequence[StartOutcome]:
+        """Return where each start of the fit ended."""
+        return self.result.starts
+
+    @property
+    def as_good(self) -> int:
+        """Return how many starts fit as well as the best."""
+        return sum(start.as_good for start in self.starts)
+
+    @property
+    def disagreeing(self) -> list[str]:
+        """Return the parameters on which starts disagree that fit as well."""
+        parameters = self.result.parameters
+        return [name_of_parameter(p) for p in parameters if "starts disagree" in p.reasons]
+
+    @property
+    def starts_agree(self) -> bool:
+        """Tell whether the starts that fit as well agree on every parameter."""
+        return not self.disagreeing

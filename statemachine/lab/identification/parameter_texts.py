@@ -1,0 +1,65 @@
+"""Parameters of an arm and their figures, in the words and units that people use."""
+
+from __future__ import annotations
+
+import math
+
+from ...measures.text import NO_NUMBER, figure, rough, significant, unit_suffix
+from .results import UNITS, FittedParameter, Kind, Reason
+
+# From the unit of a result to the one that is read, and that.
+_SHOWN: dict[Kind, tuple[float, str]] = {
+    "offset": (math.degrees(1.0), "°"),
+    "delay": (1e3, "ms"),
+    "payload": (1e3, "g"),
+}
+_ADDED: tuple[Kind, ...] = ("offset", "delay", "payload")  # the model has none of them
+REASON_WORDS: dict[Reason, str] = {
+    "too little information": "information",
+    "residual above the floor": "residual",
+    "starts disagree": "starts",
+    "does not hold elsewhere": "elsewhere",
+}
+
+
+def name_of_parameter(parameter: FittedParameter) -> str:
+    """Return the name of a parameter, and of which joint."""
+    return parameter.kind if parameter.joint is None else f"{parameter.kind} of {parameter.joint}"
+
+
+def unit_text(kind: Kind) -> str:
+    """Return the unit in which a parameter is read."""
+    return _SHOWN.get(kind, (1.0, UNITS[kind]))[1]
+
+
+def number_text(kind: Kind, value: float) -> str:
+    """Return a figure of a parameter without its unit.
+
+    Args:
+        kind: Which parameter.
+        value: Its figure, in the unit of `UNITS`.
+    """
+    return figure(value * _SHOWN.get(kind, (1.0, ""))[0])
+
+
+def half_width_text(kind: Kind, width: float) -> str:
+    """Return half of an interval with two digits, without its unit; the rest as `number_text`."""
+    return rough(width * _SHOWN.get(kind, (1.0, ""))[0])
+
+
+def figure_text(kind: Kind, value: float) -> str:
+    """Return a figure of a parameter with its unit; arguments as of `number_text`."""
+    return f"{number_text(kind, value)}{unit_suffix(unit_text(kind))}"
+
+
+def interval_text(parameter: FittedParameter) -> str:
+    """Return the interval of a parameter, without its unit."""
+    ends = [number_text(parameter.kind, end) for end in (parameter.low, parameter.high)]
+    return " to ".join(ends)
+
+
+def factor_text(parameter: FittedParameter) -> str:
+    """Return how many times the model's figure the fitted one is; a dash where it has none."""
+    if parameter.kind in _ADDED or parameter.model == 0.0:
+        return NO_NUMBER
+    return f"×{significant(parameter.fitted / parameter.model, 2)}"

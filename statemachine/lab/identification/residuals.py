@@ -1,0 +1,84 @@
+"""Whether what a fit leaves is noise of the measurement, or an error of the model.
+
+The noise of a joint is taken from the differences of successive residuals (J. von Neumann, 1941):
+an error of the model changes slowly from frame to frame, and noise does not. It must also be no
+more than a count of the servo and a reading at an uncertain time can make.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...interface import Array
+from ..recordings.arm_recording import ArmRecording
+
+UNCERTAIN_TIME = 0.003  # standard deviation of when a frame was read [s]
+_ABOVE_NOISE = 1.15  # residual of a joint, by its noise
+_ABOVE_ELSEWHERE = 1.3  # the same of what was not fitted: parameters have errors, too
+_STILL = 0.7  # counts: a joint that hardly moves has an error of this size, and no noise
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """What is left between fitted and measured angles.
+
+    Attributes:
+        rms: (n,) root mean square of each joint [rad].
+        noise: (n,) the part of it that is noise [rad].
+        most: (n,) the most that resolution and unmeasured time can make [rad].
+        resolution: (n,) angle of a count [rad].
+    """
+
+    rms: Array
+    noise: Array
+    most: Array
+    resolution: Array
+
+    @classmethod
+    def of(cls, errors: Array, recording: ArmRecording) -> Residuals:
+        """Return what is left.
+
+        Args:
+            errors: (K, n) fitted angles less measured ones [rad].
+            recording: That they are of; its last frames, if it has more.
+        """
+        state = recording.state[-len(errors) :]
+        speed = np.gradient(state, 1.0 / recording.fps, axis=0)
+        least = recording.resolution / math.sqrt(12.0)
+        noise = np.sqrt(np.square(np.diff(errors, axis=0)).mean(axis=0) / 2.0)
+        of_time = UNCERTAIN_TIME * np.sqrt(np.square(speed).mean(axis=0))
+        return cls(
+            rms=np.sqrt(np.square(errors).mean(axis=0)),
+            noise=np.maximum(noise, least),
+            most=np.hypot(recording.resolution, of_time),
+            resolution=recording.resolution,
+        )
+
+    @property
+    def overall(self) -> float:
+        """Return the root mean square over all joints [rad]."""
+        return float(np.sqrt(np.square(self.rms).mean()))
+
+    @property
+    def floor(self) -> float:
+        """Return what the measurement alone leaves, over all joints [rad]."""
+        return float(np.sqrt(np.square(np.minimum(self.noise, self.most)).mean()))
+
+    @property
+    def at_floor(self) -> bool:
+        """Tell whether nothing but noise is left, in any joint."""
+        return self._is_noise(_ABOVE_NOISE)
+
+    @property
+    def holds(self) -> bool:
+        """Tell whether a model that was fitted elsewhere leaves hardly more than noise."""
+        return self._is_noise(_ABOVE_ELSEWHERE)
+
+    def _is_noise(self, factor: float) -> bool:
+        if not np.isfinite(self.rms).all():
+            return False
+        allowed = np.maximum(factor * np.minimum(self.noise, self.most), _STILL * self.resolution)
+        return bool((self.rms <= allowed).all())

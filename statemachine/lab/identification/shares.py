@@ -1,0 +1,78 @@
+"""What each cause explains of the gap between a model and a recording: Shapley values.
+
+A cause is fitted, together with those before it, and the gap is that on what was not fitted: delay
+and gains stand in for each other, and neither order of the two says what is whose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from ...interface import Array
+from ..runs.drive import Progress, no_progress
+from ..why.shapley import shapley
+from .fit import fit
+from .results import CAUSES, Cause, CauseShare
+from .simulation import ArmSimulation
+from .starts import Fits
+
+_RUNS = 6  # simulations of all worlds of a fit, which begins at the best fit of all
+
+
+def cause_shares(
+    fits: Fits, elsewhere: ArmSimulation, progress: Progress = no_progress
+) -> tuple[CauseShare, ...]:
+    """Return the share of each cause, by what it takes from the gap elsewhere.
+
+    Args:
+        fits: Of all parameters.
+        elsewhere: Plays what was not fitted.
+        progress: Told the fraction that is done.
+    """
+    objective = fits.best.objective
+    nothing = np.zeros(len(objective.parameters))
+    known: dict[frozenset[str], float | None] = {}
+
+    def gap(causes: Collection[str]) -> float | None:
+        key = frozenset(causes)
+        if key not in known:
+            known[key] = _gap_elsewhere(fits, elsewhere, key)
+            progress(min(1.0, len(known) / 2 ** len(CAUSES)))
+        return known[key]
+
+    whole = gap_of(elsewhere, nothing)
+    if not math.isfinite(whole) or whole <= 0.0:
+        return ()
+    division = shapley(CAUSES, gap, whole)
+    shares: list[CauseShare] = []
+    for cause in CAUSES:
+        share, alone, last = division.share[cause], division.alone[cause], division.last[cause]
+        if share is None or alone is None or last is None:
+            return ()
+        shares.append(CauseShare(cause, share, alone, last))
+    return tuple(shares)
+
+
+def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str]) -> float | None:
+    """Return the gap where these causes are fitted; None where the simulation diverges."""
+    best = fits.best
+    nothing = np.zeros(len(best.vector))
+    chosen: list[Cause] = [cause for cause in CAUSES if cause in causes]
+    if not chosen:
+        return gap_of(elsewhere, nothing)
+    free = best.objective.parameters.of_causes(chosen)
+    objective = replace(best.objective, free=free, fixed=nothing)
+    fitted = fit(objective, best.vector, fine=False, runs=_RUNS)
+    gap = gap_of(elsewhere, fitted.vector)
+    return gap if math.isfinite(gap) else None
+
+
+def gap_of(simulation: ArmSimulation, vector: Array) -> float:
+    """Return the root mean square over joints and frames of a vector's angles [rad]."""
+    angles = simulation.angles_of_each(vector[None])[0]
+    errors = (angles - simulation.state)[simulation.first_frame :]
+    return float(np.sqrt(np.square(errors).mean()))

@@ -1,0 +1,215 @@
+"""The fitted figures, written into the text of the model's file.
+
+What the recording determines is written as attributes of the elements themselves. The file is
+loaded, and a figure that it then has otherwise is taken back and told with its reason.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...atomic_files import beside
+from ...backends import load
+from ...engines import raw_engine_of
+from ...engines.description.file_changes import UnwrittenChange
+from ...engines.description.file_form import FileForm, NotWrittenError
+from ...engines.description.xml_source import AttributeText, XmlSource
+from ...engines.records import Edit, SpecEdit
+from ...errors import BadInputError, EngineWarning
+from ...installed import DEFAULT
+from ...interface import Model
+from ...models import resolve
+from ..why.rewriting import RewrittenFile, changes_of, check_target, text_at
+from .parameter_texts import name_of_parameter
+from .results import FittedParameter, IdentificationResult, RecordingRequest
+
+_SUFFIXES = (".xml", ".mjcf")
+_EXACT = 1e-9  # relative: what a written figure may be off
+_CALIBRATION = "it is how the arm was calibrated, and no figure of the model"
+_OTHERWISE = "the model that is compiled of the file has another figure"
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """A parameter that is to be written.
+
+    Attributes:
+        name: Its name.
+        edits: What the compiled model of the file is to have.
+        texts: The attributes that say so.
+    """
+
+    name: str
+    edits: Sequence[Edit]
+    texts: Sequence[AttributeText]
+
+
+def check_written(request: RecordingRequest) -> None:
+    """Refuse a file that cannot be written, before anything is fitted.
+
+    Raises:
+        BadInputError: The model's file is no MJCF, or as of `why.rewriting.check_target`.
+        ModelError: The model's file is no XML.
+    """
+    if request.write is None:
+        return
+    path = resolve(request.model, request.menagerie)
+    if path.suffix.lower() not in _SUFFIXES:
+        raise BadInputError(f"--write changes the text of an MJCF; {path.name} is none")
+    inputs = [] if request.calibration is None else [Path(request.calibration)]
+    check_target(Path(request.write), path, path, inputs)
+
+
+def with_written(result: IdentificationResult) -> IdentificationResult:
+    """Write the model's file with the fitted figures, if that is asked for.
+
+    Returns:
+        The result, which says what was written and what was not, and why.
+
+    Raises:
+        StateMachineError: The model's file cannot be read.
+    """
+    request = result.request
+    if request.write is None:
+        return result
+    target, model = Path(request.write), load(request.model, menagerie=request.menagerie)
+    source = XmlSource(model.path)
+    writer = _FittedFile(result, model, source, target)
+    return replace(result, rewritten=writer.written())
+
+
+class _FittedFile:
+    """Writes what a recording determines into the text of a file.
+
+    Args:
+        result: What the recording tells.
+        model: The model as its file has it.
+        source: The file.
+        target: The file that is written.
+    """
+
+    def __init__(
+        self, result: IdentificationResult, model: Model, source: XmlSource, target: Path
+    ) -> None:
+        self._result, self._model = result, model
+        self._source, self._target = source, target
+        self._not_written: list[UnwrittenChange] = []
+
+    def written(self) -> RewrittenFile:
+        """Write the file, and return what was written of it."""
+        planned = list(self._plan())
+        with beside(self._target) as (part,):
+            compiled = self._loaded(Path(part), planned).compiled
+            good = [each for each in planned if _has(compiled, each.edits)]
+            if len(good) < len(planned):
+                self._loaded(Path(part), good)
+        for each in planned:
+            if each not in good:
+                self._not_written.append(UnwrittenChange(each.name, _OTHERWISE))
+        texts = [text for each in good for text in each.texts]
+        return RewrittenFile(
+            file=os.fspath(self._target),
+            of=self._model.path.name,
+            written=changes_of(texts),
+            not_written=tuple(self._not_written),
+        )
+
+    def _plan(self) -> Iterator[_Planned]:
+        """Yield what is determined and can be written; of the rest of it, note why it cannot."""
+        form = self._form()
+        for parameter in self._result.parameters:
+            name = name_of_parameter(parameter)
+            if parameter.verdict != "determined":
+                continue
+            if parameter.kind == "offset":
+                self._not_written.append(UnwrittenChange(name, _CALIBRATION))
+                continue
+            edits, spec_edits = self._edits(parameter)
+            try:
+                yield _Planned(name, edits, form.texts(edits, spec_edits))
+            except NotWrittenError as error:
+                self._not_written.append(UnwrittenChange(name, str(error)))
+
+    def _form(self) -> FileForm:
+        """Return what writes figures of the compiled model as attributes."""
+        raw: Any = self._model.compiled
+        same = {geom: geom for geom in range(raw.ngeom)}
+        return raw_engine_of(DEFAULT).file_form(self._source, raw, self._model.path, raw, same)
+
+    def _edits(self, parameter: FittedParameter) -> tuple[list[Edit], list[SpecEdit]]:
+        """Return what the compiled model, and its description, are to have."""
+        fitted: Any = self._result.fitted_arm.compiled
+        if parameter.kind == "delay":
+            return self._edits_of_delay(parameter.fitted)
+        if parameter.kind == "payload":
+            return self._edits_of_payload(fitted), []
+        joint = self._model.joint_id(parameter.joint or "")
+        dof = int(self._model.jnt_dofadr[joint])
+        servo = self._model.actuator_jntid.tolist().index(joint)
+        match parameter.kind:
+            case "kp":
+                gain, bias = fitted.actuator_gainprm[servo, 0], fitted.actuator_biasprm[servo, 1]
+                return [
+                    ("actuator_gainprm", (servo, 0), float(gain)),
+                    ("actuator_biasprm", (servo, 1), float(bias)),
+                ], []
+            case "viscous":
+                bias = fitted.actuator_biasprm[servo, 2]
+                return [
+                    ("actuator_biasprm", (servo, 2), float(bias)),
+                    ("dof_damping", (dof,), float(fitted.dof_damping[dof])),
+                ], []
+            case "friction":
+                return [("dof_frictionloss", (dof,), float(fitted.dof_frictionloss[dof]))], []
+            case _:
+                return [("dof_armature", (dof,), float(fitted.dof_armature[dof]))], []
+
+    def _edits_of_payload(self, fitted: Any) -> list[Edit]:
+        """Return what the bodies are to have that weigh something else where the arm is fitted."""
+        raw: Any = self._model.compiled
+        edits: list[Edit] = []
+        for body in np.flatnonzero(~np.isclose(fitted.body_mass, raw.body_mass)).tolist():
+            for array in ("body_mass", "body_ipos", "body_iquat", "body_inertia"):
+                value = getattr(fitted, array)[body]
+                if not np.allclose(value, getattr(raw, array)[body]):
+                    edits.append((array, (body,), value))
+        return edits
+
+    def _edits_of_delay(self, delay: float) -> tuple[list[Edit], list[SpecEdit]]:
+        """Return what each servo of the recording is to have so that its commands are late."""
+        late: Any = self._model.replace(latency=delay).compiled
+        driven = self._model.actuator_jntid.tolist()
+        edits: list[Edit] = []
+        spec_edits: list[SpecEdit] = []
+        for joint in self._result.recordings.fitted.joints:
+            servo = driven.index(self._model.joint_id(joint))
+            edits.append(("actuator_delay", (servo,), float(late.actuator_delay[servo])))
+            room = int(late.actuator_history[servo, 0])
+            spec_edits.append(SpecEdit("actuator", servo, "nsample", room))
+        return edits, spec_edits
+
+    def _loaded(self, part: Path, planned: Sequence[_Planned]) -> Model:
+        """Write the file with some parameters, and load it."""
+        self._source.forget()
+        for each in planned:
+            for text in each.texts:
+                self._source.set(text)
+        part.write_bytes(text_at(self._source, self._target))
+        with warnings.catch_warnings():  # of the model they were given when it was loaded
+            warnings.simplefilter("ignore", EngineWarning)
+            return load(part)
+
+
+def _has(compiled: Any, edits: Sequence[Edit]) -> bool:
+    """Tell whether a compiled model has what it was to have."""
+    return all(
+        np.allclose(getattr(compiled, array)[index], value, rtol=_EXACT, atol=0.0)
+        for array, index, value in edits
+    )
