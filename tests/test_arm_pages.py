@@ -164,6 +164,14 @@ def test_the_largest_cause_comes_first(fitted: IdentificationResult) -> None:
     assert [share.cause for share in content(fitted).ranked][:2] == ["gains", "delay"]
 
 
+def test_a_reading_that_fits_better_is_on_the_first_screen(fitted: IdentificationResult) -> None:
+    sign, other = fitted.hypotheses
+    better = replace(fitted, hypotheses=(replace(sign, verdict="fits better"), other))
+    assert content(better).better[0].name == "the sign of elbow_flex"
+    assert "the sign of elbow_flex" in shown(page(better))
+    assert "the sign of elbow_flex" not in shown(page(fitted))
+
+
 def test_only_joints_of_which_something_is_determined_have_a_row(
     fitted: IdentificationResult,
 ) -> None:
@@ -190,7 +198,10 @@ def test_what_is_not_determined_of_such_a_joint_is_a_question_mark(
 def test_delay_and_payload_are_told_in_the_units_that_people_use(
     fitted: IdentificationResult,
 ) -> None:
-    assert content(fitted).of_arm == ["delay 106 ms (104 to 108)", "payload 60.0 g (58.8 to 61.2)"]
+    assert content(fitted).of_arm == [
+        "delay 106.0 ms (103.9 to 108.1)",
+        "payload 60.0 g (58.8 to 61.2)",
+    ]
 
 
 def test_reasons_are_counted(fitted: IdentificationResult) -> None:

@@ -38,6 +38,8 @@ COMMANDS = [
     "compare hold so101/scene so101/scene damping=1 --seconds 0.2 --why",
     "compare hold so101 so101 damping=1 so101 damping=1.001 --seconds 0.2 --no-chaos",
     "compare --models so101 so101/scene",
+    "compare lerobot:synthetic so101 --seconds 2",
+    "compare lerobot:synthetic so101 --seconds 2 --why",
     "trace show {ROOT}/statemachine/lab/recordings/recorded/droop.pybullet.npz",
     "check {ROOT}/teaching/solutions/step_loop.py",
     "check --faults {ROOT}/exercises/test_arm.py --only xyzw",

@@ -16,7 +16,7 @@ from ..questions.stage.quantity_chart import charts_of
 from ..runs.reporter import QUIET, Reporter
 from .ghosts import traces_of
 from .results import IdentificationResult, RecordingResult
-from .typed_question import typed_question
+from .typed_question import recording_name, typed_question
 
 _SPOKEN = 2  # charts that are spoken as the slider moves
 
@@ -72,7 +72,7 @@ def report_page(
     if worst is not None:
         lead = tuple(k for k, chart in enumerate(charts) if chart.curve.name == worst.name) or lead
     runs = BothRuns(
-        result.request.recording.rpartition("/")[2],
+        recording_name(result.request.recording),
         comparison=comparison,
         start=0.0 if worst is None else worst.at,
         events=tuple(events_of(comparison)),

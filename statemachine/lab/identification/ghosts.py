@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from ...interface import Array, Model, forward, make_data, step
+from ...errors import DivergedError
+from ...interface import Array, Model, forward, make_data
 from ..recordings import Header, Trace
 from ..recordings.arm_recording import ArmRecording
 from ..recordings.recorder import layout_of
 from ..runs.provenance import provenance
 from ..runs.robot import scalar_joint
-from .results import IdentificationResult, RecordingResult
+from .parameters import ArmParameters
+from .results import IdentificationResult, Kind, RecordingResult
+from .simulation import ArmSimulation
 
 MEASURED, AS_IT_IS, FITTED = "the arm", "the model as it is", "the fitted model"
-_WHOLE = 1e-9  # of a step: rounding
 _INPUTS = ("qpos", "qvel", "ctrl")
 _POSES = ("xpos", "xquat", "site_xpos")
 
@@ -24,72 +26,48 @@ def traces_of(result: RecordingResult | IdentificationResult) -> tuple[Trace, Tr
     """Return the arm as it was measured, and as it is simulated: fitted, where it was fitted.
 
     Of a fit it is the episode that was not fitted, if there is one.
+
+    Raises:
+        DivergedError: The simulation diverges.
     """
-    if isinstance(result, RecordingResult):
-        recording = result.recordings.fitted
-        angles = simulated_angles(result.arm, recording)
-        return _both(result.arm, recording, angles, AS_IT_IS)
-    recording = result.recordings.held_out or result.recordings.fitted
-    offsets = _offsets(result, recording)
-    angles = simulated_angles(result.fitted_arm, recording, offsets, _delay(result))
-    return _both(result.arm, recording, angles, FITTED)
-
-
-def _both(
-    model: Model, recording: ArmRecording, simulated: Array, name: str
-) -> tuple[Trace, Trace]:
-    """Return measured and simulated angles as traces of one model."""
+    recording, name = result.recordings.fitted, AS_IT_IS
+    figures: dict[tuple[Kind, str | None], float] = {}
+    if isinstance(result, IdentificationResult):
+        recording, name = result.recordings.held_out or recording, FITTED
+        figures = {(each.kind, each.joint): each.fitted for each in result.parameters}
+    simulated = simulated_angles(result.arm, recording, figures)
     return (
-        trace_of_angles(model, recording, recording.state, MEASURED),
-        trace_of_angles(model, recording, simulated, name),
+        trace_of_angles(result.arm, recording, recording.state, MEASURED),
+        trace_of_angles(result.arm, recording, simulated, name),
     )
 
 
-def _offsets(result: IdentificationResult, recording: ArmRecording) -> Array:
-    """Return the offset of each joint of a recording (n,) [rad]."""
-    fitted = {each.joint: each.fitted for each in result.parameters if each.kind == "offset"}
-    return np.array([fitted.get(joint, 0.0) for joint in recording.joints])
-
-
-def _delay(result: IdentificationResult) -> float:
-    """Return the delay between command and measurement [s]."""
-    return sum(each.fitted for each in result.parameters if each.kind == "delay")
-
-
 def simulated_angles(
-    model: Model, recording: ArmRecording, offsets: Array | float = 0.0, delay: float = 0.0
+    model: Model, recording: ArmRecording, figures: Mapping[tuple[Kind, str | None], float]
 ) -> Array:
-    """Play the commands of a recording into a model, and return its angles at each frame.
+    """Play the commands of a recording into an arm, and return what would be measured.
 
     Args:
         model: The arm.
         recording: Its commands, and the angles that it starts from.
-        offsets: (n,) what a measured angle is more than that of the model [rad].
-        delay: How much later a measured angle is than that of the model [s].
+        figures: What parameters are, in SI units, by kind and joint; the others as in the model.
 
     Returns:
-        (K, n) angles [rad], with offsets and delay as of the measured ones.
+        (K, n) angles at each frame [rad].
+
+    Raises:
+        DivergedError: The simulation diverges.
     """
-    per_frame = math.ceil(1.0 / (recording.fps * model.timestep) - _WHOLE)
-    model = model.replace(timestep=1.0 / (recording.fps * per_frame))
-    qpos = [scalar_joint(model, joint)[0] for joint in recording.joints]
-    ctrl = _commands_of(model, recording)
-    angles = np.empty_like(recording.state)
-    with make_data(model) as data:
-        data.qpos[qpos] = recording.state[0] - offsets
-        for k, action in enumerate(recording.action):
-            angles[k] = data.qpos[qpos]
-            data.ctrl[ctrl] = action - offsets
-            step(model, data, per_frame)
-    times = np.arange(len(angles)) / recording.fps
-    columns = [np.interp(times - delay, times, column) for column in angles.T]
-    return np.column_stack(columns) + offsets
-
-
-def _commands_of(model: Model, recording: ArmRecording) -> list[int]:
-    """Return the place in ctrl of the servo of each joint of a recording."""
-    driven = model.actuator_jntid.tolist()
-    return [driven.index(model.joint_id(joint)) for joint in recording.joints]
+    parameters = ArmParameters.of(model, recording.joints)
+    vector = np.zeros(len(parameters))
+    for place, parameter in enumerate(parameters.each):
+        figure = figures.get((parameter.kind, parameter.joint))
+        if figure is not None:
+            vector[place] = parameter.value(figure)
+    angles = ArmSimulation.of(parameters, recording).angles(vector)
+    if not np.isfinite(angles).all():
+        raise DivergedError("the simulation of the recorded commands diverges")
+    return angles
 
 
 def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: str) -> Trace:
@@ -107,7 +85,8 @@ def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: 
     columns: dict[str, Array] = {"time": np.arange(len(angles)) / recording.fps}
     for column in (*_INPUTS, *_POSES, "site_xmat"):
         columns[column] = np.zeros((len(angles), *header.shape(column)))
-    columns["ctrl"][:, _commands_of(model, recording)] = recording.action
+    servos = ArmParameters.of(model, recording.joints).servo
+    columns["ctrl"][:, servos] = recording.action
     columns["qvel"][:, dofs] = np.gradient(angles, 1.0 / recording.fps, axis=0)
     with make_data(model) as data:
         for k, frame in enumerate(angles):

@@ -14,9 +14,15 @@ from ...show.first_screen import first_that_fits, with_answer
 from ...show.templates import PageContent, render, render_blocks
 from ..runs.provenance import Provenance
 from .identification_details import IdentificationDetails
-from .parameter_table import joint_table, ranked_shares
+from .parameter_table import UNKNOWN, joint_table, ranked_shares
 from .parameter_texts import figure_text, interval_text
-from .results import CauseShare, FittedParameter, IdentificationResult, RecordingGap
+from .results import (
+    CauseShare,
+    FittedParameter,
+    Hypothesis,
+    IdentificationResult,
+    RecordingGap,
+)
 from .typed_question import recording_name, typed_question
 from .units_page import units_blocks
 from .unknown import TellingMotion, motions_of
@@ -100,6 +106,11 @@ class IdentificationPage(PageContent):
         return [share for share in self.ranked if share.alone > share.share + _OVERLAP]
 
     @property
+    def better(self) -> list[Hypothesis]:
+        """Return the other readings that fit better."""
+        return [each for each in self.result.hypotheses if each.verdict == "fits better"]
+
+    @property
     def determined(self) -> list[FittedParameter]:
         """Return the parameters that the recording determines."""
         return [each for each in self.result.parameters if each.verdict == "determined"]
@@ -116,8 +127,16 @@ class IdentificationPage(PageContent):
 
     @property
     def by_joint(self) -> Table:
-        """Return a table of what is determined: a row for each joint, a column for each kind."""
-        return joint_table(self.result.parameters, self.most_rows)
+        """Return a table of what is determined: a row for each joint, a column for each kind.
+
+        Empty under `--details`, which has a row for each parameter.
+        """
+        return joint_table(() if self.further else self.result.parameters, self.most_rows)
+
+    @property
+    def mark(self) -> str:
+        """Return how that table marks what cannot be told; "" where the table is empty."""
+        return f" ({UNKNOWN})" if self.by_joint.rows else ""
 
     @property
     def of_arm(self) -> list[str]:

@@ -18,7 +18,7 @@ from .parameter_texts import (
 )
 from .results import UNITS, CauseShare, FittedParameter, IdentificationResult, Kind
 
-_UNKNOWN = "?"
+UNKNOWN = "?"
 _OF_MODEL = "the model"
 _MOST_KINDS = 4  # columns for which there is room
 
@@ -52,7 +52,7 @@ def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
 def _cell_of(parameter: FittedParameter) -> str:
     """Return a figure with half of its interval; a question mark where it cannot be told."""
     if parameter.verdict != "determined":
-        return _UNKNOWN
+        return UNKNOWN
     half = 0.5 * (parameter.high - parameter.low)
     width = half_width_text(parameter.kind, half)
     return f"{number_text(parameter.kind, parameter.fitted)} ± {width}"
@@ -67,7 +67,7 @@ def _model_text(parameters: Sequence[FittedParameter], kind: Kind) -> str:
 
 def determined_table(parameters: Sequence[FittedParameter]) -> Table:
     """Return the parameters that are determined, with intervals."""
-    headers = ("parameter", "model", "fitted", "95 % within", "is")
+    headers = ("parameter", "model", "fitted", "95 % within", "times")
     rows = [
         [*_figures(each), factor_text(each)] for each in parameters if each.verdict == "determined"
     ]

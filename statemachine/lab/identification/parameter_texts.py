@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from ...measures.text import NO_NUMBER, figure, rough, significant, unit_suffix
+from ...measures.text import NO_NUMBER, figure, fixed, rough, significant, unit_suffix
 from .results import UNITS, FittedParameter, Kind, Reason
 
-# From the unit of a result to the one that is read, and that.
-_SHOWN: dict[Kind, tuple[float, str]] = {
-    "offset": (math.degrees(1.0), "°"),
-    "delay": (1e3, "ms"),
-    "payload": (1e3, "g"),
+# Of what the model has none of: from the unit of a result to the one that is read, that, and how
+# many decimals it has.
+_ADDED: dict[Kind, tuple[float, str, int]] = {
+    "offset": (math.degrees(1.0), "°", 2),
+    "delay": (1e3, "ms", 1),
+    "payload": (1e3, "g", 1),
 }
-_ADDED: tuple[Kind, ...] = ("offset", "delay", "payload")  # the model has none of them
 REASON_WORDS: dict[Reason, str] = {
     "too little information": "information",
     "residual above the floor": "residual",
@@ -29,7 +29,7 @@ def name_of_parameter(parameter: FittedParameter) -> str:
 
 def unit_text(kind: Kind) -> str:
     """Return the unit in which a parameter is read."""
-    return _SHOWN.get(kind, (1.0, UNITS[kind]))[1]
+    return _ADDED[kind][1] if kind in _ADDED else UNITS[kind]
 
 
 def number_text(kind: Kind, value: float) -> str:
@@ -39,12 +39,15 @@ def number_text(kind: Kind, value: float) -> str:
         kind: Which parameter.
         value: Its figure, in the unit of `UNITS`.
     """
-    return figure(value * _SHOWN.get(kind, (1.0, ""))[0])
+    if kind in _ADDED:
+        factor, _, decimals = _ADDED[kind]
+        return fixed(value * factor, decimals)
+    return figure(value)
 
 
 def half_width_text(kind: Kind, width: float) -> str:
     """Return half of an interval with two digits, without its unit; the rest as `number_text`."""
-    return rough(width * _SHOWN.get(kind, (1.0, ""))[0])
+    return number_text(kind, width) if kind in _ADDED else rough(width)
 
 
 def figure_text(kind: Kind, value: float) -> str:

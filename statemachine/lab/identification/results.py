@@ -260,7 +260,8 @@ class IdentificationResult(ShownResult):
         shares: What each cause explains; empty where the model has no gap, or it was not asked.
         hypotheses: Other readings that were tried.
         starts: Where each start ended.
-        saturated: Part of the steps of the best fit in which a servo is at its force limit.
+        saturated: Part of the frames of the best fit in which the servo is at its force limit that
+            is so most.
         recordings: Both episodes; not in JSON.
         arm: The Model as it is; not in JSON.
         fitted_arm: The Model with the fitted figures (offset and delay are not in it); not in JSON.

@@ -28,8 +28,8 @@ def typed_question(request: RecordingRequest, *further: str, folders: bool = Tru
 
 def recording_name(recording: str) -> str:
     """Return a recording as it is typed, without the folder that its data set lies in."""
-    place, sign, episode = recording.removeprefix(_SCHEME).partition("#")
-    return f"{_SCHEME}{Path(place).name}{sign}{episode}"
+    # A folder of the data set ends in its name, an episode behind it included.
+    return f"{_SCHEME}{Path(recording.removeprefix(_SCHEME)).name}"
 
 
 def _words_of(request: RecordingRequest, folders: bool) -> list[str]:

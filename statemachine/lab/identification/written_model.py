@@ -31,7 +31,8 @@ from .parameter_texts import name_of_parameter
 from .results import FittedParameter, IdentificationResult, RecordingRequest
 
 _SUFFIXES = (".xml", ".mjcf")
-_EXACT = 1e-9  # relative: what a written figure may be off
+_DIGITS = 6  # of a written figure: a recording tells three at most
+_EXACT = 1e-9  # relative: what the compiled model may be off from what was written
 _CALIBRATION = "it is how the arm was calibrated, and no figure of the model"
 _OTHERWISE = "the model that is compiled of the file has another figure"
 
@@ -155,21 +156,20 @@ class _FittedFile:
         servo = self._model.actuator_jntid.tolist().index(joint)
         match parameter.kind:
             case "kp":
-                gain, bias = fitted.actuator_gainprm[servo, 0], fitted.actuator_biasprm[servo, 1]
+                kp = _rounded(fitted.actuator_gainprm[servo, 0])
                 return [
-                    ("actuator_gainprm", (servo, 0), float(gain)),
-                    ("actuator_biasprm", (servo, 1), float(bias)),
+                    ("actuator_gainprm", (servo, 0), kp),
+                    ("actuator_biasprm", (servo, 1), -kp),
                 ], []
             case "viscous":
-                bias = fitted.actuator_biasprm[servo, 2]
                 return [
-                    ("actuator_biasprm", (servo, 2), float(bias)),
-                    ("dof_damping", (dof,), float(fitted.dof_damping[dof])),
+                    ("actuator_biasprm", (servo, 2), _rounded(fitted.actuator_biasprm[servo, 2])),
+                    ("dof_damping", (dof,), _rounded(fitted.dof_damping[dof])),
                 ], []
             case "friction":
-                return [("dof_frictionloss", (dof,), float(fitted.dof_frictionloss[dof]))], []
+                return [("dof_frictionloss", (dof,), _rounded(fitted.dof_frictionloss[dof]))], []
             case _:
-                return [("dof_armature", (dof,), float(fitted.dof_armature[dof]))], []
+                return [("dof_armature", (dof,), _rounded(fitted.dof_armature[dof]))], []
 
     def _edits_of_payload(self, fitted: Any) -> list[Edit]:
         """Return what the bodies are to have that weigh something else where the arm is fitted."""
@@ -179,7 +179,7 @@ class _FittedFile:
             for array in ("body_mass", "body_ipos", "body_iquat", "body_inertia"):
                 value = getattr(fitted, array)[body]
                 if not np.allclose(value, getattr(raw, array)[body]):
-                    edits.append((array, (body,), value))
+                    edits.append((array, (body,), np.array([_rounded(x) for x in np.ravel(value)])))
         return edits
 
     def _edits_of_delay(self, delay: float) -> tuple[list[Edit], list[SpecEdit]]:
@@ -205,6 +205,11 @@ class _FittedFile:
         with warnings.catch_warnings():  # of the model they were given when it was loaded
             warnings.simplefilter("ignore", EngineWarning)
             return load(part)
+
+
+def _rounded(value: float) -> float:
+    """Return a figure with as many digits as are written."""
+    return float(f"{value:.{_DIGITS}g}")
 
 
 def _has(compiled: Any, edits: Sequence[Edit]) -> bool:

@@ -24,6 +24,11 @@ class WrittenPart(PageContent):
     has_changes: bool
 
     @property
+    def has_delay(self) -> bool:
+        """Tell whether a delay is among what was written."""
+        return any(change.attribute == "delay" for change in self.rewritten.written)
+
+    @property
     def changes(self) -> tuple[AttributeChange, ...]:
         """Return the attributes that have a row."""
         return self.rewritten.written if self.has_changes else ()
