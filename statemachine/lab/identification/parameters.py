@@ -218,11 +218,14 @@ def _of_each_joint(model: Model, joints: Sequence[str], dof: Ints, servo: Ints) 
     Raises:
         UnsupportedError: A figure that factors are to change is zero.
     """
+    viscous = model.actuator_kv[servo] + model.dof_damping[dof]
+    kp, friction = model.actuator_kp[servo], model.dof_frictionloss[dof]
+    armature = model.dof_armature[dof]
     figures: dict[Kind, Array] = {
-        "kp": model.actuator_kp[servo],
-        "viscous": model.actuator_kv[servo] + model.dof_damping[dof],
-        "friction": model.dof_frictionloss[dof],
-        "armature": model.dof_armature[dof],
+        "kp": kp,
+        "viscous": viscous,
+        "friction": friction,
+        "armature": armature,
         "offset": np.zeros(len(joints)),
     }
     each: list[Parameter] = []
