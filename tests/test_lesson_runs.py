@@ -9,9 +9,10 @@ import pytest
 import statemachine as sm
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons._longer_fall import longer_falls
-from statemachine.course.lessons.session import take
+from statemachine.course.lessons.session import page_of_lesson, take
+from statemachine.show.blocks import Table
 
-from .support.pages import lesson_result
+from .support.pages import blocks, lesson_result
 from .support.small_models import TWO_LINKS, TWO_SERVOS, model_of
 
 STEPS = 2000  # of a longer fall
@@ -54,3 +55,11 @@ def test_the_rate_of_rounds_is_about_that_of_the_whole_run(arm: sm.Model) -> Non
     result = lesson_result("time", arm, steps=400)
     whole = result.nstep * arm.timestep / result.wall
     assert 0.01 < result.rate.median / whole < 100.0
+
+
+def test_the_layouts_of_two_engines_are_compared(arm: sm.Model) -> None:
+    run = take(LESSONS["state"], arm, "mujoco")
+    page = page_of_lesson(LESSONS["state"], dict.fromkeys(("mujoco", "pybullet"), run))
+    *_, compared = blocks(page, Table)
+    assert tuple(compared.headers) == ("", "pybullet against mujoco")
+    assert [row[1] for row in compared.rows] == ["none"]

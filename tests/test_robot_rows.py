@@ -363,7 +363,8 @@ def test_a_gap_that_is_there_is_looked_for_at_half_the_timestep(
     pair: tuple[Model, Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     timesteps: set[float] = set()
-    run = runs_by_timestep(pair, {(True, False, False): 0.4, (True, False, True): 0.1})
+    places = {ENDS: 0.4, (True, True, False): 0.4, (True, False, True): 0.1}
+    run = runs_by_timestep(pair, places)
 
     def noting(model: Model, *more: Any) -> tuple[np.ndarray, str]:
         timesteps.add(model.timestep)
