@@ -730,3 +730,15 @@ def test_what_lacks_a_rotor_is_so_many_times_as_fast(tmp_path: Path) -> None:
 def test_a_rotor_that_both_have_is_no_lack_of_one(tmp_path: Path) -> None:
     texts = (ROTOR.format(armature=f'armature="{each}"', mass=1) for each in (0.03, 0.04))
     assert lack_of_armature(compared_texts(tmp_path, *texts).differences) is None
+
+
+SERVO = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/>
+<geom size=".1" pos=".2 0 0"/></body></worldbody>
+<actuator><position name="{name}" joint="hinge" kp="{kp}" kv="1"/></actuator></mujoco>"""
+
+
+def test_the_gain_of_a_servo_that_goes_by_two_names_is_compared(tmp_path: Path) -> None:
+    texts = SERVO.format(name="left_servo", kp=20), SERVO.format(name="right_servo", kp=40)
+    found = compared_texts(tmp_path, *texts)
+    gains = [(row.left, row.right) for row in found.differences if row.quantity == "kp"]
+    assert gains == [(20.0, 40.0)]
