@@ -17,8 +17,7 @@ import numpy as np
 
 from ...errors import DivergedWarning
 from ...interface import Array
-from ...worlds import make_worlds
-from ...worlds import step as step_worlds
+from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
 from .parameters import ArmParameters
 
@@ -143,40 +142,28 @@ class ArmSimulation:
         return max(1, round(_STEPS / self.recording.fps))
 
     def _played(self, vectors: Array, steps: int) -> Array:
-        """Return the angles (W, K, n) with so many steps a frame.
-
-        They are read so much earlier than a frame as the delay is, between two steps.
-        """
+        """Return the angles (W, K, n) with so many steps a frame, NaN of worlds that diverge."""
         parameters = self.parameters
         offsets = vectors[:, parameters.of_kind("offset")]
-        delays = vectors[:, parameters.of_kind("delay")[0]]
-        action, state = self.action, self.state
+        action, first = self.action, self.state[0] - offsets
         timestep = 1.0 / (self.recording.fps * steps)
-        reading = _Reading.of(float(delays.mean()), timestep, steps)
-        frames = len(action)
-        before = np.empty((len(vectors), frames, len(parameters.joints)))
-        after = np.empty_like(before)
         model = parameters.model.replace(timestep=timestep, integrator="euler", contacts=False)
         options = parameters.options(vectors, self.viscous_outside)
         with make_worlds(model, len(vectors), derived=(), **options) as worlds:
-            worlds.qpos[:, parameters.position] = state[0] - offsets
+            worlds.qpos[:, parameters.position] = first
             worlds.qvel[:, parameters.dof] = self.first_velocity
-            before[:] = after[:] = worlds.qpos[:, None, parameters.position]
+            total = (len(action) - 1) * steps
+            commands = np.repeat(worlds.ctrl[:, None], total, axis=1)
+            told = np.repeat(action[:-1], steps, axis=0)
+            commands[:, :, parameters.servo] = told - offsets[:, None]
             with warnings.catch_warnings():
                 # What diverges has no angles, and the fit leaves it again.
                 warnings.simplefilter("ignore", DivergedWarning)
-                for k in range(frames - reading.frames):
-                    worlds.ctrl[:, parameters.servo] = action[k] - offsets
-                    if reading.steps_before:
-                        step_worlds(worlds, reading.steps_before)
-                    before[:, k + reading.frames] = worlds.qpos[:, parameters.position]
-                    step_worlds(worlds)
-                    after[:, k + reading.frames] = worlds.qpos[:, parameters.position]
-                    if reading.steps_after:
-                        step_worlds(worlds, reading.steps_after)
+                positions = record(worlds, total, ctrl=commands)["qpos"][:, :, parameters.position]
             diverged = sorted(worlds.diverged)
-        part = ((reading.delay - delays) / timestep)[:, None, None]
-        angles = before + part * (after - before) + offsets[:, None, :]
+        history = np.concatenate([first[:, None], positions], axis=1)
+        delays = vectors[:, parameters.of_kind("delay")[0]]
+        angles = _late(history, delays / timestep, steps, len(action)) + offsets[:, None]
         angles[diverged] = np.nan
         return angles
 
@@ -195,24 +182,17 @@ class ArmSimulation:
         return kp * (action - offsets - angles) - kv * velocities
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """When angles are read that are measured late: between two steps of a frame.
+def _late(history: Array, delays: Array, steps: int, frames: int) -> Array:
+    """Return what is measured at each frame, (W, K, n), which is late.
 
-    Attributes:
-        delay: Whole number of steps that is at least the delay [s].
-        frames: Number of frames by which it is read before the frame that it is of.
-        steps_before, steps_after: Steps of a frame before the one over which it is read, and after.
+    Args:
+        history: (W, 1 + steps * (K - 1), n) angles after each step.
+        delays: (W,) in steps; before a delay is over, what is measured is where it began.
+        steps: Of a frame.
+        frames: K.
     """
-
-    delay: float
-    frames: int
-    steps_before: int
-    steps_after: int
-
-    @classmethod
-    def of(cls, delay: float, timestep: float, steps: int) -> _Reading:
-        """Return when to read for a delay [s] and so many steps a frame."""
-        late = max(1, math.ceil(delay / timestep - 1e-9))
-        before = -late % steps
-        return cls(late * timestep, (late + before) // steps, before, steps - before - 1)
+    moments = np.maximum(steps * np.arange(frames) - delays[:, None], 0.0)
+    before = np.minimum(moments.astype(int), history.shape[1] - 2)
+    part = (moments - before)[:, :, None]
+    worlds = np.arange(len(history))[:, None]
+    return (1.0 - part) * history[worlds, before] + part * history[worlds, before + 1]
