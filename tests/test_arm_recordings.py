@@ -15,10 +15,13 @@ import statemachine as sm
 from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.lab.recordings.arm_recording import ArmRecordings
 from statemachine.lab.recordings.arm_source import read_arm_recordings
+from statemachine.lab.recordings.lerobot_files import MOST_ROWS, read_columns
 
 from .support.arm_data_sets import (
     COUNT,
+    COUNTS,
     JOINTS,
+    calibration_file,
     data_set,
     frames_of,
     moved_counts,
@@ -93,9 +96,9 @@ def test_the_next_episode_is_held_out_and_after_the_last_the_first(
     version: Any, arm: sm.Model, tmp_path: Path
 ) -> None:
     source = written(tmp_path, data_set(DEGREES, episodes=3), version)
-    first, last = recordings(source, arm), recordings(f"{source}#2", arm)
-    assert (first.fitted.episode, first.held_out.episode) == (0, 1)
-    assert (last.fitted.episode, last.held_out.episode) == (2, 0)
+    for number, following in ((0, 1), (1, 2), (2, 0)):
+        found = recordings(f"{source}#{number}", arm)
+        assert (found.fitted.episode, found.held_out.episode) == (number, following)
 
 
 def test_of_one_episode_nothing_is_held_out(arm: sm.Model, tmp_path: Path) -> None:
@@ -117,10 +120,35 @@ def test_an_episode_that_is_too_short_is_not_held_out(arm: sm.Model, tmp_path: P
     assert recordings(written(tmp_path, made), arm).held_out.episode == 2
 
 
+def test_an_episode_that_was_not_downloaded_is_not_held_out(arm: sm.Model, tmp_path: Path) -> None:
+    source = written(tmp_path, data_set(DEGREES, episodes=3), "v2.1")
+    (tmp_path / V2_DATA).unlink()
+    found = recordings(source, arm)
+    assert (found.fitted.episode, found.held_out.episode) == (0, 2)
+
+
+def test_lists_of_any_length_are_read_as_those_of_a_fixed_length(
+    arm: sm.Model, tmp_path: Path
+) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    source = written(tmp_path, data_set(DEGREES))
+    expected = recordings(source, arm).fitted.state
+    table = parquet.read_table(tmp_path / V3_DATA)
+    for name in ("action", "observation.state"):
+        lists = table[name].cast(pa.list_(pa.float32()))
+        table = table.set_column(table.column_names.index(name), name, lists)
+    parquet.write_table(table, tmp_path / V3_DATA)
+    np.testing.assert_array_equal(recordings(source, arm).fitted.state, expected)
+
+
 def test_old_names_of_columns_are_those_of_the_joints(arm: sm.Model, tmp_path: Path) -> None:
     old = tuple(f"main_{joint}" for joint in JOINTS)
     source = written(tmp_path, replace(data_set(DEGREES), columns=old), "v2.1")
-    assert recordings(source, arm).fitted.joints == JOINTS
+    fitted = recordings(source, arm).fitted
+    assert fitted.joints == JOINTS
+    assert fitted.units[2].zero == -np.pi / 2
 
 
 def test_names_under_motors_are_read(arm: sm.Model, tmp_path: Path) -> None:
@@ -144,6 +172,28 @@ def test_commands_are_truncated_to_counts_as_they_were_sent(arm: sm.Model, tmp_p
     source = written(tmp_path, replace(made, episodes=[told, made.episodes[1]]))
     fitted = recordings(source, arm).fitted
     np.testing.assert_allclose(fitted.action[:, :5], fitted.state[:, :5], atol=1e-6)
+
+
+def test_commands_that_drive_mode_inverts_are_truncated_the_other_way(
+    arm: sm.Model, tmp_path: Path
+) -> None:
+    each = tuple(replace(servo, drive_mode=1) for servo in servos("-100 to 100"))
+    counts = moved_counts(each)
+    between = frames_of(each, counts + 0.5).state
+    told = replace(frames_of(each, counts), action=between)
+    source = written(tmp_path / "data", replace(data_set(each), episodes=[told]))
+    file = calibration_file(tmp_path, each)
+    fitted = read_arm_recordings(source, arm, file, {}).fitted
+    np.testing.assert_allclose(fitted.action, fitted.state, atol=1e-6)
+
+
+def test_commands_beyond_the_range_are_sent_as_its_end(arm: sm.Model, tmp_path: Path) -> None:
+    each = servos("-100 to 100")
+    made = data_set(each, episodes=1)
+    told = replace(made.episodes[0], action=np.full((120, 6), 130.0))
+    fitted = recordings(written(tmp_path, replace(made, episodes=[told])), arm).fitted
+    upper = [0.5 * number * COUNT for number in COUNTS[:5]]
+    np.testing.assert_allclose(fitted.action[:, :5], np.tile(upper, (120, 1)), atol=1.01 * COUNT)
 
 
 def test_a_command_on_a_count_stays_there(arm: sm.Model, tmp_path: Path) -> None:
@@ -247,6 +297,10 @@ V3_FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "fewer frames than stated": (
         lambda d: set_columns(d / V3_DATA, episode_index=[0] * 100 + [1] * 140),
         "has 100 frames of it, and meta/ states 120",
+    ),
+    "a frame without a number": (
+        lambda d: set_columns(d / V3_DATA, timestamp=[None, *np.arange(239) / 30.0]),
+        "has rows without a number",
     ),
     "no column": (
         lambda d: _without_column(d / V3_DATA, "timestamp"),
@@ -386,6 +440,16 @@ def test_a_joint_that_is_no_hinge_is_refused(tmp_path: Path) -> None:
     source = written(tmp_path, data_set(DEGREES))
     with pytest.raises(BadInputError, match="is not a hinge"):
         recordings(source, box, shoulder_pan=free)
+
+
+def test_more_rows_than_an_arm_ever_records_are_refused(tmp_path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path = tmp_path / "long.parquet"
+    parquet.write_table(pa.table({"frame_index": np.zeros(MOST_ROWS + 1, dtype=np.int8)}), path)
+    with pytest.raises(BadInputError, match="10,000,001 rows; at most 10,000,000"):
+        read_columns(path, ("frame_index",))
 
 
 def test_without_pyarrow_the_extra_is_named(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,22 @@ import pytest
 from numpy.typing import NDArray
 
 from statemachine.errors import BadInputError
-from statemachine.lab.recordings.calibration import MotorCalibration, read_calibration
+from statemachine.lab.recordings.calibration import read_calibration
 from statemachine.lab.recordings.count_grid import grid_of
 from statemachine.lab.recordings.joint_units import JointUnit
 from statemachine.lab.recordings.unit_inference import MeasuredJoint, infer_units, measured_joint
 
-from .support.arm_data_sets import COUNT, COUNTS, JOINTS, Servo, frames_of, moved_counts, servos
+from .support.arm_data_sets import (
+    COUNT,
+    COUNTS,
+    JOINTS,
+    Servo,
+    calibration_file,
+    calibration_of,
+    frames_of,
+    moved_counts,
+    servos,
+)
 
 RANGES = ((-1.9, 1.9), (-1.7, 1.7), (-1.6, 1.6), (-1.6, 1.6), (-2.7, 2.7), (-0.17, 1.75))
 DEGREE = 360 / 4095  # a count
@@ -43,14 +53,6 @@ def measured(each: tuple[Servo, ...], still: tuple[str, ...] = (), **moved: Any)
 def units_of(each: tuple[Servo, ...], still: tuple[str, ...] = (), **moved: Any) -> Any:
     """Return the units of joints by name, without a calibration."""
     return {unit.joint: unit for unit in infer_units(measured(each, still, **moved))}
-
-
-def calibration_of(each: tuple[Servo, ...]) -> dict[str, MotorCalibration]:
-    """Return what LeRobot would keep of servos."""
-    return {
-        name: MotorCalibration(number + 1, servo.drive_mode, 0, servo.range_min, servo.range_max)
-        for number, (name, servo) in enumerate(zip(JOINTS, each, strict=True))
-    }
 
 
 def angles(unit: JointUnit, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -175,7 +177,36 @@ def test_radians_are_refused() -> None:
 
 def test_raw_counts_are_refused() -> None:
     with pytest.raises(BadInputError, match="neither LeRobot's degrees nor its -100 to 100"):
-        infer_units(joints_of(moved_counts(servos("degrees")).astype(float)))
+        infer_units(joints_of(moved_counts(servos("degrees"))))
+
+
+def test_fewer_counts_than_a_servo_has_in_a_joint_are_refused() -> None:
+    each = servos("-100 to 100", (250,) * 5 + (1250,))
+    with pytest.raises(BadInputError, match="measured values of shoulder_pan"):
+        units_of(each, travel=80)
+
+
+@pytest.mark.parametrize(("column", "shift"), [(5, -60.0), (0, 100.0), (0, -100.0)])
+def test_values_beyond_the_range_are_no_parts_of_it(column: int, shift: float) -> None:
+    each = servos("-100 to 100")
+    state = frames_of(each, moved_counts(each)).state
+    state[:, column] += shift
+    with pytest.raises(BadInputError, match=f"measured values of {JOINTS[column]}"):
+        infer_units(joints_of(state))
+
+
+def test_values_that_are_near_counts_and_not_on_them_are_refused() -> None:
+    state = frames_of(servos("degrees"), moved_counts(servos("degrees"))).state
+    state += np.random.default_rng(0).normal(0.0, 0.04 * DEGREE, state.shape)
+    with pytest.raises(BadInputError, match="no whole counts of a servo"):
+        infer_units(joints_of(state))
+
+
+def test_a_value_beyond_all_turns_is_refused() -> None:
+    state = frames_of(servos("degrees"), moved_counts(servos("degrees"))).state
+    state[7, 2] = 1e30
+    with pytest.raises(BadInputError, match="measured values of elbow_flex"):
+        infer_units(joints_of(state))
 
 
 def test_a_few_odd_values_do_not_matter() -> None:
@@ -232,15 +263,11 @@ def test_a_motor_that_the_calibration_lacks_is_named() -> None:
 
 
 def _file(folder: Path, **changed: object) -> Path:
-    motors: dict[str, Any] = {
-        name: asdict(motor) for name, motor in calibration_of(servos("degrees")).items()
-    }
-    for field, value in changed.items():
-        if value is None:
-            del motors["elbow_flex"][field]
-        else:
-            motors["elbow_flex"][field] = value
-    path = folder / "arm.json"
+    """Write a calibration of which the elbow's motor is changed; None takes a field away."""
+    path = calibration_file(folder, servos("degrees"))
+    motors: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    elbow = {**motors["elbow_flex"], **changed}
+    motors["elbow_flex"] = {name: value for name, value in elbow.items() if value is not None}
     path.write_text(json.dumps(motors), "utf-8")
     return path
 
@@ -305,6 +332,6 @@ def test_fewer_than_eight_values_tell_no_grid() -> None:
 
 def test_values_between_two_places_are_truncated_to_the_lower_or_the_upper() -> None:
     grid = grid_of(np.arange(20.0), 0.05)
-    values = np.array([2.5, 2.999, 3.001, -0.5])
+    values = np.array([2.5, 2.9999, 3.0001, -0.5])
     np.testing.assert_allclose(grid.floor(values), [2, 3, 3, -1], atol=1e-9)
     np.testing.assert_allclose(grid.ceil(values), [3, 3, 3, 0], atol=1e-9)

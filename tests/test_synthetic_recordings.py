@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import statemachine as sm
 from statemachine.lab.recordings.arm_source import read_arm_recordings
+from tools.arm_recordings.__main__ import main
 from tools.arm_recordings.arm_truth import Fault, drawn_truth
 from tools.arm_recordings.plans import SHIPPED, SHIPPED_FOLDER, thirty
 from tools.arm_recordings.recordings import NOISE, Plan, SyntheticRecording, make, write
@@ -40,6 +41,13 @@ def state_of(recording: SyntheticRecording) -> NDArray[np.float64]:
     return recording.calibration.angles(recording.episodes[0].state)
 
 
+def is_nearly(found: NDArray[np.float64], expected: NDArray[np.float64]) -> None:
+    """Assert that angles are the same, but for two that lie between two counts by rounding."""
+    apart = np.abs(found - expected) / COUNT
+    assert apart.max() < 1.01
+    assert np.count_nonzero(apart > 0.01) <= 2
+
+
 # What comes with the package.
 
 
@@ -55,7 +63,7 @@ def test_the_shipped_recording_is_what_its_command_makes(arm: sm.Model) -> None:
     made = make(SHIPPED)
     for number, frames in enumerate(made.episodes):
         found = read_arm_recordings(f"lerobot:synthetic#{number}", arm, None, {}).fitted
-        np.testing.assert_allclose(found.action, made.calibration.angles(frames.action), atol=2e-6)
+        np.testing.assert_allclose(found.action, made.calibration.sent(frames.action), atol=2e-6)
         apart = np.abs(found.state - made.calibration.angles(frames.state)) / COUNT
         assert apart.max() < 1.01
         assert np.count_nonzero(apart > 0.01) <= 2
@@ -86,8 +94,8 @@ def test_what_is_written_is_read_as_it_was_simulated(
     for calibration in (None, tmp_path / "calibration.json"):
         found = read_arm_recordings(f"lerobot:{tmp_path}", arm, calibration, {}).fitted
         assert np.abs(found.state - made.unrounded[0]).max() < 0.501 * COUNT
-        expected = made.calibration.angles(made.episodes[0].action)
-        np.testing.assert_allclose(found.action, expected, atol=2e-6)
+        expected = made.calibration.sent(made.episodes[0].action)
+        is_nearly(found.action, expected)
 
 
 def test_the_same_seed_gives_the_same_numbers(without_fault: SyntheticRecording) -> None:
@@ -99,7 +107,7 @@ def test_another_seed_gives_another_arm(without_fault: SyntheticRecording) -> No
 
 
 def test_noise_and_counts_are_all_that_is_added(without_fault: SyntheticRecording) -> None:
-    action = without_fault.calibration.angles(without_fault.episodes[0].action)
+    action = without_fault.calibration.sent(without_fault.episodes[0].action)
     clean = measured_angles(arm_model("mujoco"), without_fault.truth, action)
     rms = np.sqrt(np.mean((state_of(without_fault) - clean) ** 2))
     assert rms == pytest.approx(np.hypot(NOISE, COUNT / np.sqrt(12)), rel=0.1)
@@ -134,6 +142,18 @@ def test_the_payload_is_on_the_body_gripper(arm: sm.Model) -> None:
     added = np.array(truth.applied_to(arm).body_mass) - np.array(arm.body_mass)
     assert added[arm.body_id("gripper")] == pytest.approx(truth.payload)
     assert np.count_nonzero(np.abs(added) > 1e-12) == 1
+
+
+def test_the_command_writes_what_its_words_say(
+    arm: sm.Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = f"x {tmp_path} --motion hand --seconds 2 --episodes 3 --seed 9 --zero elbow_flex 5"
+    monkeypatch.setattr("sys.argv", words.split())
+    main()
+    found = read_arm_recordings(f"lerobot:{tmp_path}#2", arm, None, {})
+    assert found.fitted.state.shape == (60, 6)
+    told = json.loads((tmp_path / "truth.json").read_text("utf-8"))
+    assert told["plan"]["fault"]["zero"] == [["elbow_flex", pytest.approx(np.radians(5))]]
 
 
 # Faults.

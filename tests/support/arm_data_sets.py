@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import json
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from statemachine.lab.recordings.calibration import MotorCalibration
 from tools.arm_recordings.data_set import Frames, Version, WrittenDataSet, write_data_set
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -29,7 +31,7 @@ class Servo:
     def middle(self) -> float:
         return 0.5 * (self.range_min + self.range_max)
 
-    def values(self, counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    def values(self, counts: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what LeRobot writes, in its own order of operations."""
         if self.unit == "degrees":
             return (counts - self.middle) * 360 / 4095
@@ -52,19 +54,19 @@ def servos(unit: str, counts: tuple[int, ...] = COUNTS) -> tuple[Servo, ...]:
 
 def moved_counts(
     each: tuple[Servo, ...], frames: int = 120, seed: int = 0, travel: int = 300
-) -> NDArray[np.int64]:
+) -> NDArray[np.float64]:
     """Return counts of each servo, (frames, n): waves about a place off the middle."""
     rng = np.random.default_rng(seed)
     time = np.arange(frames) / 30.0
-    columns: list[NDArray[np.int64]] = []
+    columns: list[NDArray[np.float64]] = []
     for servo in each:
         phase = rng.uniform(0, 2 * np.pi)
         wave = np.sin(2 * np.pi * (0.3 + 0.1 * rng.uniform()) * time + phase)
-        columns.append(np.round(servo.middle + 57 + 0.5 * travel * wave).astype(np.int64))
+        columns.append(np.round(servo.middle + 57 + 0.5 * travel * wave))
     return np.stack(columns, axis=1)
 
 
-def frames_of(each: tuple[Servo, ...], counts: NDArray[np.int64]) -> Frames:
+def frames_of(each: tuple[Servo, ...], counts: NDArray[np.float64]) -> Frames:
     """Return the frames that LeRobot writes of counts; commands are between two counts."""
     columns = [servo.values(counts[:, k]) for k, servo in enumerate(each)]
     state = np.stack(columns, axis=1)
@@ -92,3 +94,19 @@ def with_state(
     episodes = list(made.episodes)
     episodes[episode] = replace(episodes[episode], state=state)
     return replace(made, episodes=episodes)
+
+
+def calibration_of(each: tuple[Servo, ...]) -> dict[str, MotorCalibration]:
+    """Return what LeRobot would keep of servos."""
+    return {
+        name: MotorCalibration(number + 1, servo.drive_mode, 0, servo.range_min, servo.range_max)
+        for number, (name, servo) in enumerate(zip(JOINTS, each, strict=True))
+    }
+
+
+def calibration_file(folder: Path, each: tuple[Servo, ...]) -> Path:
+    """Write what LeRobot would keep of servos; return the file."""
+    motors = {name: asdict(motor) for name, motor in calibration_of(each).items()}
+    path = folder / "arm.json"
+    path.write_text(json.dumps(motors), "utf-8")
+    return path

@@ -69,22 +69,27 @@ class SyntheticRecording:
 def make(plan: Plan) -> SyntheticRecording:
     """Simulate a recording. The same plan gives the same numbers on any machine, but for rounding.
 
+    Chirps are told by a script, hand-like motion by a leader, an arm with counts of its own. Either
+    is truncated to the counts of the follower when it is sent, as LeRobot does, and is written as
+    it was told.
+
     A value that lies within the rounding error of the simulation (1e-9 rad) of the middle between
     two counts may come out as the other one.
     """
     model = arm_model(plan.backend)
-    of_arm, of_calibration, of_motion, of_noise = np.random.default_rng(plan.seed).spawn(4)
+    of_arm, of_servos, of_motion, of_noise = np.random.default_rng(plan.seed).spawn(4)
     truth = drawn_truth(model, plan.servos, of_arm, plan.fault)
-    calibration = calibrated_arm(model, plan.unit, of_calibration)
+    calibration = calibrated_arm(model, plan.unit, of_servos)
+    leader = calibrated_arm(model, plan.unit, of_servos)
     times = np.arange(round(plan.seconds * FPS)) / FPS
     episodes: list[Frames] = []
     unrounded: list[Array] = []
     for _ in range(plan.episodes):
         told = truth.recorded(commands(plan.motion, times, of_motion))
-        action = calibration.values(told)
-        angles = measured_angles(model, truth, calibration.angles(action))
+        action = calibration.told(told) if plan.motion == "chirps" else leader.measured(told)
+        angles = measured_angles(model, truth, calibration.sent(action))
         noisy = angles + of_noise.normal(0.0, NOISE, angles.shape)
-        episodes.append(Frames(action=action, state=calibration.values(noisy)))
+        episodes.append(Frames(action=action, state=calibration.measured(noisy)))
         unrounded.append(noisy)
     return SyntheticRecording(plan, truth, calibration, tuple(episodes), tuple(unrounded))
 

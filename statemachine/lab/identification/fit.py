@@ -2,8 +2,8 @@
 
 The sum of squares is that of the residuals by their standard deviation, and of the distance from
 the prior by its own (maximum a posteriori, A. Tarantola, Inverse Problem Theory, 2005). It is
-minimised by SciPy's trust region (T. Coleman and Y. Li, 1996); each Jacobian is one run of as many
-worlds as there are parameters.
+minimised by SciPy's trust region (T. Coleman and Y. Li, 1996); each Jacobian is one run of as
+many worlds as there are parameters.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from .parameters import ArmParameters
 from .simulation import ArmSimulation
 
 EXTRA = "recordings"
-_COARSE_RUNS = 12  # simulations of all worlds of a start, before angles without the step's error
-_FINE_RUNS = 12
-_COARSE_TOLERANCE = 2e-2  # of the sum of squares, where a fit goes on without the step's error
-_TOLERANCE = 1e-5
-_NEAR = 0.05  # of the prior's standard deviations: the Jacobian is taken to be the same there
+_RUNS = 40  # simulations of a fit, at most
+_TOLERANCE = 1e-4  # of the sum of squares, where a fit ends
+_LEAST_STEP = 1e-5  # by the length of the vector
+_NEAR = 0.1  # of the prior's standard deviations: the Jacobian is taken to be the same there
 _SPREAD = 0.7  # of draws, by the standard deviations of the prior
 _DRAWS_FOR_EACH = 12  # draws for each start, of which the best are taken
 _STIFFNESS = (-5.5, 0.5)  # logarithm of the factor of all gains, drawn from between
@@ -78,8 +77,8 @@ class Objective:
         scaled = np.where(np.isfinite(scaled), scaled, _PULLED)
         return np.concatenate([scaled.ravel(), values / self.prior_deviations])
 
-    def coarse(self, values: Array) -> tuple[Array, Array]:
-        """Return residuals and their Jacobian, with coarse steps."""
+    def jacobian(self, values: Array) -> Array:
+        """Return the Jacobian of the residuals, by one run of worlds."""
         steps = self.parameters.steps[self.free]
         vectors = np.tile(self.vector(values), (len(self.free) + 1, 1))
         vectors[np.arange(1, len(vectors)), self.free] += steps
@@ -88,45 +87,37 @@ class Objective:
         change = (angles[1:, first:] - angles[0, first:]) / self.deviation
         of_data = (change / steps[:, None, None]).reshape(len(self.free), -1).T
         of_data = np.where(np.isfinite(of_data), of_data, 0.0)
-        of_prior = np.diag(1.0 / self.prior_deviations)
-        return self.residuals(values, angles[0]), np.vstack([of_data, of_prior])
+        return np.vstack([of_data, np.diag(1.0 / self.prior_deviations)])
 
 
 class _Memory:
-    """Residuals and Jacobian of the last point, which SciPy asks for one after the other."""
+    """Residuals and Jacobians that SciPy asks for, and how often worlds were run for them."""
 
-    def __init__(self, objective: Objective, fine: bool) -> None:
+    def __init__(self, objective: Objective) -> None:
         """Remember nothing yet.
 
         Args:
             objective: What is made small.
-            fine: Whether residuals are those without the error of a step.
         """
-        self.objective, self.fine = objective, fine
+        self.objective = objective
         self.evaluations = 0
-        self._values: Array | None = None
-        self._known: tuple[Array, Array] | None = None
+        self._known: tuple[Array, Array] | None = None  # values, and the Jacobian there
 
     def residuals(self, values: Array) -> Array:
-        if self.fine:
-            self.evaluations += 1
-            vector = self.objective.vector(values)
-            return self.objective.residuals(values, self.objective.simulation.angles(vector))
-        return self._of(values)[0]
+        """Return the residuals, without the error of a step."""
+        self.evaluations += 1
+        angles = self.objective.simulation.angles(self.objective.vector(values))
+        return self.objective.residuals(values, angles)
 
     def jacobian(self, values: Array) -> Array:
-        if self.fine and self._known is not None and self._values is not None:
-            moved = np.abs(values - self._values) / self.objective.prior_deviations
+        """Return the Jacobian, that of the last point where it is near."""
+        if self._known is not None:
+            moved = np.abs(values - self._known[0]) / self.objective.prior_deviations
             if moved.max() < _NEAR:
                 return self._known[1]
-        return self._of(values)[1]
-
-    def _of(self, values: Array) -> tuple[Array, Array]:
-        known = self._values
-        if self._known is None or known is None or not np.array_equal(values, known):
-            self.evaluations += 1
-            self._values, self._known = values.copy(), self.objective.coarse(values)
-        return self._known
+        self.evaluations += 1
+        self._known = values.copy(), self.objective.jacobian(values)
+        return self._known[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,60 +161,45 @@ class Fit:
         )
 
 
-def fit(objective: Objective, start: Array, fine: bool = True, runs: int = _COARSE_RUNS) -> Fit:
+def fit(
+    objective: Objective, start: Array, runs: int = _RUNS, tolerance: float = _TOLERANCE
+) -> Fit:
     """Fit the free parameters from a start.
 
     Args:
         objective: What is made small.
         start: (P,) vector.
-        fine: Whether it ends with angles that have no error of a step.
-        runs: Simulations of all worlds with coarse steps, at most.
+        runs: Simulations at most, without those for derivatives.
+        tolerance: Part by which the sum of squares falls at least, or the fit ends.
 
     Raises:
         MissingEngineError: The extra `recordings` is not installed.
     """
-    values = start[objective.free]
-    coarse = _Memory(objective, fine=False)
-    values, jacobian = _minimised(coarse, values, runs, _COARSE_TOLERANCE)
-    evaluations = coarse.evaluations
-    if fine:
-        memory = _Memory(objective, fine=True)
-        values, jacobian = _minimised(memory, values, _FINE_RUNS, _TOLERANCE)
-        evaluations += memory.evaluations
-    vector = objective.vector(values)
-    angles = (
-        objective.simulation.angles(vector)
-        if fine
-        else objective.simulation.angles_of_each(vector[None])[0]
-    )
-    residuals = objective.residuals(values, angles)
-    return Fit(
-        objective=objective,
-        vector=vector,
-        cost=0.5 * float(residuals @ residuals),
-        jacobian=jacobian,
-        errors=objective.errors(angles),
-        evaluations=evaluations,
-    )
-
-
-def _minimised(memory: _Memory, values: Array, runs: int, tolerance: float) -> tuple[Array, Array]:
-    """Return the values at the end of a fit, and the Jacobian there."""
     optimize: Any = require_extra("scipy.optimize", "a fit to a recording", "SciPy", EXTRA)
-    parameters, free = memory.objective.parameters, memory.objective.free
+    parameters, free = objective.parameters, objective.free
     low, high = parameters.low[free], parameters.high[free]
     margin = 1e-6 * (high - low)
+    memory = _Memory(objective)
     result = optimize.least_squares(
         memory.residuals,
-        np.clip(values, low + margin, high - margin),
+        np.clip(start[free], low + margin, high - margin),
         jac=memory.jacobian,
         bounds=(low, high),
-        x_scale=parameters.deviations[free],
+        x_scale=objective.prior_deviations,
         max_nfev=runs,
-        xtol=_TOLERANCE,
+        xtol=_LEAST_STEP,
         ftol=tolerance,
     )
-    return np.asarray(result.x), np.asarray(result.jac)
+    rows = len(result.fun) - len(free)
+    scaled = np.asarray(result.fun[:rows]).reshape(-1, len(objective.deviation))
+    return Fit(
+        objective=objective,
+        vector=objective.vector(np.asarray(result.x)),
+        cost=float(result.cost),
+        jacobian=np.asarray(result.jac),
+        errors=scaled * objective.deviation,
+        evaluations=memory.evaluations,
+    )
 
 
 def starting_points(objective: Objective, starts: int, seed: int) -> list[Array]:

@@ -13,7 +13,7 @@ from .results import Hypothesis
 from .simulation import ArmSimulation
 from .starts import Fits
 
-_RUNS = 10  # simulations of all worlds of each fit
+_RUNS = 12  # simulations of each fit
 _EVIDENCE = 5.0  # half the sum of squares: odds of 150 to 1
 _SATURATED = 0.01  # part of the frames at the force limit, below which it does not matter
 
@@ -50,7 +50,7 @@ def tried_hypotheses(
             readings.append((f"the other sign of {joint}", replace(simulation, signs=signs)))
     if not readings:
         return ()
-    as_it_is = fit(objective, best.vector, fine=False, runs=_RUNS)
+    as_it_is = fit(objective, best.vector, runs=_RUNS)
     tried: list[Hypothesis] = []
     for number, (name, other) in enumerate(readings):
         tried.append(_tried(name, replace(objective, simulation=other), fits, as_it_is.cost))
@@ -60,7 +60,7 @@ def tried_hypotheses(
 
 def _tried(name: str, objective: Objective, fits: Fits, cost: float) -> Hypothesis:
     """Return how well another reading fits, from the best fit and from the model as it is."""
-    ends = [fit(objective, each.vector, fine=False, runs=_RUNS) for each in fits.each[:2]]
+    ends = [fit(objective, each.vector, runs=_RUNS) for each in fits.each[:2]]
     end = min(ends, key=lambda each: each.cost)
     evidence = cost - end.cost
     residual = float(np.sqrt(np.square(end.errors).mean()))

@@ -48,7 +48,7 @@ def motion_informations(fit: Fit) -> tuple[MotionInformation, ...]:
             free=objective.free,
             fixed=objective.fixed,
         )
-        jacobian = other.coarse(fit.vector[objective.free])[1][: -len(objective.free)]
+        jacobian = other.jacobian(fit.vector[objective.free])[: -len(objective.free)]
         informations.append(MotionInformation(name, jacobian.T @ jacobian))
     return tuple(informations)
 

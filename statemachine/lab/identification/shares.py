@@ -20,7 +20,7 @@ from .results import CAUSES, Cause, CauseShare
 from .simulation import ArmSimulation
 from .starts import Fits
 
-_RUNS = 6  # simulations of all worlds of a fit, which begins at the best fit of all
+_TOLERANCE = 1e-2  # of a fit, which begins at the best one of all parameters
 
 
 def cause_shares(
@@ -66,7 +66,7 @@ def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str])
         return gap_of(elsewhere, nothing)
     free = best.objective.parameters.of_causes(chosen)
     objective = replace(best.objective, free=free, fixed=nothing)
-    fitted = fit(objective, best.vector, fine=False, runs=_RUNS)
+    fitted = fit(objective, best.vector, tolerance=_TOLERANCE)
     gap = gap_of(elsewhere, fitted.vector)
     return gap if math.isfinite(gap) else None
 

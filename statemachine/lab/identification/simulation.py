@@ -23,8 +23,7 @@ from ..recordings.arm_recording import ArmRecording
 from .parameters import ArmParameters
 
 COUNTS = 4096  # of a turn of the servos (Feetech STS3215)
-_COARSE = 240.0  # steps a second, of derivatives
-_FINE = 480.0  # of angles, and twice as many
+_STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
 _UNTOLD = 0.5  # time after a start in motion that the unknown commands before it act on [s]
@@ -106,13 +105,15 @@ class ArmSimulation:
 
         NaN where the simulation diverges.
         """
-        steps = self._steps(_FINE)
-        once = self._played(vector[None], steps)[0]
-        return 2.0 * self._played(vector[None], 2 * steps)[0] - once
+        once = self._played(vector[None], self._steps)[0]
+        return 2.0 * self._played(vector[None], 2 * self._steps)[0] - once
 
     def angles_of_each(self, vectors: Array) -> Array:
-        """Return the angles (W, K, n) for each of several vectors (W, P), with coarse steps."""
-        return self._played(vectors, self._steps(_COARSE))
+        """Return the angles (W, K, n) for each of several vectors (W, P).
+
+        They have the error of a step, which hardly matters for differences.
+        """
+        return self._played(vectors, self._steps)
 
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
@@ -120,9 +121,10 @@ class ArmSimulation:
         forces = np.abs(self._forces(vector))
         return np.mean(forces >= 0.999 * limits[:, 1], axis=0)
 
-    def _steps(self, rate: float) -> int:
-        """Return the number of steps of a frame, for about so many a second."""
-        return max(1, round(rate / self.recording.fps))
+    @property
+    def _steps(self) -> int:
+        """Return the number of steps of a frame."""
+        return max(1, round(_STEPS / self.recording.fps))
 
     def _played(self, vectors: Array, steps: int) -> Array:
         """Return the angles (W, K, n) with so many steps a frame.

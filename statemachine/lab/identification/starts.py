@@ -79,7 +79,7 @@ def fits_from_starts(
     residuals = Residuals.of(best.errors, recording)
     weighted = replace(objective, deviation=np.minimum(residuals.noise, residuals.most))
     # With the noise of each joint known, the best one goes on; the others are weighed alike.
-    best = fit(weighted, best.vector, runs=1)
+    best = fit(weighted, best.vector)
     residuals = Residuals.of(best.errors, recording)
     others = [each.weighed(weighted) for each in fits]
     progress(1.0)

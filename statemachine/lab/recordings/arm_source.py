@@ -158,7 +158,7 @@ def _measured_joints(
     data_set: LerobotDataSet, number: int, model: Model, joints: tuple[str, ...]
 ) -> list[MeasuredJoint]:
     """Return the values of each joint over the episode and the others of its data set."""
-    others = [each for each in data_set.episodes if each != number]
+    others = [each for each in data_set.downloaded if each != number]
     episodes = (number, *others[: _MOST_EPISODES - 1])
     values = data_set.measured(episodes)
     measured: list[MeasuredJoint] = []
@@ -196,7 +196,7 @@ def _moves(recording: ArmRecording) -> bool:
 
 def _held_out(source: str, arm: _Arm, number: int) -> ArmRecording | None:
     """Return the next episode in which the arm moves; after the last comes the first."""
-    episodes = arm.data_set.episodes
+    episodes = arm.data_set.downloaded
     here = episodes.index(number)
     for other in (*episodes[here + 1 :], *episodes[:here]):
         if arm.data_set.place(other).length < FEWEST_FRAMES:

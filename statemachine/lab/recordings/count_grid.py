@@ -15,13 +15,14 @@ import numpy as np
 from ...interface import Array
 
 FEWEST_LEVELS = 8  # different values from which a quantum is told
-_ROUNDED = 0.01  # of a quantum: what float32 may have rounded
+_ROUNDED = 0.002  # of a quantum: what float32 may have rounded
 _MISFIT = 0.02  # of a quantum: float32 rounds to 0.0001 of one
 _WITHIN = 0.95  # of the values are that near to the grid
 _COHERENT = 0.9  # length of the mean above which a quantum is looked at
 _STEPS_PER_TURN = 10  # between two quanta that are tried, over the span of the values
+_WIDEST = 1000.0  # units that no joint turns: 2.7 turns in degrees
+_AT_ONCE = 2048  # quanta that are tried together, for their memory
 _MOST_LEVELS = 60  # that all quanta are compared with
-_REFINEMENTS = 4
 
 
 @dataclass(frozen=True)
@@ -58,16 +59,18 @@ def grid_of(levels: Array, finest: float) -> CountGrid | None:
     if len(levels) < FEWEST_LEVELS:
         return None
     span = float(levels[-1] - levels[0])
-    # Per unit: the widest grid has all values within a few places of it.
-    frequencies = np.arange(2.0 / span, 1.0 / finest, 1.0 / (_STEPS_PER_TURN * span))
+    if span > _WIDEST:
+        return None
     few = _some_of(levels) - levels[0]
-    turns = np.multiply.outer(frequencies, few)
-    coherence = np.abs(np.exp(2j * np.pi * turns).mean(axis=1))
-    tried = np.flatnonzero(coherence >= _COHERENT)
-    for index in tried:
-        grid = _refined(levels, 1.0 / float(frequencies[index]))
-        if grid is not None:
-            return grid
+    # Per unit: on the widest grid all values are within a few places.
+    frequencies = np.arange(2.0 / span, 1.0 / finest, 1.0 / (_STEPS_PER_TURN * span))
+    for first in range(0, len(frequencies), _AT_ONCE):
+        block = frequencies[first : first + _AT_ONCE]
+        coherence = np.abs(np.exp(2j * np.pi * np.multiply.outer(block, few)).mean(axis=1))
+        for frequency in block[coherence >= _COHERENT]:
+            grid = _refined(levels, 1.0 / float(frequency))
+            if grid is not None:
+                return grid
     return None
 
 
@@ -75,14 +78,11 @@ def _refined(levels: Array, quantum: float) -> CountGrid | None:
     """Return the grid near a quantum that the values fit best, if most lie on it."""
     turns = np.exp(2j * np.pi * (levels - levels[0]) / quantum)
     start = float(levels[0] + quantum * np.angle(turns.mean()) / (2.0 * np.pi))
-    for _ in range(_REFINEMENTS):
-        places = np.round((levels - start) / quantum)
-        if np.ptp(places) < 1.0:
-            return None
-        near = np.abs(levels - start - quantum * places) <= 0.25 * quantum
-        quantum, start = (float(each) for each in np.polyfit(places[near], levels[near], 1))
-        if quantum <= 0.0:
-            return None
+    places = np.round((levels - start) / quantum)
+    near = np.abs(levels - start - quantum * places) <= 0.25 * quantum
+    if np.ptp(places[near]) < 1.0:
+        return None
+    quantum, start = (float(each) for each in np.polyfit(places[near], levels[near], 1))
     places = (levels - start) / quantum
     misfit = np.quantile(np.abs(places - np.round(places)), _WITHIN)
     return CountGrid(quantum, start) if misfit <= _MISFIT else None

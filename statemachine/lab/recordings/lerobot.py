@@ -83,6 +83,12 @@ class LerobotDataSet:
         """Return the numbers of the episodes, ascending."""
         return tuple(sorted(self.description.places))
 
+    @property
+    def downloaded(self) -> tuple[int, ...]:
+        """Return the numbers of the episodes whose file is here, ascending."""
+        places = self.description.places
+        return tuple(number for number in self.episodes if places[number].file.is_file())
+
     def place(self, number: int) -> EpisodePlace:
         """Return where an episode lies.
 

@@ -67,7 +67,10 @@ def read_description(folder: Path) -> DataSetDescription:
     if not folder.is_dir():
         kind = kind_of_path(folder)
         if kind == "nothing":
-            raise BadInputError(f"there is no folder {folder}; lerobot: takes the one with meta/")
+            raise BadInputError(
+                f"there is no folder {folder}; lerobot: takes the folder of a data set, and "
+                "lerobot:synthetic is the recording that comes with this package"
+            )
         raise BadInputError(f"{folder} is {kind}; lerobot: takes the folder of a data set")
     path = folder / "meta" / "info.json"
     if not path.is_file():

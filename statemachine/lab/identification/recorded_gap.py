@@ -1,0 +1,130 @@
+"""How far a model is from a recording of a real arm, as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ...backends import load
+from ...errors import DivergedError
+from ...installed import DEFAULT
+from ...interface import Array
+from ..recordings.arm_recording import ArmRecording, ArmRecordings
+from ..recordings.arm_source import read_arm_recordings
+from ..runs.provenance import provenance
+from ..runs.reporter import QUIET, Reporter
+from .parameters import ArmParameters
+from .results import JointGap, RecordingGap, RecordingRequest, RecordingResult
+from .simulation import ArmSimulation
+
+_SECONDS = 20.0  # of an episode, where nobody says how much
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a question is about, read and loaded.
+
+    Attributes:
+        parameters: Of the arm.
+        recordings: Both episodes, no longer than asked for.
+    """
+
+    parameters: ArmParameters
+    recordings: ArmRecordings
+
+
+def asked_of(request: RecordingRequest) -> Asked:
+    """Read the recording and load the model.
+
+    Raises:
+        StateMachineError: One of them cannot be read, or the joints do not fit.
+    """
+    model = load(request.model, backend=DEFAULT, menagerie=request.menagerie)
+    recordings = read_arm_recordings(request.recording, model, request.calibration, request.names)
+    seconds = _SECONDS if request.seconds is None else request.seconds
+    held_out = recordings.held_out
+    cut = ArmRecordings(
+        fitted=shortened(recordings.fitted, seconds),
+        held_out=None if held_out is None else shortened(held_out, seconds),
+    )
+    return Asked(ArmParameters.of(model, recordings.fitted.joints), cut)
+
+
+def shortened(recording: ArmRecording, seconds: float) -> ArmRecording:
+    """Return the first seconds of a recording."""
+    frames = round(seconds * recording.fps)
+    return replace(recording, action=recording.action[:frames], state=recording.state[:frames])
+
+
+def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> RecordingResult:
+    """Play the commands of a recording into the model as it is, and compare the angles.
+
+    Raises:
+        StateMachineError: The recording or the model cannot be read, or they do not fit.
+        DivergedError: The simulation diverges.
+    """
+    asked = asked_of(request)
+    recording = asked.recordings.fitted
+    simulation = ArmSimulation.of(asked.parameters, recording)
+    with reporter.stage(f"playing {request.recording}"):
+        angles = simulation.angles(np.zeros(len(asked.parameters)))
+    if not np.isfinite(angles).all():
+        raise DivergedError("the simulation of the recorded commands diverges")
+    return RecordingResult(
+        request=request,
+        provenance=provenance(asked.parameters.model, request.seed),
+        units=recording.units,
+        fps=recording.fps,
+        gap=gap_between(simulation, angles),
+        recordings=asked.recordings,
+        arm=asked.parameters.model,
+    )
+
+
+def gap_between(
+    simulation: ArmSimulation,
+    angles: Array,
+    fitted: Array | None = None,
+    part: Literal["all", "last third"] = "all",
+    first: int = 0,
+) -> RecordingGap:
+    """Return how far simulated angles are from the measured ones.
+
+    Args:
+        simulation: Of the recording.
+        angles: (K, n) of the model as it is [rad].
+        fitted: (K, n) of the fitted model [rad]; None where nothing was fitted.
+        part: Which part of the recording counts.
+        first: The first frame that counts.
+    """
+    state = simulation.state
+    # The command that the arm had when it was read is the one of the frame before.
+    told = np.vstack([simulation.action[:1], simulation.action[:-1]])
+    rows = slice(max(first, simulation.first_frame), None)
+    of_told, of_model = (told - state)[rows], (angles - state)[rows]
+    of_fitted = None if fitted is None else (fitted - state)[rows]
+    joints: list[JointGap] = []
+    for place, joint in enumerate(simulation.parameters.joints):
+        joints.append(
+            JointGap(
+                joint=joint,
+                commanded=_rms(of_told[:, place]),
+                model=_rms(of_model[:, place]),
+                fitted=None if of_fitted is None else _rms(of_fitted[:, place]),
+            )
+        )
+    return RecordingGap(
+        episode=simulation.recording.episode,
+        part=part,
+        seconds=len(of_told) / simulation.recording.fps,
+        joints=tuple(joints),
+        commanded=_rms(of_told),
+        model=_rms(of_model),
+        fitted=None if of_fitted is None else _rms(of_fitted),
+    )
+
+
+def _rms(errors: Array) -> float:
+    return float(np.sqrt(np.square(errors).mean()))
