@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from ...backends import load
 from ...errors import BadInputError
 from ...installed import DEFAULT
 from ...interface import Array, Model
-from ...lab.identification.fit import Fit, Objective, fit
+from ...lab.identification.fit import Fit, Objective
+from ...lab.identification.fit import fit as fit_objective
 from ...lab.identification.parameters import ArmParameters
 from ...lab.identification.residuals import Residuals
 from ...lab.identification.results import CAUSES, UNITS, Cause, Kind
@@ -173,45 +174,53 @@ def run(play: CodeRun, options: Options, progress: Progress) -> RecordingLessonR
     progress(_SHARE_OF_CODE)
     model = play.model if play.model.backend == DEFAULT else load(play.model.path, backend=DEFAULT)
     recordings = read_arm_recordings(SOURCE, model, None, {})
-    parameters = ArmParameters.of(model, recordings.fitted.joints)
+    recording = recordings.fitted
+    parameters = ArmParameters.of(model, recording.joints)
+    simulation = ArmSimulation.of(parameters, recording)
     other = ArmSimulation.of(parameters, _held_out(recordings))
-    objective = first_objective(
-        Objective(
-            simulation=ArmSimulation.of(parameters, recordings.fitted),
-            deviation=recordings.fitted.resolution,
-            free=np.arange(len(parameters)),
-            fixed=np.zeros(len(parameters)),
-        )
-    )
-    nothing = objective.fixed
+    nothing = np.zeros(len(parameters))
     elsewhere = _gap(other, other.angles(nothing))
-    readings: list[Reading] = []
-    fits: list[Fit] = []
-    done = _SHARE_OF_CODE
-    for causes, share in zip(READINGS, _SHARES, strict=True):
-        start = fits[-1].vector if causes == CAUSES else _start(objective, causes)
-        fits.append(fit(_of_causes(objective, causes), start))
-        readings.append(_reading(causes, fits[-1], other, elsewhere))
-        done += share
-        progress(done)
-    last = fits[-1]
-    residuals = Residuals.of(last.errors, recordings.fitted)
+    fits = _fits(simulation, progress)
+    readings = [_reading(fit, other, elsewhere) for fit in fits]
+    residuals = Residuals.of(fits[-1].errors, recording)
+    frames = np.arange(len(recording.state))
     return RecordingLessonResult(
         joints=parameters.joints,
-        seconds=len(typed) / recordings.fitted.fps,
-        time=np.arange(len(typed)) / recordings.fitted.fps,
-        measured=recordings.fitted.state,
+        seconds=len(frames) / recording.fps,
+        time=frames / recording.fps,
+        measured=recording.state,
         typed=typed,
-        commanded=_commanded(recordings.fitted),
-        here=_gap(objective.simulation, objective.simulation.angles(nothing)),
+        commanded=_commanded(recording),
+        here=_gap(simulation, simulation.angles(nothing)),
         elsewhere=elsewhere,
         readings=tuple(readings),
         shares=_shares(readings, elsewhere),
         floor=residuals.floor,
         at_floor=residuals.at_floor,
-        figures=_figures(last, residuals),
+        figures=_figures(fits[-1], residuals),
         provenance=provenance(play.model),
     )
+
+
+def _fits(simulation: ArmSimulation, progress: Progress) -> list[Fit]:
+    """Return a fit for each of `READINGS`; that of everything starts where the others end."""
+    parameters = simulation.parameters
+    fits: list[Fit] = []
+    done = _SHARE_OF_CODE
+    for causes, share in zip(READINGS, _SHARES, strict=True):
+        objective = first_objective(
+            Objective(
+                simulation=simulation,
+                deviation=simulation.recording.resolution,
+                free=parameters.of_causes(causes),
+                fixed=np.zeros(len(parameters)),
+            )
+        )
+        start = fits[-1].vector if causes == CAUSES else _start(objective, causes)
+        fits.append(fit_objective(objective, start))
+        done += share
+        progress(done)
+    return fits
 
 
 def _held_out(recordings: ArmRecordings) -> ArmRecording:
@@ -221,54 +230,46 @@ def _held_out(recordings: ArmRecordings) -> ArmRecording:
     return recordings.held_out
 
 
-def _of_causes(objective: Objective, causes: Collection[Cause]) -> Objective:
-    """Return an objective that fits what belongs to some causes."""
-    return Objective(
-        simulation=objective.simulation,
-        deviation=objective.deviation,
-        free=objective.parameters.of_causes(causes),
-        fixed=objective.fixed,
-    )
-
-
 def _start(objective: Objective, causes: Collection[Cause]) -> Array:
     """Return the vector (P,) that fits best of some with other delays, and all gains alike."""
-    parameters = objective.parameters
+    simulation, parameters = objective.simulation, objective.parameters
+    delays = _DELAYS if "delay" in causes else (0.0,)
     stiffness = _STIFFNESS if "gains" in causes else (0.0,)
     best, least = objective.fixed, np.inf
-    for delay in _DELAYS if "delay" in causes else (0.0,):
+    for delay in delays:
         vectors = np.tile(objective.fixed, (len(stiffness), 1))
         vectors[:, parameters.of_kind("delay")] = delay
         vectors[:, parameters.of_kind("kp")] = np.array(stiffness)[:, None]
-        for vector, angles in zip(
-            vectors, objective.simulation.angles_of_each(vectors), strict=True
-        ):
-            gap = _gap(objective.simulation, angles)
-            if gap < least:
-                best, least = vector, gap
+        gaps = [_gap(simulation, angles) for angles in simulation.angles_of_each(vectors)]
+        place = int(np.argmin(gaps))
+        if gaps[place] < least:
+            best, least = vectors[place], gaps[place]
     return best
 
 
-def _reading(causes: tuple[Cause, ...], end: Fit, other: ArmSimulation, before: float) -> Reading:
+def _reading(end: Fit, other: ArmSimulation, before: float) -> Reading:
     """Return what a fit leaves.
 
     Args:
-        causes: Those that were fitted.
         end: The fit.
         other: Plays the other episode.
         before: The gap there with the model as it is [rad].
     """
-    parameters = end.objective.parameters
-    gains = zip(parameters.of_kind("kp").tolist(), parameters.joints, strict=True)
+    objective, parameters = end.objective, end.objective.parameters
+    fitted = {parameters.each[number].cause for number in objective.free.tolist()}
+    gains = [
+        parameters.each[number].figure(float(end.vector[number]))
+        for number in parameters.of_kind("kp").tolist()
+    ]
     elsewhere = _gap(other, other.angles(end.vector))
     return Reading(
-        causes=causes,
+        causes=tuple(cause for cause in CAUSES if cause in fitted),
         here=float(np.sqrt(np.square(end.errors).mean())),
         elsewhere=elsewhere,
         taken=1.0 - elsewhere / before,
         delay=float(end.vector[parameters.of_kind("delay")[0]]),
-        kp=np.array([parameters.each[k].figure(float(end.vector[k])) for k, _ in gains]),
-        angles=end.errors + end.objective.simulation.state[-len(end.errors) :],
+        kp=np.array(gains),
+        angles=objective.simulation.angles(end.vector),
     )
 
 
@@ -295,20 +296,14 @@ def _shares(readings: Sequence[Reading], before: float) -> dict[str, float | Non
 def _figures(end: Fit, residuals: Residuals) -> tuple[ToldFigure, ...]:
     """Return what the recording tells of each figure that was fitted."""
     objective = end.objective
-    weighted = Objective(
-        simulation=objective.simulation,
-        deviation=np.minimum(residuals.noise, residuals.most),
-        free=objective.free,
-        fixed=objective.fixed,
-    )
-    covariance = Fits((end.weighed(weighted),), residuals).covariance
-    deviations = np.sqrt(np.diag(covariance))
+    noise = np.minimum(residuals.noise, residuals.most)
+    weighed = end.weighed(replace(objective, deviation=noise))
+    deviations = np.sqrt(np.diag(Fits((weighed,), residuals).covariance))
     truth = synthetic_truth()
     figures: list[ToldFigure] = []
-    for place, number in enumerate(objective.free.tolist()):
+    for number, deviation in zip(objective.free.tolist(), deviations.tolist(), strict=True):
         parameter = objective.parameters.each[number]
-        value, deviation = float(end.vector[number]), float(deviations[place])
-        low, high = value - _QUANTILE * deviation, value + _QUANTILE * deviation
+        value = float(end.vector[number])
         figures.append(
             ToldFigure(
                 kind=parameter.kind,
@@ -316,8 +311,8 @@ def _figures(end: Fit, residuals: Residuals) -> tuple[ToldFigure, ...]:
                 unit=UNITS[parameter.kind],
                 model=parameter.model,
                 fitted=parameter.figure(value),
-                low=parameter.figure(low),
-                high=parameter.figure(high),
+                low=parameter.figure(value - _QUANTILE * deviation),
+                high=parameter.figure(value + _QUANTILE * deviation),
                 information=deviation / parameter.prior.deviation,
                 truth=_true_figure(truth, parameter.kind, parameter.joint),
             )

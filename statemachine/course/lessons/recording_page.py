@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...lab.identification.parameter_texts import figure_text, number_text, unit_text
-from ...lab.identification.results import CAUSES
+from ...lab.identification.results import CAUSES, Kind
 from ...measures.text import degrees, milliseconds, percent
 from ...show.blocks import Block, Table
 from ...show.engine_tables import Results, where
@@ -24,7 +24,11 @@ _TOLD = 0.3  # standard deviation after a fit by that before it, below which a f
 _WATCHED = "shoulder_lift"  # the joint that is drawn and looked at
 _CURVE = 4.0  # [s] of it that are drawn
 # The choices of the second question, in their order.
-ASKED = (("delay", None), ("kp", _WATCHED), ("offset", "shoulder_pan"))
+ASKED: tuple[tuple[Kind, str | None], ...] = (
+    ("delay", None),
+    ("kp", _WATCHED),
+    ("offset", "shoulder_pan"),
+)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 _FILE = Path(__file__).resolve().parent / "synthetic" / "truth.json"
@@ -37,10 +37,13 @@ class SyntheticTruth:
 def synthetic_truth() -> SyntheticTruth:
     """Return the truth of `lerobot:synthetic`; no fit reads it."""
     written = json.loads(_FILE.read_text(encoding="utf-8"))
-    values = {field.name: written[field.name] for field in fields(SyntheticTruth)}
     return SyntheticTruth(
-        **{
-            name: tuple(value) if isinstance(value, list) else value
-            for name, value in values.items()
-        }
+        joints=tuple(written["joints"]),
+        kp=tuple(written["kp"]),
+        viscous=tuple(written["viscous"]),
+        frictionloss=tuple(written["frictionloss"]),
+        armature=tuple(written["armature"]),
+        offset=tuple(written["offset"]),
+        delay=written["delay"],
+        payload=written["payload"],
     )
