@@ -10,28 +10,26 @@ from statemachine.interface import Array, Model
 from .arm_truth import ArmTruth
 
 FPS = 30
-STEPS_PER_FRAME = 64  # of 1/1920 s: finer than what a fit takes
-_TIMESTEP = 1.0 / (FPS * STEPS_PER_FRAME)
+STEPS_PER_FRAME = 64  # of 1/1920 s, and twice as many: finer than what a fit takes
 _SETTLING = 60  # frames for which it is told the first command before it is recorded
 
 
 def arm_model(backend: str) -> Model:
-    """Return the arm that is simulated, with the fine step.
+    """Return the arm that is simulated.
 
     MuJoCo's semi-implicit Euler: implicitfast leaves the damping of a servo out of its implicit
     part while its force is at the limit, so that what comes out jumps with the parameters.
     """
-    model = sm.load("so101", backend=backend)
-    if backend == "mujoco":
-        return model.replace(timestep=_TIMESTEP, contacts=False, integrator="euler")
-    return model.replace(timestep=_TIMESTEP, contacts=False)
+    model = sm.load("so101", backend=backend).replace(contacts=False)
+    return model.replace(integrator="euler") if backend == "mujoco" else model
 
 
 def measured_angles(model: Model, truth: ArmTruth, action: Array) -> Array:
     """Return the recorded angles (K, n) [rad] at each frame, without noise.
 
     The arm rests under the first command until frame 0. Frame k is measured before command k is
-    sent, and shows where the arm was one delay earlier.
+    sent, and shows where the arm was one delay earlier. The error of the step, which is of first
+    order and would pass for a delay of half a step, is taken away by Richardson's extrapolation.
 
     Args:
         model: Made by `arm_model`.
@@ -40,18 +38,27 @@ def measured_angles(model: Model, truth: ArmTruth, action: Array) -> Array:
     """
     arm = truth.applied_to(model)
     commands = truth.real(action)
-    with sm.make_data(arm) as data:
+    once = _seen(arm, commands, STEPS_PER_FRAME, truth.delay)
+    twice = _seen(arm, commands, 2 * STEPS_PER_FRAME, truth.delay)
+    return truth.recorded(2.0 * twice - once)
+
+
+def _seen(arm: Model, commands: Array, steps: int, delay: float) -> Array:
+    """Return where the arm was one delay before each frame, (K, n) [rad]."""
+    timestep = 1.0 / (FPS * steps)
+    stepped = arm.replace(timestep=timestep)
+    with sm.make_data(stepped) as data:
         data.qpos[:] = commands[0]
         data.ctrl[:] = commands[0]
-        sm.step(arm, data, _SETTLING * STEPS_PER_FRAME)
+        sm.step(stepped, data, _SETTLING * steps)
         angles = [data.qpos.copy()]
         for command in commands:
             data.ctrl[:] = command
-            for _ in range(STEPS_PER_FRAME):
-                sm.step(arm, data)
+            for _ in range(steps):
+                sm.step(stepped, data)
                 angles.append(data.qpos.copy())
-    times = np.arange(len(angles)) * _TIMESTEP
-    seen = np.arange(len(commands)) / FPS - truth.delay
+    times = np.arange(len(angles)) * timestep
+    moments = np.arange(len(commands)) / FPS - delay
     history = np.stack(angles)
-    columns = [np.interp(seen, times, history[:, joint]) for joint in range(history.shape[1])]
-    return truth.recorded(np.stack(columns, axis=1))
+    columns = [np.interp(moments, times, history[:, joint]) for joint in range(arm.nq)]
+    return np.stack(columns, axis=1)
