@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...errors import DivergedError
 from ...interface import Array, Model
 from ..recordings.arm_recording import ArmRecording, ArmRecordings
+from ..runs.drive import Progress, no_progress
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from .fit import Objective
 from .hypotheses import tried_hypotheses
 from .motions import motion_informations
 from .parameters import ArmParameters
-from .recorded_gap import asked_of, gap_between
+from .recorded_gap import Asked, asked_of, gap_between
 from .residuals import Residuals
 from .results import IdentificationResult, RecordingRequest, StartOutcome
 from .shares import cause_shares
@@ -24,6 +25,62 @@ from .starts import Fits, fits_from_starts
 from .verdicts import fitted_parameters
 
 _FITTED = 2.0 / 3.0  # of the only episode; the rest shows whether it holds
+
+
+@dataclass(frozen=True, eq=False)
+class FittedArm:
+    """An arm that was fitted to a recording, and what was not fitted.
+
+    Attributes:
+        fits: From all starts.
+        elsewhere: Plays what was not fitted.
+        first: The first frame of it that counts.
+        before: (K, n) its angles with the model as it is [rad].
+        after: (K, n) its angles with the best fit [rad].
+    """
+
+    fits: Fits
+    elsewhere: ArmSimulation
+    first: int
+    before: Array
+    after: Array
+
+    @property
+    def holds(self) -> bool:
+        """Tell whether the best fit leaves hardly more than noise of what was not fitted."""
+        rows = slice(max(self.first, self.elsewhere.first_frame), None)
+        errors = (self.after - self.elsewhere.state)[rows]
+        return Residuals.of(errors, self.elsewhere.recording).holds
+
+
+def fitted_arm(asked: Asked, starts: int, seed: int, progress: Progress = no_progress) -> FittedArm:
+    """Fit all parameters from several starts.
+
+    Args:
+        asked: The recording and the arm.
+        starts: How many.
+        seed: Of their draws.
+        progress: Told the fraction that is done.
+
+    Raises:
+        MissingEngineError: The extra `recordings` is not installed.
+        DivergedError: The simulation diverges with the figures of the model.
+    """
+    parameters = asked.parameters
+    fitted_part, elsewhere, first = _parts(asked.recordings)
+    objective = Objective(
+        simulation=ArmSimulation.of(parameters, fitted_part),
+        deviation=fitted_part.resolution,
+        free=np.arange(len(parameters)),
+        fixed=np.zeros(len(parameters)),
+    )
+    fits = fits_from_starts(objective, starts, seed, progress)
+    held_out = ArmSimulation.of(parameters, elsewhere)
+    before = held_out.angles(np.zeros(len(parameters)))
+    after = held_out.angles(fits.best.vector)
+    if not (np.isfinite(before).all() and np.isfinite(after).all()):
+        raise DivergedError("the simulation of the recorded commands diverges")
+    return FittedArm(fits, held_out, first, before, after)
 
 
 def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> IdentificationResult:
@@ -35,23 +92,10 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         DivergedError: The simulation diverges with the figures of the model.
     """
     asked = asked_of(request)
-    parameters = asked.parameters
-    fitted_part, elsewhere, first = _parts(asked.recordings)
-    objective = Objective(
-        simulation=ArmSimulation.of(parameters, fitted_part),
-        deviation=fitted_part.resolution,
-        free=np.arange(len(parameters)),
-        fixed=np.zeros(len(parameters)),
-    )
     with reporter.stage(f"fitting {request.recording}") as progress:
-        fits = fits_from_starts(objective, request.starts, request.seed, progress)
-    simulation, held_out = objective.simulation, ArmSimulation.of(parameters, elsewhere)
-    nothing, best = np.zeros(len(parameters)), fits.best.vector
-    before, after = held_out.angles(nothing), held_out.angles(best)
-    if not (np.isfinite(before).all() and np.isfinite(after).all()):
-        raise DivergedError("the simulation of the recorded commands diverges")
-    rows = slice(max(first, held_out.first_frame), None)
-    holds = Residuals.of((after - held_out.state)[rows], elsewhere).holds
+        fitted = fitted_arm(asked, request.starts, request.seed, progress)
+    fits, held_out = fitted.fits, fitted.elsewhere
+    simulation, best = fits.best.objective.simulation, fits.best.vector
     saturated = float(simulation.saturated(best).max())
     with reporter.stage("trying other motions"):
         motions = motion_informations(fits.best)
@@ -59,26 +103,27 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         hypotheses = tried_hypotheses(fits, saturated, progress)
     with reporter.stage("dividing the gap among its causes") as progress:
         shares = cause_shares(fits, held_out, progress)
-    only = asked.recordings.held_out is None
+    as_it_is = simulation.angles(np.zeros(len(best)))
+    part = "last third" if asked.recordings.held_out is None else "all"
     return IdentificationResult(
         request=request,
-        provenance=provenance(parameters.model, request.seed),
-        units=fitted_part.units,
-        fps=fitted_part.fps,
-        fitted_gap=gap_between(simulation, simulation.angles(nothing), simulation.angles(best)),
-        gap=gap_between(held_out, before, after, "last third" if only else "all", first),
+        provenance=provenance(asked.parameters.model, request.seed),
+        units=simulation.recording.units,
+        fps=simulation.recording.fps,
+        fitted_gap=gap_between(simulation, as_it_is, simulation.angles(best)),
+        gap=gap_between(held_out, fitted.before, fitted.after, part, fitted.first),
         residual=fits.residuals.overall,
         floor=fits.residuals.floor,
-        holds=holds,
+        holds=fitted.holds,
         at_floor=fits.residuals.at_floor,
-        parameters=fitted_parameters(fits, holds, motions),
+        parameters=fitted_parameters(fits, fitted.holds, motions),
         shares=shares,
         hypotheses=hypotheses,
         starts=_outcomes(fits),
         saturated=saturated,
         recordings=asked.recordings,
-        arm=parameters.model,
-        fitted_arm=fitted_model(parameters, best),
+        arm=asked.parameters.model,
+        fitted_arm=fitted_model(asked.parameters, best),
     )
 
 

@@ -20,6 +20,7 @@ from .results import CAUSES, Cause, CauseShare
 from .simulation import ArmSimulation
 from .starts import Fits
 
+_RUNS = 6
 _TOLERANCE = 1e-2  # of a fit, which begins at the best one of all parameters
 
 
@@ -66,7 +67,7 @@ def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str])
         return gap_of(elsewhere, nothing)
     free = best.objective.parameters.of_causes(chosen)
     objective = replace(best.objective, free=free, fixed=nothing)
-    fitted = fit(objective, best.vector, tolerance=_TOLERANCE)
+    fitted = fit(objective, best.vector, _RUNS, _TOLERANCE)
     gap = gap_of(elsewhere, fitted.vector)
     return gap if math.isfinite(gap) else None
 

@@ -23,6 +23,7 @@ from ..recordings.arm_recording import ArmRecording
 from .parameters import ArmParameters
 
 COUNTS = 4096  # of a turn of the servos (Feetech STS3215)
+_STABLE = 1.2  # rate of a servo by that of steps, below which half of them do for derivatives
 _STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
@@ -113,13 +114,28 @@ class ArmSimulation:
 
         They have the error of a step, which hardly matters for differences.
         """
-        return self._played(vectors, self._steps)
+        half = self._steps // 2
+        rate = self.recording.fps * half
+        is_stable = half > 0 and self._fastest_rate(vectors) < _STABLE * rate
+        return self._played(vectors, half if is_stable else self._steps)
 
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
         limits = self.parameters.model.actuator_forcerange[self.parameters.servo]
         forces = np.abs(self._forces(vector))
         return np.mean(forces >= 0.999 * limits[:, 1], axis=0)
+
+    def _fastest_rate(self, vectors: Array) -> float:
+        """Return the fastest rate at which a servo moves its armature alone [1/s].
+
+        The links add to that inertia, so it is a bound.
+        """
+        parameters = self.parameters
+        figures = parameters.options(vectors)
+        inertia = figures["armature"][:, parameters.dof]
+        spring = np.sqrt(figures["kp"][:, parameters.servo] / inertia)
+        viscous = figures["kv"][:, parameters.servo] / inertia
+        return float(np.maximum(spring, viscous).max())
 
     @property
     def _steps(self) -> int:

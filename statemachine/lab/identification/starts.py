@@ -74,7 +74,8 @@ def fits_from_starts(
     for number, start in enumerate(points):
         fits.append(fit(objective, start))
         progress((number + 1) / (starts + 1))
-    best = min(fits, key=_cost)
+    place = min(range(len(fits)), key=lambda number: fits[number].cost)
+    best = fits.pop(place)
     recording = objective.simulation.recording
     residuals = Residuals.of(best.errors, recording)
     weighted = replace(objective, deviation=np.minimum(residuals.noise, residuals.most))

@@ -1,0 +1,194 @@
+"""How often a fit of synthetic recordings says what is true.
+
+python -m tools.arm_recordings.score DIR [--write FILE.json]     after --all DIR of the maker
+
+For each recording: which parameters are called determined, whether the truth is in their intervals,
+and how wide these are by those of the Fisher information at the truth (the bound of Cramér and Rao,
+with the prior).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from statemachine.lab.identification.fit import Objective
+from statemachine.lab.identification.identify import fitted_arm
+from statemachine.lab.identification.parameters import ArmParameters, Parameter
+from statemachine.lab.identification.recorded_gap import asked_of
+from statemachine.lab.identification.results import FEWEST_STARTS, FittedParameter, RecordingRequest
+from statemachine.lab.identification.verdicts import fitted_parameters
+
+COUNTED = ("kp", "viscous", "friction", "delay", "payload")  # of which most are to be determined
+_KEYS = {"friction": "frictionloss"}  # in truth.json
+_BAND = 2 * 1.96  # width of an interval of 95 %, in standard deviations
+
+
+@dataclass(frozen=True)
+class ScoredParameter:
+    """A parameter of a recording.
+
+    Attributes:
+        kind, joint: Which.
+        truth, fitted, low, high: In SI units.
+        determined: Whether the fit calls it so.
+        width: Of its interval by that of the bound.
+    """
+
+    kind: str
+    joint: str | None
+    truth: float
+    fitted: float
+    low: float
+    high: float
+    determined: bool
+    width: float
+
+    @property
+    def covered(self) -> bool:
+        """Tell whether the truth is in the interval."""
+        return self.low <= self.truth <= self.high
+
+
+@dataclass(frozen=True)
+class ScoredRecording:
+    """A recording.
+
+    Attributes:
+        name: Of its folder.
+        parameters: All that were fitted, but for those that its fault changes.
+        at_floor, holds: As the fit has them.
+        as_good: Starts that ended as well as the best.
+        seconds: Of the processor.
+    """
+
+    name: str
+    parameters: tuple[ScoredParameter, ...]
+    at_floor: bool
+    holds: bool
+    as_good: int
+    seconds: float
+
+
+def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
+    """Fit a recording, and hold what is said against its truth."""
+    truth = json.loads((folder / "truth.json").read_text())
+    began = time.process_time()
+    asked = asked_of(RecordingRequest(f"lerobot:{folder}", "so101"))
+    fitted = fitted_arm(asked, starts, seed=0)
+    parameters = fitted_parameters(fitted.fits, fitted.holds, ())
+    seconds = time.process_time() - began
+    best = fitted.fits.best.objective
+    true = _true_vector(asked.parameters, truth)
+    bound = _bound(best, true)
+    each: list[ScoredParameter] = []
+    for place, parameter in enumerate(parameters):
+        if _is_changed(parameter, truth):
+            continue
+        of_vector = asked.parameters.each[place]
+        low, high = (of_vector.value(max(x, 1e-12)) for x in (parameter.low, parameter.high))
+        each.append(
+            ScoredParameter(
+                kind=parameter.kind,
+                joint=parameter.joint,
+                truth=of_vector.figure(float(true[place])),
+                fitted=parameter.fitted,
+                low=parameter.low,
+                high=parameter.high,
+                determined=parameter.verdict == "determined",
+                width=(high - low) / (_BAND * float(bound[place]))
+                if of_vector.is_factor
+                else (parameter.high - parameter.low) / (_BAND * float(bound[place])),
+            )
+        )
+    return ScoredRecording(
+        name=folder.name,
+        parameters=tuple(each),
+        at_floor=fitted.fits.residuals.at_floor,
+        holds=fitted.holds,
+        as_good=len(fitted.fits.as_good),
+        seconds=seconds,
+    )
+
+
+def _true_vector(parameters: ArmParameters, truth: dict[str, Any]) -> np.ndarray:
+    """Return the vector of the truth."""
+    return np.array([each.value(_true_figure(each, truth)) for each in parameters.each])
+
+
+def _true_figure(parameter: Parameter, truth: dict[str, Any]) -> float:
+    figures = truth[_KEYS.get(parameter.kind, parameter.kind)]
+    if parameter.joint is None:
+        return figures
+    return figures[truth["joints"].index(parameter.joint)]
+
+
+def _is_changed(parameter: FittedParameter, truth: dict[str, Any]) -> bool:
+    """Tell whether the fault of a recording changes what a parameter means."""
+    if parameter.joint is None:
+        return False
+    return truth["scale"][truth["joints"].index(parameter.joint)] != 1.0
+
+
+def _bound(objective: Objective, true: np.ndarray) -> np.ndarray:
+    """Return the standard deviations (P,) that no fit can be better than, with the prior."""
+    jacobian = objective.jacobian(true[objective.free])
+    return np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+
+
+def summary(recordings: Sequence[ScoredRecording]) -> dict[str, float]:
+    """Return what the recordings of a group have in common."""
+    all_of = [each for recording in recordings for each in recording.parameters]
+    counted = [each for each in all_of if each.kind in COUNTED]
+    determined = [each for each in all_of if each.determined]
+    return {
+        "recordings": len(recordings),
+        "determined": float(np.mean([each.determined for each in counted])),
+        "covered": float(np.mean([each.covered for each in determined])) if determined else np.nan,
+        "width": float(np.median([each.width for each in determined])) if determined else np.nan,
+        "at_floor": sum(recording.at_floor for recording in recordings),
+    }
+
+
+def group_of(name: str) -> str:
+    """Return the group of a recording: its name without its seed."""
+    return name.rpartition("-")[0]
+
+
+def main() -> None:
+    """Score all recordings of a folder, print a line for each and for each group."""
+    parser = argparse.ArgumentParser(prog="python -m tools.arm_recordings.score")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--write", type=Path, metavar="FILE.json")
+    options = parser.parse_args()
+    recordings: list[ScoredRecording] = []
+    for folder in sorted(path.parent for path in options.folder.glob("*/truth.json")):
+        recordings.append(scored(folder))
+        last = recordings[-1]
+        print(
+            last.name,
+            summary([last]),
+            last.holds,
+            last.as_good,
+            f"{last.seconds:.0f} s",
+            flush=True,
+        )
+        if options.write is not None:
+            options.write.write_text(json.dumps([asdict(each) for each in recordings], indent=1))
+    groups: dict[str, list[ScoredRecording]] = {}
+    for recording in recordings:
+        groups.setdefault(group_of(recording.name), []).append(recording)
+    for group, members in groups.items():
+        print(group, summary(members))
+    print("all", summary(recordings))
+
+
+if __name__ == "__main__":
+    main()
