@@ -100,7 +100,7 @@ class RecordingLessonResult:
 
     Attributes:
         joints: (n,) names.
-        seconds: Length of each episode [s].
+        fps: Frames per second [1/s].
         time: (K,) of the frames [s].
         measured: (K, n) measured angles [rad].
         typed: (K, n) angles of the program [rad].
@@ -115,7 +115,7 @@ class RecordingLessonResult:
     """
 
     joints: tuple[str, ...]
-    seconds: float
+    fps: float
     time: Array
     measured: Array = field(metadata=_NOT_IN_JSON)
     typed: Array = field(metadata=_NOT_IN_JSON)
@@ -183,21 +183,23 @@ def run(play: CodeRun, options: Options, progress: Progress) -> RecordingLessonR
     fits = _fits(simulation, progress)
     readings = [_reading(fit, other, elsewhere) for fit in fits]
     residuals = Residuals.of(fits[-1].errors, recording)
-    frames = np.arange(len(recording.state))
+    time = np.arange(len(recording.state)) / recording.fps
+    commanded, here = _commanded(recording), _gap(simulation, simulation.angles(nothing))
+    figures, shares = _figures(fits[-1], residuals), _shares(readings, elsewhere)
     return RecordingLessonResult(
         joints=parameters.joints,
-        seconds=len(frames) / recording.fps,
-        time=frames / recording.fps,
+        fps=recording.fps,
+        time=time,
         measured=recording.state,
         typed=typed,
-        commanded=_commanded(recording),
-        here=_gap(simulation, simulation.angles(nothing)),
+        commanded=commanded,
+        here=here,
         elsewhere=elsewhere,
         readings=tuple(readings),
-        shares=_shares(readings, elsewhere),
+        shares=shares,
         floor=residuals.floor,
         at_floor=residuals.at_floor,
-        figures=_figures(fits[-1], residuals),
+        figures=figures,
         provenance=provenance(play.model),
     )
 
@@ -261,10 +263,11 @@ def _reading(end: Fit, other: ArmSimulation, before: float) -> Reading:
         parameters.each[number].figure(float(end.vector[number]))
         for number in parameters.of_kind("kp").tolist()
     ]
+    here = float(np.sqrt(np.square(end.errors).mean()))
     elsewhere = _gap(other, other.angles(end.vector))
     return Reading(
         causes=tuple(cause for cause in CAUSES if cause in fitted),
-        here=float(np.sqrt(np.square(end.errors).mean())),
+        here=here,
         elsewhere=elsewhere,
         taken=1.0 - elsewhere / before,
         delay=float(end.vector[parameters.of_kind("delay")[0]]),
@@ -303,20 +306,20 @@ def _figures(end: Fit, residuals: Residuals) -> tuple[ToldFigure, ...]:
     figures: list[ToldFigure] = []
     for number, deviation in zip(objective.free.tolist(), deviations.tolist(), strict=True):
         parameter = objective.parameters.each[number]
-        value = float(end.vector[number])
-        figures.append(
-            ToldFigure(
-                kind=parameter.kind,
-                joint=parameter.joint,
-                unit=UNITS[parameter.kind],
-                model=parameter.model,
-                fitted=parameter.figure(value),
-                low=parameter.figure(value - _QUANTILE * deviation),
-                high=parameter.figure(value + _QUANTILE * deviation),
-                information=deviation / parameter.prior.deviation,
-                truth=_true_figure(truth, parameter.kind, parameter.joint),
-            )
+        value, width = float(end.vector[number]), _QUANTILE * deviation
+        true_figure = _true_figure(truth, parameter.kind, parameter.joint)
+        figure = ToldFigure(
+            kind=parameter.kind,
+            joint=parameter.joint,
+            unit=UNITS[parameter.kind],
+            model=parameter.model,
+            fitted=parameter.figure(value),
+            low=parameter.figure(value - width),
+            high=parameter.figure(value + width),
+            information=deviation / parameter.prior.deviation,
+            truth=true_figure,
         )
+        figures.append(figure)
     return tuple(figures)
 
 

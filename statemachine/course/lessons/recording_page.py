@@ -154,7 +154,7 @@ class RecordingPage(PageContent):
     @property
     def fps(self) -> int:
         """Return the frames per second of the recording."""
-        return round(len(self.result.time) / self.result.seconds)
+        return round(self.result.fps)
 
     @property
     def pan_is_untold(self) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _FILE = Path(__file__).resolve().parent / "synthetic" / "truth.json"
+_BY_JOINT = ("joints", "kp", "viscous", "frictionloss", "armature", "offset")
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,16 @@ class SyntheticTruth:
 def synthetic_truth() -> SyntheticTruth:
     """Return the truth of `lerobot:synthetic`; no fit reads it."""
     written = json.loads(_FILE.read_text(encoding="utf-8"))
+    joints, kp, viscous, frictionloss, armature, offset = (
+        tuple(written[name]) for name in _BY_JOINT
+    )
     return SyntheticTruth(
-        joints=tuple(written["joints"]),
-        kp=tuple(written["kp"]),
-        viscous=tuple(written["viscous"]),
-        frictionloss=tuple(written["frictionloss"]),
-        armature=tuple(written["armature"]),
-        offset=tuple(written["offset"]),
+        joints=joints,
+        kp=kp,
+        viscous=viscous,
+        frictionloss=frictionloss,
+        armature=armature,
+        offset=offset,
         delay=written["delay"],
         payload=written["payload"],
     )
