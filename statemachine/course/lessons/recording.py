@@ -40,7 +40,7 @@ _SHARES = (0.1, 0.15, 0.25, 0.45)  # of that time, of each reading
 
 
 @dataclass(frozen=True)
-class Reading:
+class FittedReading:
     """What is left of the gap where some causes are fitted.
 
     Attributes:
@@ -122,14 +122,14 @@ class RecordingLessonResult:
     commanded: float
     here: float
     elsewhere: float
-    readings: tuple[Reading, ...]
+    readings: tuple[FittedReading, ...]
     shares: dict[str, float | None]
     floor: float
     at_floor: bool
     figures: tuple[ToldFigure, ...]
     provenance: Provenance
 
-    def reading(self, *causes: Cause) -> Reading:
+    def reading(self, *causes: Cause) -> FittedReading:
         """Return what is left where these causes are fitted."""
         return next(reading for reading in self.readings if reading.causes == causes)
 
@@ -249,7 +249,7 @@ def _start(objective: Objective, causes: Collection[Cause]) -> Array:
     return best
 
 
-def _reading(end: Fit, other: ArmSimulation, before: float) -> Reading:
+def _reading(end: Fit, other: ArmSimulation, before: float) -> FittedReading:
     """Return what a fit leaves.
 
     Args:
@@ -265,7 +265,7 @@ def _reading(end: Fit, other: ArmSimulation, before: float) -> Reading:
     ]
     here = float(np.sqrt(np.square(end.errors).mean()))
     elsewhere = _gap(other, other.angles(end.vector))
-    return Reading(
+    return FittedReading(
         causes=tuple(cause for cause in CAUSES if cause in fitted),
         here=here,
         elsewhere=elsewhere,
@@ -289,7 +289,7 @@ def _commanded(recording: ArmRecording) -> float:
     return float(np.sqrt(np.square(errors).mean()))
 
 
-def _shares(readings: Sequence[Reading], before: float) -> dict[str, float | None]:
+def _shares(readings: Sequence[FittedReading], before: float) -> dict[str, float | None]:
     """Return the Shapley values of delay and gains, as parts of the gap in the other episode."""
     gaps = {frozenset[str](reading.causes): reading.elsewhere for reading in readings}
     gaps[frozenset()] = before

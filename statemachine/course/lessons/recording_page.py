@@ -16,7 +16,7 @@ from ...show.labels import TableLabels
 from ...show.pictures import Traces
 from ...show.templates import PageContent
 from .frame import LessonFrame
-from .recording import Reading, RecordingLessonResult, ToldFigure
+from .recording import FittedReading, RecordingLessonResult, ToldFigure
 
 _SAY = TableLabels(__name__, "recording_labels.md.j2")
 _MOST = 0.5  # of the gap: a reading that takes away more explains most of it
@@ -32,7 +32,7 @@ ASKED: tuple[tuple[Kind, str | None], ...] = (
 
 
 @dataclass(frozen=True)
-class RecordingPage(PageContent):
+class RecordingLessonPage(PageContent):
     """What the page of the lesson shows of one engine.
 
     Attributes:
@@ -51,22 +51,22 @@ class RecordingPage(PageContent):
     curves: Sequence[Block]
 
     @property
-    def delay(self) -> Reading:
+    def delay(self) -> FittedReading:
         """Return what is left where the delay alone is fitted."""
         return self.result.reading("delay")
 
     @property
-    def gains(self) -> Reading:
+    def gains(self) -> FittedReading:
         """Return what is left where the gains alone are fitted."""
         return self.result.reading("gains")
 
     @property
-    def both(self) -> Reading:
+    def both(self) -> FittedReading:
         """Return what is left where delay and gains are fitted."""
         return self.result.reading("delay", "gains")
 
     @property
-    def whole(self) -> Reading:
+    def whole(self) -> FittedReading:
         """Return what is left where everything is fitted."""
         return self.result.reading(*CAUSES)
 
@@ -115,7 +115,7 @@ class RecordingPage(PageContent):
         """Return that gain where delay and gains are fitted [N·m/rad]."""
         return self._gain_of(self.both)
 
-    def _gain_of(self, reading: Reading) -> float:
+    def _gain_of(self, reading: FittedReading) -> float:
         return float(reading.kp[self.result.joints.index(_WATCHED)])
 
     @property
@@ -179,13 +179,13 @@ class RecordingPage(PageContent):
 
 def contents(
     results: Results[RecordingLessonResult], frame: LessonFrame
-) -> dict[str, RecordingPage]:
+) -> dict[str, RecordingLessonPage]:
     """Return what the page shows of each engine."""
     readings, curves = _readings(results), _curves(results)
     first = next(iter(results.values()))
     figures = _figures(first)
     return {
-        name: RecordingPage(frame, result, readings, figures, curves)
+        name: RecordingLessonPage(frame, result, readings, figures, curves)
         for name, result in results.items()
     }
 
@@ -221,7 +221,7 @@ def _readings(results: Results[RecordingLessonResult]) -> Table:
     return Table(headers, rows)
 
 
-def _name_of(reading: Reading) -> str:
+def _name_of(reading: FittedReading) -> str:
     """Return what was fitted, in words."""
     if reading.causes == CAUSES:
         return _SAY("everything")
@@ -262,9 +262,10 @@ def _curves(results: Results[RecordingLessonResult]) -> list[Block]:
     def curve(angles: np.ndarray) -> tuple[list[float], list[float]]:
         return time, np.degrees(angles[shown, place]).tolist()
 
+    as_it_is = _SAY("as_it_is")
     curves = {_SAY("measured"): curve(first.measured)}
     for name, result in results.items():
-        curves[f"{where(results, name)}{_SAY('as_it_is')}"] = curve(result.typed)
+        curves[f"{where(results, name)}{as_it_is}"] = curve(result.typed)
     for reading in first.readings[:2]:
         curves[_SAY("only", cause=_name_of(reading))] = curve(reading.angles)
     return [Traces(_SAY("curves", joint=_WATCHED), "time [s]", _SAY("angle"), curves)]
