@@ -574,7 +574,9 @@ def run_file(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
         printed = capsys.readouterr()
         assert without_estimates(printed.err) == ""
         lines = printed.out.splitlines()
-        assert ended.value.code == 2 or max(map(len, lines)) <= 80
+        # Where the checkout stands is no width of ours: a line may name the file with its folder.
+        widths = [len(line.replace(str(file), file.name)) for line in lines]
+        assert ended.value.code == 2 or max(widths) <= 80
         return int(ended.value.code or 0), lines
 
     return run

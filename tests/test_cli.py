@@ -182,6 +182,20 @@ def test_a_pipe_that_closes_early_is_no_error() -> None:
     assert in_a_shell("lesson state | head -1").stderr == ""
 
 
+def test_a_pipe_whose_reader_has_left_ends_the_command_in_silence() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "statemachine"],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
 @pytest.mark.slow
 def test_a_terminal_without_unicode(cli: Cli) -> None:
     done = cli(

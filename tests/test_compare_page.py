@@ -603,6 +603,11 @@ def test_shortened_names_stay_apart(names: list[str], width: int) -> None:
     assert len(set(cut)) == len(names)
 
 
+def test_what_all_names_have_in_common_is_shortened_and_no_other_part() -> None:
+    names = [f"{side}{'x' * 40}{side}" for side in ("1", "2")]
+    assert [(cut[0], cut[-1]) for cut in shortened(names, 20)] == [("1", "1"), ("2", "2")]
+
+
 def test_names_that_fit_are_left_as_they_are() -> None:
     assert shortened(["elbow", "shoulder"], 8) == ["elbow", "shoulder"]
 

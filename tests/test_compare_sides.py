@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine import lab
 from statemachine.engines import raw_engine_of
 from statemachine.errors import BadInputError, StateMachineError, TraceError, UnknownNameError
 from statemachine.lab.compare import (
@@ -700,3 +701,12 @@ def test_what_is_emulated_of_a_file_has_the_parts_that_were_given(
     assert dials.emulated.timestep == of_file.timestep
     assert np.array_equal(dials.emulated.gravity, of_file.gravity)
     assert np.array_equal(dials.emulated.body_mass, of_file.body_mass)
+
+
+def test_two_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    ball = "<mujoco><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>"
+    names = "one/robot/arm.xml", "two/robot/arm.xml"
+    written_all(tmp_path, dict.fromkeys(names, ball))
+    files = [tmp_path / name for name in names]
+    found = lab.compare(*files, what="fall", seconds=0.02, chaos=False).comparison
+    assert (found.left.short, found.right.short) == names

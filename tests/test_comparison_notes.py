@@ -190,6 +190,26 @@ def test_commands_at_other_moments_are_those_that_are_in_force(still: Trace) -> 
     assert commands_alike(changed(left, ctrl=ctrl + np.eye(ROWS)[:, [7]]), right)
 
 
+def test_a_command_is_in_force_until_the_next_one(still: Trace) -> None:
+    """The right has 200 rows in each step of the left, with the command of then."""
+    ctrl = np.array(still.ctrl)
+    ctrl[:, 0] = np.arange(len(still))
+    left = changed(still, ctrl=ctrl)
+    rows = np.repeat(np.arange(len(still)), 200)
+    time = left.time[rows] + np.tile(np.arange(200), len(still)) * STEP / 200
+    columns = {name: left[name][rows] for name in ("qpos", "qvel", "ctrl")}
+    assert commands_alike(left, Trace(left.header, {"time": time, **columns}))
+
+
+def test_commands_are_held_against_each_other_from_the_start_of_each_run(still: Trace) -> None:
+    ctrl = np.array(still.ctrl)
+    ctrl[:, 0] = np.arange(len(still))
+    left = changed(still, ctrl=ctrl)
+    late = changed(left, time=left.time + 7.0)
+    assert commands_alike(left, late)
+    assert not commands_alike(left, changed(late, ctrl=ctrl + 1.0))
+
+
 @pytest.mark.parametrize("column", ["qpos", "qvel"])
 def test_commands_are_of_one_start(still: Trace, column: str) -> None:
     array = np.array(still[column])
@@ -380,3 +400,13 @@ def test_a_header_of_before_may_lack_who_owns_joints_and_sites(still: Trace) -> 
     assert Header.from_json(older.as_json()) == older
     assert older.moving_sites is None
     assert still.header.moving_sites == (True,)
+
+
+def test_the_tolerance_of_a_site_does_not_depend_on_where_the_robot_stands(still: Trace) -> None:
+    def tolerance(east: float) -> float:
+        shift = np.array([east, 0.0, 0.0])
+        run = changed(still, xpos=still["xpos"] + shift, site_xpos=still["site_xpos"] + shift)
+        (tip,) = (each for each in compare(run, run).agreements if each.kind == "tip")
+        return tip.tolerance
+
+    assert tolerance(100.0) == pytest.approx(tolerance(0.0))

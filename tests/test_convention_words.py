@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from statemachine.engines.measured import Measurement, ReadTwice
-from statemachine.engines.samples import CENTRE, FIXED, MARKS, RATE, limp
+from statemachine.engines.samples import CENTRE, FIXED, MARKS, RATE, TREE_URDF, limp
 from statemachine.lab.probes.conventions import answers, frames, motion
 from statemachine.lab.probes.conventions.answers import (
     NO_ANSWER,
@@ -334,3 +335,12 @@ def test_the_order_of_joints_is_the_rule_that_gives_it() -> None:
         ]
     (first, _) = frames.joints.answer({"MJCF": list(reversed(moving))})
     assert first.answer == UNDECIDED
+
+
+def test_the_links_of_the_tree_are_not_named_as_its_joints() -> None:
+    """So no rule about links passes for one about joints."""
+    links, joints = (
+        set(re.findall(rf'<{tag} name="(\w+)"', TREE_URDF)) for tag in ("link", "joint")
+    )
+    assert len(links) == len(joints) + 1
+    assert links & joints == set()

@@ -672,3 +672,12 @@ def test_a_room_that_cannot_be_imported_is_left_out(
     out, err = capsys.readouterr()
     assert "room of 'broken'" in err
     assert "broken" not in out
+
+
+def test_a_question_that_there_is_not_is_refused_before_any_is_asked() -> None:
+    asked: list[float] = []
+    known = next(iter(QUESTIONS))
+    refused(
+        (UnknownNameError, "nosuch", lambda: probe(["mujoco"], [known, "nosuch"], asked.append))
+    )
+    assert asked == []

@@ -277,6 +277,13 @@ def test_further_inputs_of_a_model_are_stored_too(tmp_path: Path) -> None:
     assert "raw.sensordata" not in inside(titled("derived", diagram), diagram)
 
 
+def test_a_model_without_sites_has_none_to_read(tmp_path: Path) -> None:
+    diagram = pipeline(loaded(tmp_path, MIXED.replace("<site name='tip'/>", "")))
+    derived = inside(titled("derived", diagram), diagram)
+    assert "xpos" in derived
+    assert "site_" not in derived
+
+
 def test_the_brackets_reach_as_far_as_the_calls(mixed: sm.Model) -> None:
     diagram = pipeline(mixed)
     covered = {}

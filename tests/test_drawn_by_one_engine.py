@@ -118,3 +118,11 @@ def test_pybullet_is_given_a_shape_of_many_faces_in_pieces(tmp_path: Path) -> No
     text = f"<mujoco>{field}<worldbody><geom type='hfield' hfield='f'/>{BALL}</worldbody></mujoco>"
     seen = shot("pybullet", Scene(text, seen_from_above(0.9), [(9, 9, 9)]), tmp_path)
     assert np.isfinite(seen.depth[:, 8:-8]).all()
+
+
+def test_mujoco_s_depth_is_in_metres_however_large_the_model_is(tmp_path: Path) -> None:
+    far = '<geom size="0.05" pos="40 0 0"/>'
+    text = mjcf(f'<body><freejoint/><geom size="0.1"/></body>{far}')
+    camera = seen_from_above(1.0)
+    seen = shot("mujoco", Scene(text, camera, [(0, 0, 0)]), tmp_path)
+    assert np.nanmin(seen.depth) == pytest.approx(camera.distance - 0.1, abs=0.01)

@@ -64,8 +64,9 @@ def _drawn(
 ) -> tuple[ListedDifference, ...]:
     """Return what two links differ in by their visuals."""
     meshes = {"wedge.stl": WEDGE, "spike.stl": SPIKE, "y_up.stl": Y_UP, "other/wedge.stl": Y_UP}
-    (folder / "other").mkdir()
+    meshes["capitals/WEDGE.STL"] = Y_UP
     for name, corners in meshes.items():
+        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_bytes(_stl(corners))
     for name, visuals in (("left", left), ("right", right)):
         shapes = "".join(f"{visual}\n" for visual in visuals)
@@ -140,6 +141,12 @@ def test_a_mesh_with_other_axes_that_is_turned_back_is_drawn_alike(tmp_path):
     """As an exporter that has y up writes it, with a turn in the file that puts it right."""
     upright = Visual("other/wedge.stl", HERE, rpy=(np.pi / 2, 0, 0))
     assert _drawn(tmp_path, [Visual("wedge.stl", HERE)], [upright]) == ()
+
+
+def test_a_mesh_of_one_name_in_capitals_is_told_by_its_turn_in_the_file(tmp_path):
+    turned = Visual("capitals/WEDGE.STL", HERE, rpy=(0, 0, 0.5))
+    rows = _drawn(tmp_path, [Visual("wedge.stl", HERE)], [turned])
+    assert [row.right for row in rows if row.quantity == "turned by"] == [pytest.approx(0.5)]
 
 
 def test_a_visual_that_one_side_has_is_told_by_its_file(tmp_path):

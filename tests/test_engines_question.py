@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -38,6 +39,7 @@ from statemachine.show.first_screen import LINES, lines_of
 from .support.backends import BOTH, registered
 from .support.claims import assert_has, refused
 from .support.files import written, written_all
+from .support.pages import shown
 from .support.processes import Cli
 from .support.requirements import need_engine
 from .support.screens import wide_lines
@@ -430,12 +432,12 @@ def test_what_is_typed_runs(here: Cli, pendulum: Path) -> None:
 def test_the_arm_on_engines_as_they_come(here: Cli) -> None:
     """Against the course's text: with its own motors PyBullet is far from both."""
     backends = [word for name in (*BOTH, "pybullet:engine") for word in ("--backend", name)]
-    words = ("--seconds", "0.5", "--no-chaos", "--json")
+    words = ("--seconds", "0.25", "--no-chaos", "--json")
     done = here("compare", "hold", *backends, *words, code=1)
     found = json.loads(done.stdout)
     assert found["odd"]["side"] == "pybullet:engine"
     assert found["odd"]["gap"] > np.radians(40)
-    two = lab.compare(what="hold", seconds=0.5, chaos=False).to_dict()
+    two = lab.compare(what="hold", seconds=0.25, chaos=False).to_dict()
     (pair,) = (gap for gap in found["gaps"] if gap["right"] == "pybullet")
     assert pair["largest"] == pytest.approx(max(two["max"][: two["kind"].count("joint")]))
 
@@ -464,14 +466,21 @@ def test_the_page_shows_who_is_odd_at_each_step_where_that_changes(
 
 
 def test_the_first_line_names_the_odd_one_and_its_gap(damped: EnginesResult) -> None:
-    shown = page(damped)
-    assert shown.headline is not None
+    headline = page(damped).headline
+    assert headline is not None
     assert damped.odd is not None
-    assert damped.odd.side in shown.headline.lead
-    assert f"{np.degrees(damped.odd.gap):.3g}°" in shown.headline.lead
+    assert damped.odd.side in headline.lead
+    assert f"{np.degrees(damped.odd.gap):.3g}°" in headline.lead
 
 
 def test_the_table_has_as_many_columns_as_pairs(damped: EnginesResult) -> None:
     table = damped.to_dict()
     assert {len(column) for column in table.values()} == {3}
     assert table["largest"] == [gap.largest for gap in damped.gaps]
+
+
+def test_pairs_that_are_not_shown_are_counted(damped: EnginesResult) -> None:
+    many = replace(damped, gaps=damped.gaps * 5)
+    (told,) = re.findall(r"Further pairs, less far apart: (\d+)", shown(page(many)))
+    (table,) = (block for block in page(many).blocks if isinstance(block, Table))
+    assert int(told) + len(table.rows) == 15

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import pytest
 
 import statemachine as sm
@@ -124,6 +125,23 @@ def test_sensors_in_another_order_are_put_into_it(tmp_path: Path) -> None:
     assert [raw.joint("j").id, raw.site("t").id, raw.body("b").id] == [0, 1, 1]
     for name in ("sensor_adr", "sensor_dim", "sensor_type", "sensor_objid"):
         assert getattr(raw, name).tolist() == getattr(left, name).tolist()
+
+
+def test_sensors_in_another_order_are_found_by_the_engine_where_they_are(tmp_path: Path) -> None:
+    place = PLACE.format("s")
+    (found,) = sensor_differences(tmp_path, POSITION + place + SPEED, SPEED + POSITION + place)
+    raw = edited(compiled(tmp_path / "right.xml"), found.edits)
+    kind = mujoco.mjtObj.mjOBJ_SENSOR
+    assert [mujoco.mj_name2id(raw, kind, name) for name in ("p", "f", "v")] == [0, 1, 2]
+
+
+def test_the_numbers_of_a_sensor_are_paired_one_by_one(tmp_path: Path) -> None:
+    place = PLACE.format("s")
+    texts = SENSORS.format(place), SENSORS.format(POSITION + place)
+    left, right = (sm.load(written(tmp_path / f"{k}.xml", text)) for k, text in enumerate(texts))
+    room: Any = raw_engine_of("mujoco")
+    pairs = room.shown_elements(left.compiled, right.compiled, match_models(left, right))
+    assert pairs["sensordata"] == [(0, 1), (1, 2), (2, 3)]
 
 
 def test_an_order_among_other_sensors_is_refused(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -251,3 +252,26 @@ def test_no_fork_stays(tmp_path: Path, number: int) -> None:
     assert run.returncode == (130 if number == signal.SIGINT else -number)
     assert without_estimates(err.decode()).strip() == ""
     assert soon(lambda: not any(lives(int(each.stem)) for each in tmp_path.glob("*.pid")))
+
+
+@forks
+def test_a_run_that_is_made_again_here_may_be_ended_too() -> None:
+    """As by the end of a time limit, which `meanwhile` raises."""
+    here = os.getpid()
+    made_here: list[int] = []
+
+    def raises_in_a_fork() -> int:
+        if os.getpid() != here:
+            raise ValueError
+        made_here.append(1)
+        return 1
+
+    forks_there: list[bool] = []
+    in_forks(
+        [raises_in_a_fork],
+        1,
+        lambda _number, _result: None,
+        meanwhile=lambda: forks_there.append(bool(multiprocessing.active_children())),
+    )
+    assert made_here == [1]
+    assert forks_there[-1] is False  # asked once more, before the run that is made here

@@ -14,6 +14,7 @@ import pytest
 
 from statemachine import releases
 from statemachine.engines.mujoco import known_changes
+from statemachine.engines.mujoco.release_probes import kv_in_derivative
 from statemachine.engines.records import KnownChange
 from statemachine.errors import EngineWarning
 from statemachine.lab.compare.sides import Request, Side
@@ -209,3 +210,8 @@ def test_the_page_has_a_sentence_for_each(tmp_path: Path, old_releases: None) ->
     (items,) = blocks(page(result), Items)
     assert len(items.texts) == len(result.pairs[0].changes) == 1
     assert "servo" in items.texts[0]
+
+
+@pytest.mark.parametrize("integrator", ["implicit", "implicitfast"])
+def test_this_release_has_no_kv_of_a_servo_at_its_limit_in_its_derivative(integrator: str) -> None:
+    assert kv_in_derivative(integrator) == pytest.approx(0.0, abs=1e-9)

@@ -835,6 +835,29 @@ def test_a_program_and_a_diagram_stay_on_one_screen(figure: list[str]) -> None:
     assert ends[-1] == len(lines)
 
 
+def test_a_window_does_not_end_at_an_empty_line_of_a_program() -> None:
+    lines = ["text\n", "\n", "    first()\n", "\n", "    second()\n", "\n", "text\n"]
+    assert quiz.cuts(lines) == {3, 4}
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_the_prompt_names_the_last_of_the_letters(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prompts: list[str] = []
+    monkeypatch.setattr("builtins.input", lambda prompt: prompts.append(prompt) or "")
+    quiz.Reader().ask(Question("?", tuple("wxyz"[:count]), 0, ""))
+    assert [re.findall(r"a-(\w)", prompt) for prompt in prompts] == [["abcd"[count - 1]]]
+
+
+def test_who_types_something_where_enter_goes_on_is_told_so_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("builtins.input", Mock(side_effect=["what?", ""]))
+    quiz.Reader().go_on()
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
 def test_a_bar_of_progress_takes_nothing_of_what_is_printed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

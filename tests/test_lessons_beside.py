@@ -225,6 +225,16 @@ def test_what_a_slide_is_off_by_is_a_length(tmp_path: Path, pinocchio: None) -> 
     assert not any("°" in cell for cells in table.rows for cell in cells)
 
 
+@pytest.mark.parametrize("engines", [("mujoco",), ("mujoco", "pybullet")])
+def test_each_row_of_the_lines_has_a_cell_below_each_head(
+    step_result: StepLessonResult, engines: tuple[str, ...]
+) -> None:
+    run = LessonRun(result=step_result, code="", printed="", arm=True)
+    page = page_of_lesson(LESSONS["step"], dict.fromkeys(engines, run))
+    table = next(t for t in blocks(page, Table) if len(t.rows) > len(LINES))
+    assert {len(row) for row in table.rows} == {len(table.headers)}
+
+
 @pytest.mark.parametrize("lesson", ["step", "hold", "gravity"])
 def test_a_robot_without_servos_is_told_an_experiment_that_there_is(
     lesson: str, tmp_path: Path, pinocchio: None

@@ -21,8 +21,10 @@ from statemachine.course.lessons import _two_runs as two_runs
 from statemachine.course.lessons import energy
 from statemachine.course.lessons.hold import HoldResult
 from statemachine.course.lessons.replay import ReplayResult
-from statemachine.course.lessons.reset import KeyframeScene
+from statemachine.course.lessons.reset import KeyframeScene, ResetResult
+from statemachine.course.lessons.reset_page import ResetPage
 from statemachine.course.lessons.time import TimeResult, is_still
+from statemachine.engines.records import WayBack
 from statemachine.interface import Array
 from statemachine.lab.runs.interleaved_timing import Ratio, time_interleaved
 from statemachine.show.blocks import Table
@@ -170,6 +172,12 @@ def test_every_way_back_of_mujoco_is_exact(tmp_path: Path) -> None:
         "set_state twice": 0.0,
         "put back": 0.0,
     }
+
+
+def test_a_way_back_leads_to_the_same_future_or_is_off_by_its_difference() -> None:
+    ways = [WayBack("reset", 0.0), WayBack("put back", 0.0025)]
+    table = two_runs.through_us({"mujoco": ways}, WORDS)
+    assert [tuple(row) for row in table.rows] == [("reset", "same"), ("put_back", "off 2.5e-03")]
 
 
 def test_a_free_body_is_called_by_its_name_where_it_has_one(tmp_path: Path) -> None:
@@ -541,6 +549,21 @@ def test_where_the_joints_end_if_nothing_can_touch() -> None:
     ],
 )
 def test_a_body_is_held_by_the_robot_alone(more: dict[str, Any], is_held: bool) -> None:
+    assert scene_of(**more).held is is_held
+
+
+@pytest.mark.parametrize(("exact", "right"), [(("qpos", "time"), 2), (("qpos",), 0)])
+def test_the_time_after_a_reset_is_that_of_the_keyframe_or_zero(
+    exact: tuple[str, ...], right: int
+) -> None:
+    scenes = (scene_of(time=1.5, exact=exact),)
+    result = ResetResult((), True, True, 10, 0.1, False, scenes, ANYWHERE)
+    page = ResetPage(ANYWHERE, result, ANYWHERE, ANYWHERE, ANYWHERE)
+    assert page.right == right
+
+
+def scene_of(**more: Any) -> KeyframeScene:
+    """Return the scene of a box that a robot holds."""
     facts: dict[str, Any] = {
         "name": "k",
         "time": 0.0,
@@ -554,7 +577,7 @@ def test_a_body_is_held_by_the_robot_alone(more: dict[str, Any], is_held: bool) 
         "world_steps": 0,
         "rise": 0.0,
     }
-    assert KeyframeScene(**facts | more).held is is_held
+    return KeyframeScene(**facts | more)
 
 
 # Time.

@@ -94,6 +94,7 @@ def files_of(folder: Path) -> list[Path]:
         ("check", "expected one of FILE"),
         ("check --faults", "expected one argument"),
         ("compare hold --html", "--html PAGE.html"),
+        ("compare hold --frame gripperframe", "--models"),
         ("compare hold --html --no-why", "--html PAGE.html"),
         ("lessn", "Did you mean lesson?"),
         ("gravity", "Did you mean statemachine lesson gravity?"),

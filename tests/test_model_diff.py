@@ -27,6 +27,7 @@ from statemachine.lab.model_differences import (
     read,
 )
 from statemachine.lab.model_differences.agreement import digits_of
+from statemachine.lab.model_differences.subject_page import LackOfArmature, lack_of_armature
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 
@@ -35,6 +36,7 @@ from .support.explained import with_changes
 from .support.files import written, written_all
 from .support.motions import opened
 from .support.two_arms import mjcf, urdf
+from .support.two_files import compared_texts
 
 Pair = Callable[..., tuple[Path, Path]]
 
@@ -712,3 +714,31 @@ def test_the_floor_is_there_on_both_engines() -> None:
         (shape,) = _tree("so101/scene", engine).groups[0].shapes[:1]
         assert shape.kind == "plane", engine
         assert np.allclose(shape.place.mat[:, 2], [0, 0, 1])
+
+
+ROTOR = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0" {armature}/>
+<inertial mass="{mass}" pos="0 0 0" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>"""
+
+
+def test_what_lacks_a_rotor_is_so_many_times_as_fast(tmp_path: Path) -> None:
+    """Of 0.04 kg m² three quarters are the rotor's; another mass beside it has no part in that."""
+    left = ROTOR.format(armature='armature="0.03"', mass=1)
+    found = compared_texts(tmp_path, left, ROTOR.format(armature="", mass=2))
+    assert lack_of_armature(found.differences) == LackOfArmature("hinge", "4", "right")
+
+
+def test_a_rotor_that_both_have_is_no_lack_of_one(tmp_path: Path) -> None:
+    texts = (ROTOR.format(armature=f'armature="{each}"', mass=1) for each in (0.03, 0.04))
+    assert lack_of_armature(compared_texts(tmp_path, *texts).differences) is None
+
+
+SERVO = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/>
+<geom size=".1" pos=".2 0 0"/></body></worldbody>
+<actuator><position name="{name}" joint="hinge" kp="{kp}" kv="1"/></actuator></mujoco>"""
+
+
+def test_the_gain_of_a_servo_that_goes_by_two_names_is_compared(tmp_path: Path) -> None:
+    texts = SERVO.format(name="left_servo", kp=20), SERVO.format(name="right_servo", kp=40)
+    found = compared_texts(tmp_path, *texts)
+    gains = [(row.left, row.right) for row in found.differences if row.quantity == "kp"]
+    assert gains == [(20.0, 40.0)]

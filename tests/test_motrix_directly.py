@@ -116,3 +116,11 @@ def test_a_model_of_another_engine_has_no_data_of_it() -> None:
     model = sm.load("so101")
     with pytest.raises(TypeError):
         data_in(model, np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nu))
+
+
+def test_a_joint_has_its_place_in_the_interface_and_in_the_engine(
+    tmp_path: Path, motrix: Any
+) -> None:
+    model = sm.load(written(tmp_path / "cart.xml", CART.format(actuators="")), backend="motrix")
+    term = motrix.terms(model)[0]
+    assert (term.thing, term.ours, term.engine) == ("joint rail", "qpos[0]", "dof_pos[0]")

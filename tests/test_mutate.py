@@ -209,6 +209,19 @@ def test_a_case_of_each_test_comes_before_the_second_of_one(tmp_path: Path) -> N
     assert names == ["x[1]", "y"]
 
 
+@pytest.mark.parametrize("earlier", ["tests/test_a.py::last", "tests/test_b.py::of_another_line"])
+def test_the_test_that_noticed_a_fault_before_comes_first_whatever_it_takes(
+    tmp_path: Path, earlier: str
+) -> None:
+    seconds = {"tests/test_a.py::first": 1.0, "tests/test_a.py::last": 9.0}
+    contexts = {f"{test} (call)": 8 for test in seconds}
+    covered = _covered(tmp_path, contexts, seconds | {"tests/test_b.py::of_another_line": 9.0})
+    [site, *_] = [site for site in sites(_module(tmp_path), tmp_path) if 8 in site.lines]
+    assert covered.chosen(site, 2.5).tests == ("tests/test_a.py::first",)
+    assert covered.chosen(site, 2.5, earlier).tests[0] == earlier
+    assert covered.chosen(site, 2.5, "tests/test_a.py::gone").tests == ("tests/test_a.py::first",)
+
+
 @pytest.mark.parametrize(("context", "is_at_import"), [("", True), ("tests/t.py::x (call)", False)])
 def test_a_statement_that_no_test_runs_is_one_of_the_import(
     tmp_path: Path, context: str, is_at_import: bool

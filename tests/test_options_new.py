@@ -17,7 +17,7 @@ import pytest
 
 import statemachine as sm
 from statemachine import worlds
-from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
+from statemachine.errors import BadInputError, EngineWarning, ModelError, UnsupportedError
 
 from .support.backends import each_of_both
 from .support.claims import refused
@@ -241,3 +241,15 @@ def test_energies_are_those_of_the_changed_mass() -> None:
     models = [model.replace(mass=2 * model.body_mass) for model in on_both("so101")]
     found = [energies(model, "model", *rows)[0] for model in models]
     np.testing.assert_allclose(*found, rtol=1e-12)
+
+
+def test_energies_that_are_not_known_are_no_numbers_of_both_kinds() -> None:
+    from statemachine.lab.recordings.energies import energies
+
+    def cannot_be_read(_model: sm.Model) -> sm.Model:
+        raise ModelError("no file")
+
+    rows = np.zeros((3, 6)), np.zeros((3, 6))
+    joules, source = energies(sm.load("so101"), "model", *rows, load=cannot_be_read)
+    assert (joules.shape, source) == ((3, 2), "")
+    assert np.isnan(joules).all()

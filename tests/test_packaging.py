@@ -17,6 +17,8 @@ from .support.claims import assert_in
 from .support.project import makefile_text, project_table
 from .support.requirements import ROOT
 
+PIP = sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"
+
 
 def _run(*command: str | Path, cwd: Path) -> str:
     # Without what the surrounding checkout put into the environment.
@@ -37,8 +39,7 @@ def _run(*command: str | Path, cwd: Path) -> str:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wheel")
-    pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check")
-    _run(*pip, "wheel", "--no-deps", "--wheel-dir", folder, ROOT, cwd=folder)
+    _run(*PIP, "wheel", "--no-deps", "--wheel-dir", folder, ROOT, cwd=folder)
     (file,) = folder.glob("*.whl")
     return file
 
@@ -73,10 +74,12 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
 @pytest.mark.network
 def test_the_installed_wheel_runs_a_lesson_from_another_folder(wheel: Path, tmp_path: Path) -> None:
     home = tmp_path / "environment"
-    _run(sys.executable, "-m", "venv", home, cwd=tmp_path)
+    _run(sys.executable, "-m", "venv", "--without-pip", home, cwd=tmp_path)
     binaries = home / ("Scripts" if os.name == "nt" else "bin")
-    pip = (binaries / "python", "-m", "pip", "-q", "--disable-pip-version-check")
-    _run(*pip, "install", "-c", ROOT / "constraints.txt", wheel, cwd=tmp_path)
+    pip = (*PIP, "--python", binaries / "python")
+    # Only what the commands import is compiled, when they do.
+    install = "install", "--no-compile", "-c", ROOT / "constraints.txt", wheel
+    _run(*pip, *install, cwd=tmp_path)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     page = _run(binaries / "statemachine", "lesson", "gravity", cwd=elsewhere)

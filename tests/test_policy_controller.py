@@ -10,13 +10,14 @@ import pytest
 from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.interface import Array, Model
-from statemachine.lab.policy.command import Command
+from statemachine.lab.policy.command import Command, usual_commands
 from statemachine.lab.policy.walk import set_start, walked
 
 from .support.backends import BOTH
 from .support.policies import (
     SIZE,
     constant_network,
+    contract,
     linear_network,
     motors,
     node,
@@ -232,3 +233,20 @@ def test_motors_are_commanded_torques(tmp_path: Path) -> None:
     model = load(robot(tmp_path, motors()))
     policy = on_model(tmp_path, model, constant_network(tmp_path, [0.0, 0.0]), EXPLICIT)
     assert run(policy, 1).ctrl[0] == pytest.approx((20.0 * 0.2, 20.0 * 0.1))
+
+
+def test_the_height_of_a_walk_is_that_of_its_base(tmp_path: Path, model: Model) -> None:
+    """It stands 0.3 m high, and falls in these 0.1 s by at most g t² / 2."""
+    policy = on_model(tmp_path, model, constant_network(tmp_path, [0.0, 0.0]))
+    height = walked(policy, Command(0.5), 0.1).walk.height
+    assert height is not None
+    assert 0.25 < height <= 0.3
+
+
+@pytest.mark.parametrize(("most", "turn"), [(0.4, 0.24), (5.0, 0.5)])
+def test_a_policy_is_asked_to_turn_at_a_part_of_its_limit(
+    tmp_path: Path, most: float, turn: float
+) -> None:
+    limits = {"policy_io.commands.base_velocity.limit": {"wz": [-most, most]}}
+    straight, turning = usual_commands(contract(tmp_path, limits))
+    assert (straight.wz, turning.wz) == (0.0, pytest.approx(turn))

@@ -359,6 +359,22 @@ def test_what_is_asked_of_a_gap(
     assert gaps.run_gap(*pair, 0).shrinks is None
 
 
+def test_a_gap_that_is_there_is_looked_for_at_half_the_timestep(
+    pair: tuple[Model, Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    timesteps: set[float] = set()
+    places = {ENDS: 0.4, (True, True, False): 0.4, (True, False, True): 0.1}
+    run = runs_by_timestep(pair, places)
+
+    def noting(model: Model, *more: Any) -> tuple[np.ndarray, str]:
+        timesteps.add(model.timestep)
+        return run(model, *more)
+
+    monkeypatch.setattr(gaps, "run", noting)
+    gaps.run_gap(*pair, 0, halve=True)
+    assert timesteps == {pair[0].timestep, pair[0].timestep / 2}
+
+
 # What examines, and its table
 
 CODE: dict[str, Any] = {"end": "code", "code": 0, "how": "ended the process with code 0"}

@@ -14,6 +14,7 @@ from statemachine.course.grading.submissions import Submission
 from statemachine.errors import BadInputError
 
 from .support.claims import refused
+from .support.files import written
 
 
 def _file_of(folder: Path, text: str, files: tuple[str, ...]) -> dict[str, str]:
@@ -49,6 +50,17 @@ def test_a_header_is_no_student(tmp_path: Path, header: str) -> None:
 def test_without_a_header_the_names_are_what_looks_like_them(tmp_path: Path) -> None:
     text = "Müller,Jörg,41017,jmueller,jm@x.edu\nvan Dam,Eva-Marie,vd.py\n"
     assert list(_file_of(tmp_path, text, ())) == ["Müller Jörg", "van Dam Eva-Marie"]
+
+
+@pytest.mark.parametrize(("first", "is_told"), [("Klasse,Raum", True), ("Klasse 7b,Raum 3", False)])
+def test_a_first_row_of_whom_no_file_is_may_be_a_header_unless_it_has_digits(
+    tmp_path: Path, first: str, is_told: bool
+) -> None:
+    roster = written(tmp_path / "roster.csv", f"{first}\nMüller,Jörg\n")
+    submitted = [Submission("Jörg_Müller.py", tmp_path / "Jörg_Müller.py")]
+    with warnings.catch_warnings(record=True, action="always") as told:
+        enrolled(submitted, roster)
+    assert bool(told) is is_told
 
 
 def test_two_with_one_surname_have_their_own_files(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.engines.mujoco.differences import edited
 from statemachine.engines.records import ModelDifference
 from statemachine.interface import Array
 from statemachine.lab.compare.matching import match_models
@@ -259,3 +260,23 @@ def test_a_box_of_a_urdf_with_two_edges_exchanged_and_turned(tmp_path):
     written_all(tmp_path, {"left.urdf": left, "right.urdf": right})
     (row,) = compare(tmp_path / "left.urdf", tmp_path / "right.urdf").differences
     assert (row.quantity, row.size) == ("size", pytest.approx(0.0005))
+
+
+POINTED = """<mujoco><asset><mesh name="m" vertex="{vertex}"/></asset><worldbody>
+<body><freejoint/><geom name="g" type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+WEDGE = ("0 0 0", ".1 0 0", "0 .06 0", ".02 .01 .04", ".03 .05 .05")
+
+
+def test_a_mesh_that_is_copied_brings_its_convex_hull(tmp_path: Path) -> None:
+    """Whose faces go by the numbers of the vertices, which stand in another order there."""
+    other = (*WEDGE[::-1][:-1], "0 0 -.02")
+    texts = {"left.xml": POINTED, "right.xml": POINTED}
+    for name, vertices in (("left.xml", WEDGE), ("right.xml", other)):
+        texts[name] = texts[name].format(vertex=" ".join(vertices))
+    written_all(tmp_path, texts)
+    left, right = (sm.load(tmp_path / name) for name in texts)
+    found = differences_of(left, right, match_models(left, right))
+    edits = [edit for row in found for edit in row.edits]
+    hull = edited(right.compiled, edits).mesh_graph
+    assert right.compiled.mesh_graph.tolist() != left.compiled.mesh_graph.tolist()
+    assert hull.tolist() == left.compiled.mesh_graph.tolist()

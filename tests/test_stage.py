@@ -599,3 +599,21 @@ def test_what_is_to_come_is_paler_than_what_was(strips: list[np.ndarray]) -> Non
     dark = end < 200
     assert dark.any()
     assert 255 - middle[dark] == pytest.approx(0.4 * (255 - end[dark]), abs=2)
+
+
+def test_the_site_is_looked_at_from_25_times_its_gap_where_the_page_opens(
+    sides: tuple[sm.Model, Trace, Trace],
+) -> None:
+    model, left, _ = sides
+    look = drawing_of(model)
+
+    def distances(gap: float) -> tuple[float, float]:
+        apart = np.zeros_like(left["site_xpos"])
+        apart[2:, 0, 2] = gap
+        right = changed(left, site_xpos=left["site_xpos"] + apart)
+        data = scene_of(runs_of(left, right), [look, look], left.time[:4], start=2).data
+        assert data is not None
+        return data["near"], data["extent"]
+
+    _, extent = distances(0.0)
+    assert distances(0.02 * extent) == pytest.approx((0.5 * extent, extent))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -211,6 +212,17 @@ def test_a_run_that_grows_without_bound_is_reported(arm: sm.Model) -> None:
     stepper.qvel[:] = 1e150
     with pytest.raises(DivergedError), np.errstate(all="ignore"):
         stepper.step(100)
+
+
+def test_the_joint_that_diverged_is_named(tmp_path: Path) -> None:
+    """Nothing brakes a slide that is so fast that its position is no number after a step."""
+    unbraked = re.sub(r' (damping|frictionloss)="\S+"', "", LINKS)
+    stepper = Stepper(
+        _written(tmp_path, unbraked).replace(timestep=10.0), StepTerms(coriolis=False)
+    )
+    stepper.qvel[2] = 1e308
+    with pytest.raises(DivergedError, match=r"first at joint 2$"), np.errstate(all="ignore"):
+        stepper.step(1)
 
 
 REFUSED = {

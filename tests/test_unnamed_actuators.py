@@ -1,7 +1,8 @@
-"""Actuators that have no name and drive no joint: which of two files' are one."""
+"""Which actuators of two files are one: by their names, and where they have none."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -22,11 +23,18 @@ ACROSS = '<general site="tip" gear="0 1 0 0 0 0"/>'
 OF_THE_JOINT = '<motor joint="j"/>'
 
 
-def _pairs(folder: Path, left: str, right: str) -> tuple[tuple[int, int], ...]:
+def _motors(names: str) -> str:
+    """Return motors of the joint, each by its letter."""
+    return "".join(f'<motor name="{name}" joint="j"/>' for name in names)
+
+
+def _pairs(
+    folder: Path, left: str, right: str, names: Mapping[str, str] | None = None
+) -> tuple[tuple[int, int], ...]:
     need_engine("mujoco")
     one = sm.load(written(folder / "left.xml", ARM.format(mass=1.0, actuators=left)))
     two = sm.load(written(folder / "right.xml", ARM.format(mass=1.2, actuators=right)))
-    return match_models(one, two).actuators
+    return match_models(one, two, names).actuators
 
 
 @pytest.mark.parametrize(
@@ -42,6 +50,14 @@ def test_as_many_on_both_sides_are_paired_in_their_order(
     tmp_path: Path, left: str, right: str, pairs: tuple[tuple[int, int], ...]
 ) -> None:
     assert _pairs(tmp_path, left, right) == pairs
+
+
+def test_those_of_one_name_are_a_pair_whatever_joint_is_theirs(tmp_path: Path) -> None:
+    assert _pairs(tmp_path, _motors("abc"), _motors("bca")) == ((0, 2), (1, 0), (2, 1))
+
+
+def test_a_name_that_is_another_one_on_the_right_is_that_one(tmp_path: Path) -> None:
+    assert _pairs(tmp_path, _motors("ab"), _motors("xy"), {"a": "y"}) == ((0, 1), (1, 0))
 
 
 def test_where_one_side_has_more_none_is_taken_for_another(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -103,12 +104,28 @@ def test_mujoco_does_in_a_case_what_the_table_says(name: str) -> None:
         assert faults_of(run_case(CASES[name], variant)) == []
 
 
+# Of these the verdict, or the order, is that of the shortest timestep too.
+ALL_TIMESTEPS = {
+    *("bounce", "collision-restitution", "reaction-moving", "sliding-time"),
+    *("symmetric-body", "top-ball", "tumbling-energy"),
+}
+
+
+def results_of(backend: str) -> Iterator[CaseResult]:
+    """Yield what comes of each case, without its shortest timestep: half of all steps are its."""
+    for name, case in CASES.items():
+        timesteps = case.timesteps
+        if len(timesteps) > 2 and name not in ALL_TIMESTEPS:
+            timesteps = timesteps[:-1]
+        for variant in ways_of(backend):
+            yield run_case(case, variant, timesteps)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_an_engine_does_in_each_case_what_the_table_says(backend: str) -> None:
     need_engine(backend.partition(":")[0])
-    results = answer(ValidateRequest((backend,))).results
-    faults = {f"{row.name} on {row.way}": faults_of(row) for row in results}
+    faults = {f"{row.name} on {row.way}": faults_of(row) for row in results_of(backend)}
     assert {name: fault for name, fault in faults.items() if fault} == {}
 
 

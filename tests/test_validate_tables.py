@@ -614,3 +614,11 @@ def test_a_number_that_is_zero_at_a_sample_crosses_there() -> None:
 
 def test_the_largest_deviation_is_a_ratio_with_its_sign() -> None:
     assert largest_deviation(np.array([2.0, 1.4, 2.2]), 2.0) == pytest.approx(-0.3)
+
+
+def test_an_order_on_record_is_one_that_a_scheme_can_have() -> None:
+    records = [record for case in CASES.values() for record in case.expected.values()]
+    orders = [record.order for record in records if record.order is not None]
+    assert len(orders) > 30
+    assert min(orders) >= 0.5
+    assert max(orders) <= 5.0  # the energy of RK4

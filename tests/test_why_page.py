@@ -16,9 +16,10 @@ from statemachine.lab.why import Explanation, Share
 from statemachine.lab.why.answer_page import CauseSentence, sentence_of
 from statemachine.lab.why.apart_page import ApartSentence
 from statemachine.lab.why.changes_page import WhyChanges
+from statemachine.lab.why.locate import Localisation
 from statemachine.lab.why.page import WhyPage, page
 from statemachine.lab.why.rewriting import RewrittenFile
-from statemachine.lab.why.table_page import summary_table
+from statemachine.lab.why.table_page import is_noisy, summary_table
 from statemachine.measures.text import percent
 from statemachine.show.blocks import Code, Section, Table, Verdict
 from statemachine.show.first_screen import COLUMNS, LINES
@@ -84,6 +85,20 @@ def test_the_largest_shares_come_first_and_the_rest_is_counted_with_its_share(
     told = [getattr(row[3], "share", None) for row in table.rows]
     assert [abs(share or 0.0) for share in told[:3]] == pytest.approx(largest[:3])
     assert len(table.rows) == 4
+
+
+def test_what_was_localised_has_a_row_by_its_share(many: Explanation) -> None:
+    contacts = Localisation("contacts", "no contacts", None, 2.0, None, 0.0, False)
+    table = summary_table(replace(many, found_in=(contacts,)), 3)
+    assert [row[0] for row in table.rows].index("Contacts (localised)") == 0
+    assert table.rows[0][3] == percent(2.0)
+
+
+@pytest.mark.parametrize(("floor", "is_so"), [(0.05, False), (0.5, True)])
+def test_a_floor_is_spoken_of_above_a_hundredth_of_the_gap(
+    gains: Explanation, floor: float, is_so: bool
+) -> None:
+    assert is_noisy(replace(gains, gap=10.0, floor=floor)) is is_so
 
 
 def test_the_page_begins_with_the_verdict_and_ends_with_what_to_type(gains: Explanation) -> None:
@@ -198,6 +213,19 @@ def test_what_was_not_written_is_told_on_the_first_screen(gains: Explanation) ->
     assert_one_screen(result)
     assert "cause 0:" in shown(page(result))
     assert "cause 29" in shown(page(result, details=True))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("statemachine", "compare", "f.py:walk", "a.xml"),
+        ("statemachine", "compare", "f.py:walk", "--every", "10ms", "a.xml"),
+    ],
+)
+def test_a_command_has_one_period_and_all_its_other_words(words: tuple[str, ...]) -> None:
+    command = TypedCommand(words).calling_every("5ms")
+    assert command.words[-2:] == ("--every", "5ms")
+    assert command.words[:-2] == ("statemachine", "compare", "f.py:walk", "a.xml")
 
 
 @pytest.mark.parametrize("width", [10, 60])

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+import statemachine as sm
 from statemachine.engines.records import TURNED, DifferingQuantity
+from statemachine.lab.compare.matching import match_models
 from statemachine.lab.why import Share
+from statemachine.lab.why.causes import causes, differences_of
 from statemachine.lab.why.values_page import heading_of, sides_of, texts_of, wording_of
+from statemachine.lab.why.written import SourceLine, as_written
+
+from .support.files import written_all
+from .support.small_models import mjcf
 
 
 def _share(name: str, kind: str, *values: DifferingQuantity) -> Share:
@@ -61,3 +70,19 @@ def test_a_value_that_several_elements_have_alike_is_told_once():
 )
 def test_as_many_digits_as_it_takes_to_tell_two_values_apart(left, right, texts):
     assert texts_of(DifferingQuantity("x", left, right)) == texts
+
+
+PART = """<mujocoinclude>
+<body name="b"><joint name="j" axis="0 1 0" damping="{}"/><geom size=".1" pos=".1 0 0"/></body>
+</mujocoinclude>"""
+
+
+def test_what_stands_in_an_included_file_is_told_with_its_line_there(tmp_path: Path) -> None:
+    models = []
+    for side, damping in (("left", 0.1), ("right", 0.2)):
+        files = {"part.xml": PART.format(damping), "main.xml": mjcf('<include file="part.xml"/>')}
+        models.append(sm.load(written_all(tmp_path / side, files) / "main.xml"))
+    left, right = models
+    found = causes(differences_of(left, right, match_models(left, right)))
+    (cause,) = as_written(left.path, right.path, found)
+    assert cause.place == SourceLine("part.xml", 2)

@@ -580,3 +580,8 @@ def test_a_time_that_is_no_number_is_refused(model: sm.Model) -> None:
         many.step(worlds, ids=[0])
         many.reset(worlds)
         many.step(worlds)
+
+
+@pytest.mark.parametrize("verb", [many.step, many.forward, many.reset])
+def test_what_is_no_worlds_is_refused_by_its_kind(verb: Callable[[Any], object]) -> None:
+    refused((TypeError, "from make_worlds; got str", lambda: verb("so101")))

@@ -11,7 +11,7 @@ import shutil
 import sys
 import time
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, fields, replace
@@ -88,14 +88,18 @@ def read_tried(log: Path) -> list[Tried]:
     return [Tried(**json.loads(line)) for line in text.splitlines()]
 
 
-def _run(mutants: Sequence[Mutant], seconds: float) -> list[Row]:
+def _run(
+    mutants: Sequence[Mutant], seconds: float, earlier: Mapping[Mutant, str] | None = None
+) -> list[Row]:
     """Return every mutant with what became of it; those that an interrupt leaves are not tried.
 
     Args:
         mutants: The mutants.
         seconds: Processor time that the tests of each may take. One that survived tests of less
             time is tried again.
+        earlier: The test that noticed a mutant before.
     """
+    noticed_by = earlier or {}
     trees = [copy(f"tree{number}") for number in range(os.cpu_count() or 1)]
     folder = _measured(trees[0])
     standing = by_code(all_sites(trees[0]))
@@ -117,7 +121,7 @@ def _run(mutants: Sequence[Mutant], seconds: float) -> list[Row]:
                 known = Tried(str(mutant), "gone", "", seconds)
                 if site is not None:
                     with writing:
-                        chosen = covered.chosen(site, seconds)
+                        chosen = covered.chosen(site, seconds, noticed_by.get(mutant, ""))
                     place = free.get()
                     try:
                         result, test = place.outcome(site, chosen)
@@ -275,7 +279,9 @@ def main() -> int:
             write(_with_notes(rows, read()))
         return 0
     before = read()
-    now = _with_notes(_run([row.mutant for row in before], options.seconds), before)
+    noticed_by = {row.mutant: row.test for row in before}
+    mutants = [row.mutant for row in before]
+    now = _with_notes(_run(mutants, options.seconds, noticed_by), before)
     write(now)
     lost = [
         row

@@ -166,7 +166,7 @@ class Covered:
             count[file] += 1
         return sorted(tests, key=lambda test: (rounds[test], cost(test)))
 
-    def chosen(self, site: Site, seconds: float) -> Chosen:
+    def chosen(self, site: Site, seconds: float, earlier: str = "") -> Chosen:
         """Return the tests that run the statement of a mutant.
 
         The quickest of each file come first, then the second ones: what many tests run is noticed
@@ -175,9 +175,13 @@ class Covered:
         functions of its module, and what a fixture runs to all tests of its file. The fixtures of
         a file take their time once.
 
+        The test that noticed a fault before comes before all, whatever it takes: so no fault counts
+        as lost because other tests have come before it.
+
         Args:
             site: Where the mutant stands.
             seconds: How long they may take in all; the first is always there [s].
+            earlier: The test that noticed it before; "" for none.
         """
         by_line = self._contexts(site.mutant.file)
         lines = [line for line in site.lines if site.called] or list(by_line)
@@ -189,7 +193,10 @@ class Covered:
         rooms = set(site.mutant.file.removesuffix(".py").replace("/", "_").split("_")[1:])
         by_file: dict[str, list[str]] = {}  # in the order of the first of each
         left = seconds
-        for test in self._ordered(found & set(self._seconds), rooms):
+        ordered = self._ordered(found & set(self._seconds), rooms)
+        if earlier in self._seconds:
+            ordered = [earlier, *(test for test in ordered if test != earlier)]
+        for test in ordered:
             file = _file(test)
             fixtures = 0.0 if file in by_file else self._fixtures.get(file, 0.0)
             if not by_file or self._seconds[test] + fixtures < left:

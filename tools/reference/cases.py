@@ -31,8 +31,8 @@ _LESSONS = (
     *("nowhere", "objects", "state", "forward", "hold", "gravity", "reset", "replay", "time"),
     *("summary", "questions"),
 )
-# Without them the lesson looks how fast the machine is.
-_LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20")}
+# Without them the lesson looks how fast the machine is; what many worlds cost is no figure here.
+_LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20"), "objects": ("--most", "4")}
 # Of what takes steps of 0.1 ms: runs until after the first touch, and lessons of few steps.
 _SHORT = {"newton cradle": ("--seconds", "0.25")}
 _NOT_CONVERGED = {"manipulator", "cheetah"}  # a minute each, and four other robots are

@@ -94,7 +94,7 @@ class _Memory:
     """Residuals and Jacobians that SciPy asks for, and how often worlds were run for them."""
 
     def __init__(self, objective: Objective) -> None:
-        """Remember nothing yet.
+        """Begin with nothing known.
 
         Args:
             objective: What is made small.
@@ -180,9 +180,10 @@ def fit(
     low, high = parameters.low[free], parameters.high[free]
     margin = 1e-6 * (high - low)
     memory = _Memory(objective)
+    inside = np.clip(start[free], low + margin, high - margin)
     result = optimize.least_squares(
         memory.residuals,
-        np.clip(start[free], low + margin, high - margin),
+        inside,
         jac=memory.jacobian,
         bounds=(low, high),
         x_scale=objective.prior_deviations,
@@ -190,14 +191,14 @@ def fit(
         xtol=_LEAST_STEP,
         ftol=tolerance,
     )
-    rows = len(result.fun) - len(free)
-    scaled = np.asarray(result.fun[:rows]).reshape(-1, len(objective.deviation))
+    of_data = np.asarray(result.fun)[: -len(free)]
+    errors = of_data.reshape(-1, len(objective.deviation)) * objective.deviation
     return Fit(
         objective=objective,
         vector=objective.vector(np.asarray(result.x)),
         cost=float(result.cost),
         jacobian=np.asarray(result.jac),
-        errors=scaled * objective.deviation,
+        errors=errors,
         evaluations=memory.evaluations,
     )
 

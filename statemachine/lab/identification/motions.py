@@ -37,7 +37,7 @@ def motion_informations(fit: Fit) -> tuple[MotionInformation, ...]:
     objective = fit.objective
     parameters = objective.parameters
     frames = round(_SECONDS * _FPS)
-    middle, width = _middle_and_width(parameters, objective.simulation.action.mean(axis=0))
+    middle, width = middle_and_width(parameters, objective.simulation.action.mean(axis=0))
     informations: list[MotionInformation] = []
     for name, motion in MOTIONS.items():
         shape = motion(np.arange(frames) / _FPS, len(parameters.joints))
@@ -53,7 +53,7 @@ def motion_informations(fit: Fit) -> tuple[MotionInformation, ...]:
     return tuple(informations)
 
 
-def _middle_and_width(parameters: ArmParameters, usual: Array) -> tuple[Array, Array]:
+def middle_and_width(parameters: ArmParameters, usual: Array) -> tuple[Array, Array]:
     """Return where motions are centred (n,), and how far they go to each side (n,) [rad]."""
     model = parameters.model
     numbers = [model.joint_id(name) for name in parameters.joints]

@@ -131,25 +131,7 @@ class ArmParameters:
             servos.append(int(mine[0]))
         dof = np.array(model.jnt_dofadr)[numbers]
         servo = np.array(servos)
-        figures: dict[Kind, Array] = {
-            "kp": model.actuator_kp[servo],
-            "viscous": model.actuator_kv[servo] + model.dof_damping[dof],
-            "friction": model.dof_frictionloss[dof],
-            "armature": model.dof_armature[dof],
-            "offset": np.zeros(len(numbers)),
-        }
-        each: list[Parameter] = []
-        for kind in BY_JOINT:
-            for name, figure in zip(joints, figures[kind].tolist(), strict=True):
-                if kind in _FACTORS and not figure > 0.0:
-                    raise UnsupportedError(
-                        f"a fit changes figures of the model by factors, and joint {name} of "
-                        f"{model.path.name} has no {kind}: write a figure into its file",
-                        backend=model.backend,
-                        feature=kind,
-                        reason="model",
-                    )
-                each.append(Parameter(kind, name, figure))
+        each = _of_each_joint(model, joints, dof, servo)
         each += [Parameter("delay", None, 0.0), Parameter("payload", None, 0.0)]
         return cls(
             model=model,
@@ -228,6 +210,42 @@ class ArmParameters:
             "armature": armature,
             "mass": mass,
         }
+
+
+def _of_each_joint(model: Model, joints: Sequence[str], dof: Ints, servo: Ints) -> list[Parameter]:
+    """Return the parameters that each joint has.
+
+    Raises:
+        UnsupportedError: A figure that factors are to change is zero.
+    """
+    viscous = model.actuator_kv[servo] + model.dof_damping[dof]
+    kp, friction = model.actuator_kp[servo], model.dof_frictionloss[dof]
+    armature = model.dof_armature[dof]
+    figures: dict[Kind, Array] = {
+        "kp": kp,
+        "viscous": viscous,
+        "friction": friction,
+        "armature": armature,
+        "offset": np.zeros(len(joints)),
+    }
+    each: list[Parameter] = []
+    for kind in BY_JOINT:
+        for name, figure in zip(joints, figures[kind].tolist(), strict=True):
+            if kind in _FACTORS and not figure > 0.0:
+                raise _without(model, name, kind)
+            each.append(Parameter(kind, name, figure))
+    return each
+
+
+def _without(model: Model, joint: str, kind: Kind) -> UnsupportedError:
+    """Return the error of a figure that is zero, which no factor changes."""
+    return UnsupportedError(
+        f"a fit changes figures of the model by factors, and joint {joint} of "
+        f"{model.path.name} has no {kind}: write a figure into its file",
+        backend=model.backend,
+        feature=kind,
+        reason="model",
+    )
 
 
 def _payload_body(model: Model, joints: Sequence[int]) -> int:

@@ -74,6 +74,6 @@ def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str])
 
 def gap_of(simulation: ArmSimulation, vector: Array) -> float:
     """Return the root mean square over joints and frames of a vector's angles [rad]."""
-    angles = simulation.angles_of_each(vector[None])[0]
+    angles = simulation.angles(vector)
     errors = (angles - simulation.state)[simulation.first_frame :]
     return float(np.sqrt(np.square(errors).mean()))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...interface import Array
 from .motions import MotionInformation
+from .parameters import Parameter
 from .results import UNITS, FittedParameter, Reason
 from .starts import Fits
 
@@ -35,36 +37,70 @@ def fitted_parameters(
     agree = np.all((ends >= low) & (ends <= high), axis=0).tolist()
     low = np.maximum(np.minimum(low, ends.min(axis=0)), objective.parameters.low[objective.free])
     high = np.maximum(high, ends.max(axis=0))
-    told = deviations / prior
+    told = (deviations / prior).tolist()
     fitted: list[FittedParameter] = []
     for place, number in enumerate(objective.free.tolist()):
+        interval = _Interval(float(values[place]), float(low[place]), float(high[place]))
+        agrees = agree[place] and len(ends) >= _FEWEST_AS_GOOD
+        motion = "" if told[place] < _TELLS else _motion_for(place, fits, motions)
+        reasons = _reasons(told[place], fits, agrees, holds)
         parameter = objective.parameters.each[number]
-        reasons: list[Reason] = []
-        if told[place] >= _TELLS:
-            reasons.append("too little information")
-        if not fits.residuals.at_floor:
-            reasons.append("residual above the floor")
-        if not agree[place] or len(ends) < _FEWEST_AS_GOOD:
-            reasons.append("starts disagree")
-        if not holds:
-            reasons.append("does not hold elsewhere")
-        fitted.append(
-            FittedParameter(
-                kind=parameter.kind,
-                joint=parameter.joint,
-                cause=parameter.cause,
-                unit=UNITS[parameter.kind],
-                model=parameter.model,
-                fitted=parameter.figure(float(values[place])),
-                low=parameter.figure(float(low[place])),
-                high=parameter.figure(float(high[place])),
-                information=float(told[place]),
-                verdict="cannot tell" if reasons else "determined",
-                reasons=tuple(reasons),
-                motion=_motion_for(place, fits, motions) if told[place] >= _TELLS else "",
-            )
-        )
+        fitted.append(_verdict(parameter, interval, told[place], reasons, motion))
     return tuple(fitted)
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """An entry of the vector, and within what it is."""
+
+    value: float
+    low: float
+    high: float
+
+
+def _verdict(
+    parameter: Parameter,
+    interval: _Interval,
+    told: float,
+    reasons: tuple[Reason, ...],
+    motion: str,
+) -> FittedParameter:
+    """Return what is said of a parameter."""
+    return FittedParameter(
+        kind=parameter.kind,
+        joint=parameter.joint,
+        cause=parameter.cause,
+        unit=UNITS[parameter.kind],
+        model=parameter.model,
+        fitted=parameter.figure(interval.value),
+        low=parameter.figure(interval.low),
+        high=parameter.figure(interval.high),
+        information=told,
+        verdict="cannot tell" if reasons else "determined",
+        reasons=reasons,
+        motion=motion,
+    )
+
+
+def _reasons(told: float, fits: Fits, agrees: bool, holds: bool) -> tuple[Reason, ...]:
+    """Return why a parameter is not determined; empty where it is.
+
+    Args:
+        told: Its standard deviation after the fit, by that before it.
+        fits: From all starts.
+        agrees: Whether all starts that fit as well as the best have it within its interval.
+        holds: Whether the best fit holds on what was not fitted.
+    """
+    reasons: list[Reason] = []
+    if told >= _TELLS:
+        reasons.append("too little information")
+    if not fits.residuals.at_floor:
+        reasons.append("residual above the floor")
+    if not agrees:
+        reasons.append("starts disagree")
+    if not holds:
+        reasons.append("does not hold elsewhere")
+    return tuple(reasons)
 
 
 def _motion_for(place: int, fits: Fits, motions: Sequence[MotionInformation]) -> str:

@@ -1,0 +1,295 @@
+"""A fit of an arm to a recording whose truth is known: what it finds, and how sure it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from statemachine.lab.identification.fit import fit, starting_points
+from statemachine.lab.identification.hypotheses import tried_hypotheses
+from statemachine.lab.identification.identify import fitted_model
+from statemachine.lab.identification.motions import MOTIONS, middle_and_width, motion_informations
+from statemachine.lab.identification.parameters import ArmParameters
+from statemachine.lab.identification.residuals import Residuals
+from statemachine.lab.identification.shares import cause_shares, gap_of
+from statemachine.lab.identification.simulation import ArmSimulation
+from statemachine.lab.identification.starts import Fits, fits_from_starts
+from statemachine.lab.identification.verdicts import fitted_parameters
+from tests.support.arm_fits import (
+    COUNT,
+    SOFT,
+    arm_parameters,
+    objective_of,
+    recording_of,
+    swings,
+    vector,
+)
+
+pytest.importorskip("scipy")
+NOISE = 0.6 * COUNT
+TRUE = {"kp": SOFT, "delay": 0.045}
+
+
+@pytest.fixture(scope="module")
+def parameters() -> ArmParameters:
+    return arm_parameters()
+
+
+@pytest.fixture(scope="module")
+def true(parameters):
+    return vector(parameters, TRUE)
+
+
+@pytest.fixture(scope="module")
+def recording(parameters, true):
+    return recording_of(parameters, swings(parameters, 2.0), true, NOISE)
+
+
+@pytest.fixture(scope="module")
+def objective(parameters, recording):
+    return objective_of(parameters, recording, ("kp", "delay"), NOISE)
+
+
+@pytest.fixture(scope="module")
+def fits(objective) -> Fits:
+    return fits_from_starts(objective, starts=3, seed=0)
+
+
+# The fit.
+
+
+def test_gains_and_delay_are_found(fits, true):
+    assert fits.best.vector[:6] == pytest.approx(true[:6], abs=0.15)
+    assert fits.best.vector[-2] == pytest.approx(true[-2], abs=0.002)
+
+
+def test_what_is_not_fitted_stays_as_the_model_has_it(fits, parameters):
+    held = np.setdiff1d(np.arange(len(parameters)), fits.best.objective.free)
+    assert not fits.best.vector[held].any()
+
+
+def test_the_covariance_is_that_of_the_errors_that_are_made(fits, true):
+    free = fits.best.objective.free
+    off = (fits.best.vector - true)[free] / np.sqrt(np.diag(fits.covariance))
+    assert np.sqrt(np.square(off).mean()) < 2.5
+
+
+def test_starts_from_elsewhere_end_at_the_same_place(fits):
+    ends = np.array([each.vector for each in fits.as_good])
+    assert len(ends) >= 2
+    assert np.ptp(ends, axis=0).max() < 0.05
+
+
+def test_the_best_fit_comes_first(fits):
+    costs = [each.cost for each in fits.each]
+    assert costs == sorted(costs)
+
+
+def test_the_same_seed_gives_the_same_fit(objective):
+    ends = [fit(objective, point).vector for point in starting_points(objective, 1, 5) * 2]
+    assert np.array_equal(ends[0], ends[1])
+
+
+def test_starting_points_are_those_that_fit_least_badly(objective):
+    few, more = starting_points(objective, 2, 0), starting_points(objective, 2, 1)
+    assert not np.array_equal(few[0], more[0])
+    costs = []
+    for point in few:
+        angles = objective.simulation.angles_of_each(point[None])[0]
+        costs.append(np.square(objective.residuals(point[objective.free], angles)).sum())
+    assert costs == sorted(costs)
+
+
+def test_a_fit_weighed_as_it_was_is_the_same(fits):
+    again = fits.best.weighed(fits.best.objective)
+    assert again.cost == pytest.approx(fits.best.cost)
+    assert again.jacobian == pytest.approx(fits.best.jacobian)
+
+
+def test_half_the_noise_weighs_four_times(fits):
+    best = fits.best
+    half = replace(best.objective, deviation=best.objective.deviation / 2)
+    prior = (
+        0.5 * np.square(best.vector[best.objective.free] / best.objective.prior_deviations).sum()
+    )
+    assert best.weighed(half).cost - prior == pytest.approx(4 * (best.cost - prior), rel=1e-6)
+
+
+def test_the_jacobian_is_how_residuals_change(objective, true):
+    values = true[objective.free]
+    jacobian = objective.jacobian(values)
+    step = np.zeros(len(values))
+    step[1] = 0.01
+    ends = []
+    for place in (values - step, values + step):
+        angles = objective.simulation.angles_of_each(objective.vector(place)[None])[0]
+        ends.append(objective.residuals(place, angles))
+    slope = (ends[1] - ends[0]) / 0.02
+    assert jacobian[:, 1] == pytest.approx(slope, abs=0.02 * np.abs(slope).max())
+
+
+# What is left.
+
+
+def test_noise_alone_is_at_the_floor(fits):
+    assert fits.residuals.at_floor
+    assert fits.residuals.floor == pytest.approx(NOISE, rel=0.1)
+
+
+def test_a_slow_error_of_the_model_is_above_the_floor(recording):
+    random = np.random.default_rng(0)
+    noise = random.normal(0.0, NOISE, recording.state.shape)
+    slow = 2 * NOISE * np.sin(np.arange(len(noise)) / 10)[:, None]
+    assert Residuals.of(noise, recording).at_floor
+    assert not Residuals.of(noise + slow, recording).at_floor
+
+
+def test_an_error_that_changes_from_frame_to_frame_is_no_noise_where_it_is_large(recording):
+    errors = np.random.default_rng(0).normal(0.0, 0.1, recording.state.shape)
+    assert not Residuals.of(errors, recording).at_floor
+
+
+def test_angles_that_are_no_numbers_are_never_at_the_floor(recording):
+    assert not Residuals.of(np.full(recording.state.shape, np.nan), recording).at_floor
+
+
+def test_a_still_joint_may_be_off_by_less_than_a_count(recording):
+    still = replace(recording, state=np.zeros_like(recording.state))
+    assert Residuals.of(np.full(still.state.shape, 0.6 * COUNT), still).at_floor
+    assert not Residuals.of(np.full(still.state.shape, 1.5 * COUNT), still).at_floor
+
+
+# What is said of each parameter.
+
+
+def test_what_is_told_holds_and_agrees_is_determined(fits):
+    verdicts = {each.kind: each.verdict for each in fitted_parameters(fits, True, ())}
+    assert verdicts["delay"] == "determined"
+
+
+def test_nothing_is_determined_that_does_not_hold_elsewhere(fits):
+    said = fitted_parameters(fits, False, ())
+    assert {each.verdict for each in said} == {"cannot tell"}
+    assert all("does not hold elsewhere" in each.reasons for each in said)
+
+
+def test_nothing_is_determined_where_more_than_noise_is_left(fits):
+    left = replace(fits.residuals, rms=2 * fits.residuals.rms)
+    said = fitted_parameters(replace(fits, residuals=left), True, ())
+    assert all("residual above the floor" in each.reasons for each in said)
+
+
+def test_nothing_is_determined_by_one_start_alone(fits):
+    said = fitted_parameters(replace(fits, each=fits.each[:1]), True, ())
+    assert all("starts disagree" in each.reasons for each in said)
+
+
+def test_a_start_as_good_and_elsewhere_is_no_agreement(fits):
+    elsewhere = fits.best.vector.copy()
+    elsewhere[0] += 1.0
+    other = replace(fits.best, vector=elsewhere)
+    said = fitted_parameters(replace(fits, each=(fits.best, other, fits.best)), True, ())
+    assert "starts disagree" in said[0].reasons
+    assert "starts disagree" not in said[1].reasons
+
+
+def test_the_interval_reaches_to_a_start_that_is_as_good(fits):
+    elsewhere = fits.best.vector.copy()
+    elsewhere[0] += 1.0
+    other = replace(fits.best, vector=elsewhere)
+    said = fitted_parameters(replace(fits, each=(fits.best, other, fits.best)), True, ())
+    assert said[0].high == pytest.approx(said[0].fitted * np.e)
+
+
+def test_of_a_vertical_axis_the_offset_is_not_told(parameters, recording):
+    objective = objective_of(parameters, recording, ("kp", "delay", "offset"), NOISE)
+    best = fit(objective, vector(parameters, TRUE))
+    residuals = Residuals.of(best.errors, recording)
+    said = fitted_parameters(Fits((best, best, best), residuals), True, ())
+    of_pan = next(each for each in said if each.kind == "offset" and each.joint == "shoulder_pan")
+    assert of_pan.information == pytest.approx(1.0, abs=0.01)
+    assert of_pan.reasons == ("too little information",)
+
+
+# What other motions would tell.
+
+
+def test_each_motion_adds_information(fits):
+    for motion in motion_informations(fits.best):
+        assert np.linalg.eigvalsh(motion.information).min() > 0.0
+
+
+def test_motions_stay_within_the_joints_ranges(parameters, fits):
+    low, high = np.array(parameters.model.jnt_range).T
+    middle, width = middle_and_width(parameters, np.zeros(6))
+    assert (middle - width > low).all()
+    assert (middle + width < high).all()
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_a_motion_goes_no_further_than_its_width(name):
+    shape = MOTIONS[name](np.arange(300) / 30.0, 6)
+    assert shape.shape == (300, 6)
+    assert np.abs(shape).max() <= 1.0
+
+
+# Causes.
+
+
+@pytest.fixture(scope="module")
+def shares(fits, parameters, recording):
+    return {
+        each.cause: each for each in cause_shares(fits, ArmSimulation.of(parameters, recording))
+    }
+
+
+@pytest.mark.slow
+def test_delay_and_gains_stand_in_for_each_other(shares):
+    assert shares["gains"].alone + shares["delay"].alone > 1.1
+    assert shares["gains"].share + shares["delay"].share > 0.9
+
+
+@pytest.mark.slow
+def test_shares_add_up_to_what_all_take_away(shares):
+    assert 0.95 < sum(each.share for each in shares.values()) <= 1.0
+
+
+def test_the_gap_of_the_truth_is_its_noise(parameters, recording, true):
+    gap = gap_of(ArmSimulation.of(parameters, recording), true)
+    assert gap == pytest.approx(NOISE, rel=0.2)
+
+
+# Other readings.
+
+
+def test_no_sign_is_tried_where_only_noise_is_left(fits):
+    assert tried_hypotheses(fits, saturated=0.0) == ()
+
+
+@pytest.mark.slow
+def test_the_other_sign_of_a_lifting_joint_fits_better_where_it_is_the_true_one(
+    parameters, recording
+):
+    turned = np.array([1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    wrong = replace(recording, action=recording.action * turned, state=recording.state * turned)
+    objective = objective_of(parameters, wrong, ("kp", "delay", "payload"), NOISE)
+    found = fits_from_starts(objective, starts=2, seed=0)
+    verdicts = {each.name: each.verdict for each in tried_hypotheses(found, saturated=0.0)}
+    assert verdicts["the other sign of shoulder_lift"] == "fits better"
+    assert verdicts["the other sign of elbow_flex"] != "fits better"
+
+
+def test_where_viscous_friction_acts_is_tried_at_the_force_limit(fits):
+    (tried,) = tried_hypotheses(fits, saturated=0.5)
+    assert "viscous" in tried.name
+
+
+# The fitted model.
+
+
+def test_the_fitted_model_has_the_fitted_gains(fits, parameters):
+    model = fitted_model(parameters, fits.best.vector)
+    expected = parameters.model.actuator_kp * np.exp(fits.best.vector[:6])
+    assert model.actuator_kp == pytest.approx(expected)
