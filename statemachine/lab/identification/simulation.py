@@ -22,7 +22,6 @@ from ..recordings.arm_recording import ArmRecording
 from .parameters import ArmParameters
 
 COUNTS = 4096  # of a turn of the servos (Feetech STS3215)
-_STABLE = 1.2  # rate of a servo by that of steps, below which half of them do for derivatives
 _STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
@@ -98,43 +97,33 @@ class ArmSimulation:
     def _moving_at_first(self) -> Array:
         """Tell of each joint (n,) whether it moves in the first frames."""
         first = self.state[:_FIRST_FRAMES]
-        return np.ptp(first, axis=0) > _REST * self.recording.resolution
+        half = len(first) // 2
+        moved = np.abs(first[half:].mean(axis=0) - first[:half].mean(axis=0))
+        return moved > _REST * self.recording.resolution
 
     def angles(self, vector: Array) -> Array:
         """Return the angles (K, n) that would be measured [rad], without the error of a step.
 
         NaN where the simulation diverges.
         """
-        once = self._played(vector[None], self._steps)[0]
-        return 2.0 * self._played(vector[None], 2 * self._steps)[0] - once
+        return self.angles_of_each(vector[None])[0]
 
-    def angles_of_each(self, vectors: Array) -> Array:
+    def angles_of_each(self, vectors: Array, with_error: bool = False) -> Array:
         """Return the angles (W, K, n) for each of several vectors (W, P).
 
-        They have the error of a step, which hardly matters for differences.
+        Args:
+            vectors: Of the parameters.
+            with_error: Whether the error of a step stays in them, which takes a third of the time:
+                enough for the way to a fit, and not for what is said of it.
         """
-        half = self._steps // 2
-        rate = self.recording.fps * half
-        is_stable = half > 0 and self._fastest_rate(vectors) < _STABLE * rate
-        return self._played(vectors, half if is_stable else self._steps)
+        once = self._played(vectors, self._steps)
+        return once if with_error else 2.0 * self._played(vectors, 2 * self._steps) - once
 
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
         limits = self.parameters.model.actuator_forcerange[self.parameters.servo]
         forces = np.abs(self._forces(vector))
         return np.mean(forces >= 0.999 * limits[:, 1], axis=0)
-
-    def _fastest_rate(self, vectors: Array) -> float:
-        """Return the fastest rate at which a servo moves its armature alone [1/s].
-
-        The links add to that inertia, so it is a bound.
-        """
-        parameters = self.parameters
-        figures = parameters.options(vectors)
-        inertia = figures["armature"][:, parameters.dof]
-        spring = np.sqrt(figures["kp"][:, parameters.servo] / inertia)
-        viscous = figures["kv"][:, parameters.servo] / inertia
-        return float(np.maximum(spring, viscous).max())
 
     @property
     def _steps(self) -> int:
