@@ -15,7 +15,12 @@ from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.residuals import Residuals
 from statemachine.lab.identification.shares import cause_shares, gap_of
 from statemachine.lab.identification.simulation import ArmSimulation
-from statemachine.lab.identification.starts import Fits, fits_from_starts
+from statemachine.lab.identification.starts import (
+    Fits,
+    fits_from_starts,
+    informations_beside,
+    least_certain,
+)
 from statemachine.lab.identification.verdicts import fitted_parameters
 from tests.support.arm_fits import (
     COUNT,
@@ -102,9 +107,9 @@ def test_what_is_not_fitted_stays_as_the_model_has_it(fits, parameters):
     assert not fits.best.vector[held].any()
 
 
-def test_the_covariance_is_that_of_the_errors_that_are_made(fits, true):
+def test_the_deviations_are_those_of_the_errors_that_are_made(fits, true):
     free = fits.best.objective.free
-    off = (fits.best.vector - true)[free] / np.sqrt(np.diag(fits.covariance))
+    off = (fits.best.vector - true)[free] / fits.deviations
     assert np.sqrt(np.square(off).mean()) < 2.5
 
 
@@ -243,6 +248,23 @@ def test_of_a_vertical_axis_the_offset_is_not_told(parameters, recording):
     of_pan = next(each for each in said if each.kind == "offset" and each.joint == "shoulder_pan")
     assert of_pan.information == pytest.approx(1.0, abs=0.01)
     assert of_pan.reasons == ("too little information",)
+
+
+def test_what_only_the_force_limit_tells_is_not_told_of_a_weaker_arm(parameters):
+    # Gains, friction and armature of the gripper have a common scale, which only shows where its
+    # servo reaches the limit of its force: here it does, and with three quarters of it not.
+    at_limit = vector(parameters, {"kp": SOFT, "viscous": -0.8})
+    at_limit[[5, 11, 17, 23]] += 0.9
+    recording = recording_of(parameters, swings(parameters, 2.0, rate=1.0), at_limit)
+    kinds = ("kp", "viscous", "friction", "armature")
+    best = fit(objective_of(parameters, recording, kinds, NOISE), at_limit)
+    residuals = Residuals.of(best.errors, recording)
+    prior = best.objective.prior_deviations
+    assert least_certain([best.information], prior)[5] < 0.1
+    fits = Fits((best, best, best), residuals, informations_beside(best))
+    assert fits.deviations[5] > 0.3
+    said = fitted_parameters(fits, True, ())
+    assert said[5].high > 1.5 * said[5].fitted
 
 
 # What other motions would tell.

@@ -63,7 +63,9 @@ def test_the_model_of_the_fit_has_its_gains(shipped):
 
 @pytest.fixture(scope="module")
 def by_hand(tmp_path_factory) -> ScoredRecording:
-    return _scored(tmp_path_factory.mktemp("hand"), Plan("hand-7", motion="hand", seed=7, seconds=7.0))
+    return _scored(
+        tmp_path_factory.mktemp("hand"), Plan("hand-7", motion="hand", seed=7, seconds=7.0)
+    )
 
 
 def test_what_a_hand_like_motion_determines_is_true(by_hand):

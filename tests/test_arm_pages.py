@@ -191,8 +191,14 @@ def test_what_is_not_determined_of_such_a_joint_is_a_question_mark(
         fitted.parameters,
         lambda p: p.verdict == "determined" and (p.kind, p.joint) != ("kp", "elbow_flex"),
     )
-    table = content(replace(fitted, parameters=parameters)).by_joint
-    assert table.rows[1][:2] == ["elbow_flex", "?"]
+    part = content(replace(fitted, parameters=parameters))
+    assert part.by_joint.rows[1][:2] == ["elbow_flex", "?"]
+    assert part.mark == " (?)"
+
+
+def test_a_table_without_a_question_mark_needs_no_key_to_it(fitted: IdentificationResult) -> None:
+    assert content(fitted).undetermined
+    assert content(fitted).mark == ""
 
 
 def test_delay_and_payload_are_told_in_the_units_that_people_use(

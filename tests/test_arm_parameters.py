@@ -92,10 +92,17 @@ def test_an_unknown_joint_is_refused(parameters):
         ArmParameters.of(parameters.model, ["shoulder_pan", "hip"])
 
 
-def test_a_joint_without_friction_is_refused(parameters):
+def test_a_joint_without_friction_is_not_fitted(parameters):
     smooth = parameters.model.replace(frictionloss=0.0)
     with pytest.raises(UnsupportedError, match="has no friction"):
-        ArmParameters.of(smooth, smooth.joint_names)
+        ArmParameters.of(smooth, smooth.joint_names).check_factors()
+
+
+def test_the_figures_of_a_joint_without_friction_stay_as_they_are(parameters):
+    smooth = parameters.model.replace(frictionloss=0.0)
+    options = ArmParameters.of(smooth, smooth.joint_names).options(np.zeros((1, len(parameters))))
+    assert options["frictionloss"].tolist() == [[0.0] * 6]
+    assert options["kp"].tolist() == [smooth.actuator_kp.tolist()]
 
 
 def test_a_joint_without_a_servo_is_refused(tmp_path):

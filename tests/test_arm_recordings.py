@@ -393,6 +393,16 @@ def test_a_number_that_is_not_finite_is_named(
         recordings(source, arm)
 
 
+def test_a_command_of_more_than_a_turn_is_refused(arm: sm.Model, tmp_path: Path) -> None:
+    made = data_set(DEGREES)
+    first = made.episodes[0]
+    far = np.array(first.action)
+    far[17, 2] = 2048.0
+    source = written(tmp_path, replace(made, episodes=[replace(first, action=far)]))
+    with pytest.raises(BadInputError, match="action of elbow_flex is 2048 in frame 17"):
+        recordings(source, arm)
+
+
 def test_too_few_frames_are_refused(arm: sm.Model, tmp_path: Path) -> None:
     source = written(tmp_path, data_set(DEGREES, frames=29))
     with pytest.raises(BadInputError, match="has 29 frames; at least 30 are needed"):

@@ -75,6 +75,11 @@ def test_an_option_of_runs_is_refused(name: str) -> None:
         asked(RECORDING, "so101", flag, WORDS[name])
 
 
+def test_models_without_a_word_behind_it_is_refused() -> None:
+    with pytest.raises(BadInputError, match="^--models does not go with a recording"):
+        asked(RECORDING, "so101", "--models")
+
+
 @pytest.mark.parametrize("name", SWITCHES)
 def test_a_switch_of_runs_is_refused(name: str) -> None:
     flag = f"--{name.replace('_', '-')}"

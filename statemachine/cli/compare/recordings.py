@@ -27,6 +27,7 @@ OPTIONS_OF_RECORDINGS = frozenset(
     {"what", "calibration", "why", "html", "write", "json", "details", "seconds", "seed", "map"}
     | {"menagerie", "trust_binary", "help", "help_all", "run"}
 )
+_NOT_OF_RECORDINGS = "{} does not go with a recording of an arm"
 _EXAMPLE = f"{PROGRAM} compare lerobot:DIR#3 so101"
 
 
@@ -47,7 +48,9 @@ def recording_request_of(options: argparse.Namespace) -> RecordingRequest:
     from ...lab.identification.results import RecordingRequest
 
     others = [name for name in vars(options) if name not in OPTIONS_OF_RECORDINGS]
-    refuse_options(options, others, "{} does not go with a recording of an arm")
+    refuse_options(options, others, _NOT_OF_RECORDINGS)
+    if options.models is not None:  # without a word of its own, too
+        raise BadInputError(_NOT_OF_RECORDINGS.format("--models"))
     if is_given(options, "write") and not options.why:
         raise BadInputError("--write goes with --why: it writes the figures that are fitted")
     return RecordingRequest(

@@ -135,8 +135,8 @@ class IdentificationPage(PageContent):
 
     @property
     def mark(self) -> str:
-        """Return how that table marks what cannot be told; "" where the table is empty."""
-        return f" ({UNKNOWN})" if self.by_joint.rows else ""
+        """Return how that table marks what cannot be told; "" where it has no such cell."""
+        return f" ({UNKNOWN})" if any(UNKNOWN in row for row in self.by_joint.rows) else ""
 
     @property
     def of_arm(self) -> list[str]:

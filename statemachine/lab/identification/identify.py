@@ -64,9 +64,11 @@ def fitted_arm(asked: Asked, starts: int, seed: int, progress: Progress = no_pro
 
     Raises:
         MissingEngineError: The extra `recordings` is not installed.
+        UnsupportedError: The model has a figure of zero, which no factor changes.
         DivergedError: The simulation diverges with the figures of the model.
     """
     parameters = asked.parameters
+    parameters.check_factors()
     fitted_part, elsewhere, first = _parts(asked.recordings)
     objective = Objective(
         simulation=ArmSimulation.of(parameters, fitted_part),

@@ -112,8 +112,7 @@ class ArmParameters:
         """Return the parameters of these joints.
 
         Raises:
-            UnsupportedError: A joint has no position servo, no friction or no armature: nothing
-                that a factor could change.
+            UnsupportedError: A joint has no position servo.
             UnknownNameError: There is no such joint.
         """
         numbers = [model.joint_id(name) for name in joints]
@@ -145,6 +144,16 @@ class ArmParameters:
 
     def __len__(self) -> int:
         return len(self.each)
+
+    def check_factors(self) -> None:
+        """Refuse to fit a figure that is zero, which no factor changes.
+
+        Raises:
+            UnsupportedError: A joint has no gain, no friction or no armature.
+        """
+        for parameter in self.each:
+            if parameter.is_factor and not parameter.model > 0.0:
+                raise _without(self.model, parameter.joint or "", parameter.kind)
 
     @property
     def deviations(self) -> Array:
@@ -213,11 +222,7 @@ class ArmParameters:
 
 
 def _of_each_joint(model: Model, joints: Sequence[str], dof: Ints, servo: Ints) -> list[Parameter]:
-    """Return the parameters that each joint has.
-
-    Raises:
-        UnsupportedError: A figure that factors are to change is zero.
-    """
+    """Return the parameters that each joint has."""
     viscous = model.actuator_kv[servo] + model.dof_damping[dof]
     kp, friction = model.actuator_kp[servo], model.dof_frictionloss[dof]
     armature = model.dof_armature[dof]
@@ -231,8 +236,6 @@ def _of_each_joint(model: Model, joints: Sequence[str], dof: Ints, servo: Ints) 
     each: list[Parameter] = []
     for kind in BY_JOINT:
         for name, figure in zip(joints, figures[kind].tolist(), strict=True):
-            if kind in _FACTORS and not figure > 0.0:
-                raise _without(model, name, kind)
             each.append(Parameter(kind, name, figure))
     return each
 

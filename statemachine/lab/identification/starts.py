@@ -16,6 +16,7 @@ _AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
 _NEAR_THE_END = 1e-3  # of the sum of squares, where a start waits for the best one
 _NEARLY_AS_GOOD = 30.0  # half the sum of squares: such a start may still become as good
 _FIRST_NOISE = 0.6  # counts: taken for the noise before any residual is known
+_WEAKER = (0.15, 0.3)  # logarithms of the factors by which an arm is taken to be weaker
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +26,12 @@ class Fits:
     Attributes:
         each: At least one; `cost` of each is by the noise that the best one leaves.
         residuals: Of the best one.
+        beside: Fisher informations (free, free) of arms that are weaker than the best fit.
     """
 
     each: tuple[Fit, ...]
     residuals: Residuals
+    beside: tuple[Array, ...] = ()
 
     @property
     def best(self) -> Fit:
@@ -41,16 +44,51 @@ class Fits:
         return tuple(each for each in self.each if each.cost - self.best.cost < _AS_GOOD)
 
     @property
-    def covariance(self) -> Array:
-        """Return the covariance (free, free) of what was fitted, with the prior.
+    def informations(self) -> tuple[Array, ...]:
+        """Return the Fisher informations (free, free), without the prior: of the best fit first."""
+        return (self.best.information, *self.beside)
 
-        By the noise of each joint; where more than noise is left, by so much more.
+    @property
+    def deviations(self) -> Array:
+        """Return the standard deviations (free,) of what was fitted, with the prior.
+
+        By the noise of each joint; where more than noise is left, by so much more. Of the best fit
+        or of an arm beside it, whichever tells less.
         """
         left = self.residuals.rms / np.minimum(self.residuals.noise, self.residuals.most)
         more = max(1.0, float(np.sqrt(np.square(left).mean())))
-        precision = 1.0 / np.square(self.best.objective.prior_deviations)
-        information = self.best.information / more**2 + np.diag(precision)
-        return np.asarray(np.linalg.inv(information), np.float64)
+        prior = self.best.objective.prior_deviations
+        return least_certain([each / more**2 for each in self.informations], prior)
+
+
+def least_certain(informations: Sequence[Array], prior: Array) -> Array:
+    """Return the largest standard deviations (free,) that any of some informations leaves.
+
+    Args:
+        informations: (free, free) each, without the prior.
+        prior: (free,) standard deviations of the prior.
+    """
+    precision = np.diag(1.0 / np.square(prior))
+    each = [np.sqrt(np.diag(np.linalg.inv(one + precision))) for one in informations]
+    return np.max(each, axis=0)
+
+
+def informations_beside(best: Fit) -> tuple[Array, ...]:
+    """Return the Fisher informations (free, free) of arms that are weaker than the best fit.
+
+    A fit may end where a servo just reaches its force limit: beyond, angles change with the common
+    scale of a joint's gains, friction and armature, and below they do not. The information there
+    is that of one side, and an interval from it would be too narrow towards the other.
+    """
+    objective = best.objective
+    parameters = objective.parameters
+    is_factor = np.array([each.is_factor for each in parameters.each])
+    informations: list[Array] = []
+    for weaker in _WEAKER:
+        vector = np.maximum(best.vector - weaker * is_factor, parameters.low)
+        jacobian = objective.jacobian(vector[objective.free])[: -len(objective.free)]
+        informations.append(jacobian.T @ jacobian)
+    return tuple(informations)
 
 
 def first_objective(objective: Objective) -> Objective:
@@ -88,8 +126,9 @@ def fits_from_starts(
     others = [_gone_on(each.weighed(weighted), best) for each in fits]
     every_one = _in_order([best, *others])
     residuals = Residuals.of(every_one[0].errors, recording)
+    beside = informations_beside(every_one[0])
     progress(1.0)
-    return Fits(every_one, residuals)
+    return Fits(every_one, residuals, beside)
 
 
 def _gone_on(end: Fit, best: Fit) -> Fit:

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Array
 from .motions import MotionInformation
 from .parameters import Parameter
 from .results import UNITS, FittedParameter, Reason
-from .starts import Fits
+from .starts import Fits, least_certain
 
 _TELLS = 0.3  # standard deviation after the fit, by that before it
 _QUANTILE = 1.96  # of the normal distribution, for 95 %
@@ -29,7 +28,7 @@ def fitted_parameters(
         motions: What other motions would tell, in the order in which they are advised.
     """
     objective = fits.best.objective
-    deviations = np.sqrt(np.diag(fits.covariance))
+    deviations = fits.deviations
     prior = objective.prior_deviations
     values = fits.best.vector[objective.free]
     low, high = values - _QUANTILE * deviations, values + _QUANTILE * deviations
@@ -107,12 +106,8 @@ def _motion_for(place: int, fits: Fits, motions: Sequence[MotionInformation]) ->
     """Return the first motion after which a parameter would be told; "" where none would do."""
     prior = fits.best.objective.prior_deviations
     for motion in motions:
-        after = _deviations(fits.best.information + motion.information, prior)
+        together = [each + motion.information for each in fits.informations]
+        after = least_certain(together, prior)
         if after[place] < _TELLS * prior[place]:
             return motion.name
     return ""
-
-
-def _deviations(information: Array, prior: Array) -> Array:
-    """Return the standard deviations that information of data and prior leave."""
-    return np.sqrt(np.diag(np.linalg.inv(information + np.diag(1.0 / np.square(prior)))))

@@ -23,6 +23,7 @@ _FORM = f"{PREFIX}DIR or {PREFIX}DIR#EPISODE"
 SYNTHETIC = "synthetic"  # the recording that comes with the package
 _SYNTHETIC_FOLDER = Path(__file__).resolve().parent / "synthetic"
 _MOST_EPISODES = 100  # whose values are looked at for their quantum
+_FURTHEST = 360.0  # degrees: a servo turns once, and its counts are from -180 to 180
 _MOVES = 12 * COUNT  # rad, about 1°: an arm whose joints all stay within that does not move
 
 
@@ -72,7 +73,8 @@ def read_arm_recordings(
 
     Raises:
         BadInputError: The source names no episode of a data set; or it is damaged, does not fit
-            the model, has a unit that cannot be told, or an arm that does not move.
+            the model, has a unit that cannot be told, commands no servo reaches, or an arm that
+            does not move.
         MissingEngineError: pyarrow is not installed.
     """
     folder, number = folder_and_episode(source)
@@ -169,6 +171,7 @@ def _measured_joints(
 
 
 def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
+    _check_reach(arm, episode)
     joints = tuple(unit.joint for unit in arm.units)
     resolution = np.full(len(arm.units), COUNT)
     return ArmRecording(
@@ -181,6 +184,19 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
         resolution=resolution,
         units=arm.units,
     )
+
+
+def _check_reach(arm: _Arm, episode: LerobotEpisode) -> None:
+    """Refuse commands in degrees that are more than a turn away: they are no degrees."""
+    in_degrees = np.array([unit.unit == "degrees" for unit in arm.units])
+    beyond = np.argwhere((np.abs(episode.action) > _FURTHEST) & in_degrees)
+    if len(beyond):
+        frame, joint = (int(index) for index in beyond[0])
+        raise BadInputError(
+            f"{arm.data_set.folder}, episode {episode.number}: action of {arm.joints[joint].name} "
+            f"is {episode.action[frame, joint]:g} in frame {frame}, where its measured values are "
+            f"degrees: no servo turns that far. Is the action in another unit?"
+        )
 
 
 def _angles(values: Array, units: tuple[JointUnit, ...]) -> Array:
