@@ -35,8 +35,10 @@ _DELAYS = tuple(np.arange(0.0, 0.21, 0.02).tolist())  # [s] from which fits star
 _STIFFNESS = (0.0, -1.0, -2.0, -3.0, -4.0)  # logarithms of the factor of all gains, likewise
 _NOT_IN_JSON = {"json": False}
 _QUANTILE = 1.96  # of the normal distribution, for 95 %
+_RUNS = 12  # simulations of a fit, without those for derivatives
+_TOLERANCE = 1e-3  # part by which the sum of squares falls at least, or a fit ends
 _SHARE_OF_CODE = 0.05  # of the time that the lesson takes
-_SHARES = (0.1, 0.15, 0.25, 0.45)  # of that time, of each reading
+_SHARES = (0.1, 0.1, 0.2, 0.55)  # of that time, of each reading
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,7 @@ def _fits(simulation: ArmSimulation, progress: Progress) -> list[Fit]:
             )
         )
         start = fits[-1].vector if causes == CAUSES else _start(objective, causes)
-        fits.append(fit_objective(objective, start))
+        fits.append(fit_objective(objective, start, runs=_RUNS, tolerance=_TOLERANCE))
         done += share
         progress(done)
     return fits
