@@ -65,6 +65,38 @@ def test_gains_and_delay_are_found(fits, true):
     assert fits.best.vector[-2] == pytest.approx(true[-2], abs=0.002)
 
 
+@pytest.mark.slow
+def test_mujocos_own_least_squares_ends_at_the_same_place(objective, fits):
+    # mujoco.minimize, which mujoco.sysid fits with: other code, the same residuals.
+    minimize = pytest.importorskip("mujoco.minimize")
+    weighed = replace(fits.best.objective, free=objective.free)
+    scale = weighed.prior_deviations
+
+    def residual(points):
+        columns = []
+        for point in points.T:
+            values = point * scale
+            columns.append(
+                weighed.residuals(values, weighed.simulation.angles(weighed.vector(values)))
+            )
+        return np.stack(columns, axis=1)
+
+    low, high = weighed.parameters.low[weighed.free], weighed.parameters.high[weighed.free]
+    start = starting_points(objective, 1, 0)[0][weighed.free]
+    found, _ = minimize.least_squares(
+        start / scale,
+        residual,
+        bounds=(low / scale, high / scale),
+        eps=1e-4,
+        max_iter=40,
+        verbose=minimize.Verbosity.SILENT,
+    )
+    cost = 0.5 * np.square(residual(found[:, None])).sum()
+    assert fits.best.cost == pytest.approx(cost, abs=0.1)
+    apart = (found * scale - fits.best.vector[weighed.free]) / np.sqrt(np.diag(fits.covariance))
+    assert np.abs(apart).max() < 0.3
+
+
 def test_what_is_not_fitted_stays_as_the_model_has_it(fits, parameters):
     held = np.setdiff1d(np.arange(len(parameters)), fits.best.objective.free)
     assert not fits.best.vector[held].any()
