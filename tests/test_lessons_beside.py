@@ -34,7 +34,6 @@ from statemachine.show.blocks import Page, Question, Table, Verdict
 from .support.pages import blocks, lesson_result, shown, with_figures
 from .support.processes import Cli
 
-
 BESIDE = ["step", "energy", "recording"]
 
 
