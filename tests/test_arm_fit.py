@@ -252,19 +252,19 @@ def test_of_a_vertical_axis_the_offset_is_not_told(parameters, recording):
 
 def test_what_only_the_force_limit_tells_is_not_told_of_a_weaker_arm(parameters):
     # Gains, friction and armature of the gripper have a common scale, which only shows where its
-    # servo reaches the limit of its force: here it does, and with three quarters of it not.
+    # servo reaches the limit of its force: here it does, and with three quarters of them not.
     at_limit = vector(parameters, {"kp": SOFT, "viscous": -0.8})
-    at_limit[[5, 11, 17, 23]] += 0.9
+    at_limit[[5, 11, 17, 23]] += 0.8
     recording = recording_of(parameters, swings(parameters, 2.0, rate=1.0), at_limit)
     kinds = ("kp", "viscous", "friction", "armature")
     best = fit(objective_of(parameters, recording, kinds, NOISE), at_limit)
     residuals = Residuals.of(best.errors, recording)
     prior = best.objective.prior_deviations
-    assert least_certain([best.information], prior)[5] < 0.1
+    of_best = least_certain([best.information], prior)[5]
     fits = Fits((best, best, best), residuals, informations_beside(best))
-    assert fits.deviations[5] > 0.3
+    assert fits.deviations[5] > 2.0 * of_best
     said = fitted_parameters(fits, True, ())
-    assert said[5].high > 1.5 * said[5].fitted
+    assert said[5].high > 1.4 * said[5].fitted
 
 
 # What other motions would tell.
