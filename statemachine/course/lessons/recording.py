@@ -17,7 +17,7 @@ from ...lab.identification.parameters import ArmParameters
 from ...lab.identification.residuals import Residuals
 from ...lab.identification.results import CAUSES, UNITS, Cause, Kind
 from ...lab.identification.simulation import ArmSimulation
-from ...lab.identification.starts import Fits, first_objective
+from ...lab.identification.starts import Fits, first_objective, informations_beside
 from ...lab.recordings.arm_recording import ArmRecording, ArmRecordings
 from ...lab.recordings.arm_source import read_arm_recordings
 from ...lab.recordings.synthetic_truth import SyntheticTruth, synthetic_truth
@@ -311,7 +311,7 @@ def _shares(readings: Sequence[FittedReading], before: float) -> dict[str, float
 def _figures(end: Fit, residuals: Residuals) -> tuple[ToldFigure, ...]:
     """Return what the recording tells of each figure that was fitted."""
     objective = end.objective
-    deviations = np.sqrt(np.diag(Fits((end,), residuals).covariance))
+    deviations = Fits((end,), residuals, informations_beside(end)).deviations
     truth = synthetic_truth()
     figures: list[ToldFigure] = []
     for number, deviation in zip(objective.free.tolist(), deviations.tolist(), strict=True):
