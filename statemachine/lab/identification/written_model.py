@@ -114,6 +114,7 @@ class _FittedFile:
             good = [each for each in planned if _has(model.compiled, each.edits)]
             if len(good) < len(planned):
                 model = self._loaded(Path(part), good)
+        gap = gap_elsewhere(model, self._result.recordings)
         for each in planned:
             if each not in good:
                 self._not_written.append(UnwrittenChange(each.name, _OTHERWISE))
@@ -123,7 +124,7 @@ class _FittedFile:
             of=self._model.path.name,
             written=changes_of(texts),
             not_written=tuple(self._not_written),
-            gap=gap_elsewhere(model, self._result.recordings),
+            gap=gap,
             before=self._result.gap.model,
             quantity="joints",
             unit="rad",
