@@ -19,6 +19,7 @@ import pytest
 
 from statemachine import load, releases
 from statemachine.backends import backend_engine, backend_names, chosen
+from statemachine.backends.binary import TRUST
 from statemachine.cli import main
 from statemachine.cli.common import FAULT
 from statemachine.errors import EngineWarning
@@ -82,6 +83,8 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("MENAGERIE", "COLUMNS", "FORCE_COLOR", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("STATEMACHINE_JUDGED", "")  # what tests judge is no verdict for anybody
+    # A command that is run in this process may set it, for its children: not for the next test.
+    monkeypatch.setenv(TRUST, "")
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -63,7 +63,9 @@ def test_the_model_of_the_fit_has_its_gains(shipped):
 
 @pytest.fixture(scope="module")
 def by_hand(tmp_path_factory) -> ScoredRecording:
-    return _scored(tmp_path_factory.mktemp("hand"), Plan("hand-7", motion="hand", seed=7))
+    return _scored(
+        tmp_path_factory.mktemp("hand"), Plan("hand-7", motion="hand", seed=7, seconds=7.0)
+    )
 
 
 def test_what_a_hand_like_motion_determines_is_true(by_hand):
@@ -74,7 +76,7 @@ def test_what_a_hand_like_motion_determines_is_true(by_hand):
 
 
 def test_the_wrong_sign_of_a_joint_is_found(tmp_path):
-    plan = Plan("sign-3", seed=3, fault=Fault(reversed_joint="elbow_flex"), seconds=6.0)
+    plan = Plan("sign-3", seed=3, fault=Fault(reversed_joint="elbow_flex"), seconds=5.0)
     write(make(plan), tmp_path / plan.name)
     result = identify(RecordingRequest(f"lerobot:{tmp_path / plan.name}", "so101"))
     verdicts = {each.name: each.verdict for each in result.hypotheses}

@@ -467,5 +467,5 @@ def test_without_pyarrow_the_extra_is_named(
 ) -> None:
     source = written(tmp_path, data_set(DEGREES))
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
-    with pytest.raises(MissingEngineError, match=r"pyarrow.*\[parquet\]"):
+    with pytest.raises(MissingEngineError, match=r"pyarrow.*\[recordings\]"):
         recordings(source, arm)

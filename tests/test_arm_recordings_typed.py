@@ -76,7 +76,7 @@ def test_an_option_of_runs_is_refused(name: str) -> None:
 
 
 def test_models_without_a_word_behind_it_is_refused() -> None:
-    with pytest.raises(BadInputError, match="^--models does not go with a recording"):
+    with pytest.raises(BadInputError, match=r"^--models does not go with a recording"):
         asked(RECORDING, "so101", "--models")
 
 

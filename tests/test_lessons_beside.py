@@ -34,6 +34,8 @@ from statemachine.show.blocks import Page, Question, Table, Verdict
 from .support.pages import blocks, lesson_result, shown, with_figures
 from .support.processes import Cli
 
+BESIDE = ["step", "energy", "recording"]
+
 
 @cache
 def _result(name: str, backend: str = "mujoco") -> Any:
@@ -52,8 +54,8 @@ def _right(page: Page) -> int | None:
 def test_they_come_after_the_end_of_the_course() -> None:
     names = list(LESSONS)
     assert [name for name, lesson in LESSONS.items() if lesson.ends_course] == ["questions"]
-    assert names[names.index("questions") + 1 :] == ["step", "energy"]
-    assert not {"step", "energy"} & {lesson.name for lesson in PATH}
+    assert names[names.index("questions") + 1 :] == BESIDE
+    assert not set(BESIDE) & {lesson.name for lesson in PATH}
 
 
 @pytest.mark.slow

@@ -6,6 +6,8 @@ import io
 from contextlib import redirect_stdout
 from typing import Any, TypeVar
 
+import pytest
+
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.session import take
 from statemachine.interface import Model
@@ -25,9 +27,12 @@ QUICK = {
 
 
 def need_engines_of(lesson: str) -> None:
-    """Skip a test of a lesson that computes with Pinocchio where that is not."""
+    """Skip a test of a lesson that computes with Pinocchio or reads parquet where that is not."""
     if lesson == "step":
         need_engine("pinocchio")
+    if lesson == "recording":
+        for name in ("pyarrow", "scipy"):
+            pytest.importorskip(name)
 
 
 def lesson_result(name: str, model: Model, **options: Any) -> Any:

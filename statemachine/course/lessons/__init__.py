@@ -216,6 +216,13 @@ _LESSONS = (
         on_path=False,
         plots=True,
     ),
+    Lesson(
+        "recording",
+        "Is it my arm or my simulator?",
+        "so101",
+        on_path=False,
+        plots=True,
+    ),
 )
 
 # Lessons that were, and the command that now shows what they taught.

@@ -9,7 +9,7 @@ many worlds as there are parameters.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ...interface import Array, Ints
 from .parameters import ArmParameters
 from .simulation import ArmSimulation
 
+Derivatives = Literal["coarse", "exact"]
 EXTRA = "recordings"
 _RUNS = 40  # simulations of a fit, at most
 _TOLERANCE = 1e-4  # of the sum of squares, where a fit ends
@@ -77,12 +78,17 @@ class Objective:
         scaled = np.where(np.isfinite(scaled), scaled, _PULLED)
         return np.concatenate([scaled.ravel(), values / self.prior_deviations])
 
-    def jacobian(self, values: Array) -> Array:
-        """Return the Jacobian of the residuals, by one run of worlds."""
+    def jacobian(self, values: Array, with_error: bool = False) -> Array:
+        """Return the Jacobian of the residuals, by one run of worlds.
+
+        Args:
+            values: Of what is fitted.
+            with_error: As of `ArmSimulation.angles_of_each`.
+        """
         steps = self.parameters.steps[self.free]
         vectors = np.tile(self.vector(values), (len(self.free) + 1, 1))
         vectors[np.arange(1, len(vectors)), self.free] += steps
-        angles = self.simulation.angles_of_each(vectors)
+        angles = self.simulation.angles_of_each(vectors, with_error)
         first = self.simulation.first_frame
         change = (angles[1:, first:] - angles[0, first:]) / self.deviation
         of_data = (change / steps[:, None, None]).reshape(len(self.free), -1).T
@@ -93,13 +99,14 @@ class Objective:
 class _Memory:
     """Residuals and Jacobians that SciPy asks for, and how often worlds were run for them."""
 
-    def __init__(self, objective: Objective) -> None:
+    def __init__(self, objective: Objective, method: Derivatives | Array) -> None:
         """Begin with nothing known.
 
         Args:
             objective: What is made small.
+            method: As of `fit`.
         """
-        self.objective = objective
+        self.objective, self.method = objective, method
         self.evaluations = 0
         self._known: tuple[Array, Array] | None = None  # values, and the Jacobian there
 
@@ -111,12 +118,15 @@ class _Memory:
 
     def jacobian(self, values: Array) -> Array:
         """Return the Jacobian, that of the last point where it is near."""
+        if isinstance(self.method, np.ndarray):
+            return self.method
         if self._known is not None:
             moved = np.abs(values - self._known[0]) / self.objective.prior_deviations
             if moved.max() < _NEAR:
                 return self._known[1]
         self.evaluations += 1
-        self._known = values.copy(), self.objective.jacobian(values)
+        with_error = self.method == "coarse"
+        self._known = values.copy(), self.objective.jacobian(values, with_error)
         return self._known[1]
 
 
@@ -162,7 +172,11 @@ class Fit:
 
 
 def fit(
-    objective: Objective, start: Array, runs: int = _RUNS, tolerance: float = _TOLERANCE
+    objective: Objective,
+    start: Array,
+    runs: int = _RUNS,
+    tolerance: float = _TOLERANCE,
+    derivatives: Derivatives | Array = "coarse",
 ) -> Fit:
     """Fit the free parameters from a start.
 
@@ -171,6 +185,8 @@ def fit(
         start: (P,) vector.
         runs: Simulations at most, without those for derivatives.
         tolerance: Part by which the sum of squares falls at least, or the fit ends.
+        derivatives: How the Jacobian is computed: with the error of a step, or without; or the
+            Jacobian itself, of a fit that ended near.
 
     Raises:
         MissingEngineError: The extra `recordings` is not installed.
@@ -179,7 +195,7 @@ def fit(
     parameters, free = objective.parameters, objective.free
     low, high = parameters.low[free], parameters.high[free]
     margin = 1e-6 * (high - low)
-    memory = _Memory(objective)
+    memory = _Memory(objective, derivatives)
     inside = np.clip(start[free], low + margin, high - margin)
     result = optimize.least_squares(
         memory.residuals,
@@ -223,7 +239,7 @@ def starting_points(objective: Objective, starts: int, seed: int) -> list[Array]
     drawn = np.clip(drawn, parameters.low, parameters.high)
     fixed = np.setdiff1d(np.arange(len(parameters)), objective.free)
     drawn[:, fixed] = objective.fixed[fixed]
-    angles = objective.simulation.angles_of_each(drawn)
+    angles = objective.simulation.angles_of_each(drawn, with_error=True)
     costs = [
         float(np.square(objective.residuals(vector[objective.free], angles[i])).sum())
         for i, vector in enumerate(drawn)

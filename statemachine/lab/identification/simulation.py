@@ -17,13 +17,11 @@ import numpy as np
 
 from ...errors import DivergedWarning
 from ...interface import Array
-from ...worlds import make_worlds
-from ...worlds import step as step_worlds
+from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
 from .parameters import ArmParameters
 
 COUNTS = 4096  # of a turn of the servos (Feetech STS3215)
-_STABLE = 1.2  # rate of a servo by that of steps, below which half of them do for derivatives
 _STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
@@ -99,25 +97,27 @@ class ArmSimulation:
     def _moving_at_first(self) -> Array:
         """Tell of each joint (n,) whether it moves in the first frames."""
         first = self.state[:_FIRST_FRAMES]
-        return np.ptp(first, axis=0) > _REST * self.recording.resolution
+        half = len(first) // 2
+        moved = np.abs(first[half:].mean(axis=0) - first[:half].mean(axis=0))
+        return moved > _REST * self.recording.resolution
 
     def angles(self, vector: Array) -> Array:
         """Return the angles (K, n) that would be measured [rad], without the error of a step.
 
         NaN where the simulation diverges.
         """
-        once = self._played(vector[None], self._steps)[0]
-        return 2.0 * self._played(vector[None], 2 * self._steps)[0] - once
+        return self.angles_of_each(vector[None])[0]
 
-    def angles_of_each(self, vectors: Array) -> Array:
+    def angles_of_each(self, vectors: Array, with_error: bool = False) -> Array:
         """Return the angles (W, K, n) for each of several vectors (W, P).
 
-        They have the error of a step, which hardly matters for differences.
+        Args:
+            vectors: Of the parameters.
+            with_error: Whether the error of a step stays in them, which takes a third of the time:
+                enough for the way to a fit, and not for what is said of it.
         """
-        half = self._steps // 2
-        rate = self.recording.fps * half
-        is_stable = half > 0 and self._fastest_rate(vectors) < _STABLE * rate
-        return self._played(vectors, half if is_stable else self._steps)
+        once = self._played(vectors, self._steps)
+        return once if with_error else 2.0 * self._played(vectors, 2 * self._steps) - once
 
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
@@ -125,58 +125,34 @@ class ArmSimulation:
         forces = np.abs(self._forces(vector))
         return np.mean(forces >= 0.999 * limits[:, 1], axis=0)
 
-    def _fastest_rate(self, vectors: Array) -> float:
-        """Return the fastest rate at which a servo moves its armature alone [1/s].
-
-        The links add to that inertia, so it is a bound.
-        """
-        parameters = self.parameters
-        figures = parameters.options(vectors)
-        inertia = figures["armature"][:, parameters.dof]
-        spring = np.sqrt(figures["kp"][:, parameters.servo] / inertia)
-        viscous = figures["kv"][:, parameters.servo] / inertia
-        return float(np.maximum(spring, viscous).max())
-
     @property
     def _steps(self) -> int:
         """Return the number of steps of a frame."""
         return max(1, round(_STEPS / self.recording.fps))
 
     def _played(self, vectors: Array, steps: int) -> Array:
-        """Return the angles (W, K, n) with so many steps a frame.
-
-        They are read so much earlier than a frame as the delay is, between two steps.
-        """
+        """Return the angles (W, K, n) with so many steps a frame, NaN of worlds that diverge."""
         parameters = self.parameters
         offsets = vectors[:, parameters.of_kind("offset")]
-        delays = vectors[:, parameters.of_kind("delay")[0]]
-        action, state = self.action, self.state
+        action, first = self.action, self.state[0] - offsets
         timestep = 1.0 / (self.recording.fps * steps)
-        reading = _Reading.of(float(delays.mean()), timestep, steps)
-        frames = len(action)
-        before = np.empty((len(vectors), frames, len(parameters.joints)))
-        after = np.empty_like(before)
         model = parameters.model.replace(timestep=timestep, integrator="euler", contacts=False)
         options = parameters.options(vectors, self.viscous_outside)
         with make_worlds(model, len(vectors), derived=(), **options) as worlds:
-            worlds.qpos[:, parameters.position] = state[0] - offsets
+            worlds.qpos[:, parameters.position] = first
             worlds.qvel[:, parameters.dof] = self.first_velocity
-            before[:] = after[:] = worlds.qpos[:, None, parameters.position]
+            total = (len(action) - 1) * steps
+            commands = np.repeat(worlds.ctrl[:, None], total, axis=1)
+            told = np.repeat(action[:-1], steps, axis=0)
+            commands[:, :, parameters.servo] = told - offsets[:, None]
             with warnings.catch_warnings():
                 # What diverges has no angles, and the fit leaves it again.
                 warnings.simplefilter("ignore", DivergedWarning)
-                for k in range(frames - reading.frames):
-                    worlds.ctrl[:, parameters.servo] = action[k] - offsets
-                    if reading.steps_before:
-                        step_worlds(worlds, reading.steps_before)
-                    before[:, k + reading.frames] = worlds.qpos[:, parameters.position]
-                    step_worlds(worlds)
-                    after[:, k + reading.frames] = worlds.qpos[:, parameters.position]
-                    if reading.steps_after:
-                        step_worlds(worlds, reading.steps_after)
+                positions = record(worlds, total, ctrl=commands)["qpos"][:, :, parameters.position]
             diverged = sorted(worlds.diverged)
-        part = ((reading.delay - delays) / timestep)[:, None, None]
-        angles = before + part * (after - before) + offsets[:, None, :]
+        history = np.concatenate([first[:, None], positions], axis=1)
+        delays = vectors[:, parameters.of_kind("delay")[0]]
+        angles = _late(history, delays / timestep, steps, len(action)) + offsets[:, None]
         angles[diverged] = np.nan
         return angles
 
@@ -195,24 +171,17 @@ class ArmSimulation:
         return kp * (action - offsets - angles) - kv * velocities
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """When angles are read that are measured late: between two steps of a frame.
+def _late(history: Array, delays: Array, steps: int, frames: int) -> Array:
+    """Return what is measured at each frame, (W, K, n), which is late.
 
-    Attributes:
-        delay: Whole number of steps that is at least the delay [s].
-        frames: Number of frames by which it is read before the frame that it is of.
-        steps_before, steps_after: Steps of a frame before the one over which it is read, and after.
+    Args:
+        history: (W, 1 + steps * (K - 1), n) angles after each step.
+        delays: (W,) in steps; before a delay is over, what is measured is where it began.
+        steps: Of a frame.
+        frames: K.
     """
-
-    delay: float
-    frames: int
-    steps_before: int
-    steps_after: int
-
-    @classmethod
-    def of(cls, delay: float, timestep: float, steps: int) -> _Reading:
-        """Return when to read for a delay [s] and so many steps a frame."""
-        late = max(1, math.ceil(delay / timestep - 1e-9))
-        before = -late % steps
-        return cls(late * timestep, (late + before) // steps, before, steps - before - 1)
+    moments = np.maximum(steps * np.arange(frames) - delays[:, None], 0.0)
+    before = np.minimum(moments.astype(int), history.shape[1] - 2)
+    part = (moments - before)[:, :, None]
+    worlds = np.arange(len(history))[:, None]
+    return (1.0 - part) * history[worlds, before] + part * history[worlds, before + 1]

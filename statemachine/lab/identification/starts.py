@@ -13,6 +13,8 @@ from .fit import Fit, Objective, fit, starting_points
 from .residuals import Residuals
 
 _AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
+_NEAR_THE_END = 1e-3  # of the sum of squares, where a start waits for the best one
+_NEARLY_AS_GOOD = 30.0  # half the sum of squares: such a start may still become as good
 _FIRST_NOISE = 0.6  # counts: taken for the noise before any residual is known
 _WEAKER = (0.15, 0.3)  # logarithms of the factors by which an arm is taken to be weaker
 
@@ -107,24 +109,34 @@ def fits_from_starts(
         progress: Told the fraction that is done.
     """
     objective = first_objective(objective)
+    recording = objective.simulation.recording
     fits: list[Fit] = []
     points = starting_points(objective, starts, seed)
     for number, start in enumerate(points):
-        fits.append(fit(objective, start))
-        progress((number + 1) / (starts + 1))
-    place = min(range(len(fits)), key=lambda number: fits[number].cost)
-    best = fits.pop(place)
-    recording = objective.simulation.recording
+        fits.append(fit(objective, start, tolerance=_NEAR_THE_END))
+        progress((number + 1) / (starts + 2))
+    best = min(fits, key=_cost)
+    fits.remove(best)
     residuals = Residuals.of(best.errors, recording)
+    # The noise of each joint is known now: the best one goes on, with exact derivatives.
     weighted = replace(objective, deviation=np.minimum(residuals.noise, residuals.most))
-    # With the noise of each joint known, the best one goes on; the others are weighed alike.
-    best = fit(weighted, best.vector)
-    residuals = Residuals.of(best.errors, recording)
-    others = [each.weighed(weighted) for each in fits]
-    in_order = _in_order([best, *others])
-    beside = informations_beside(in_order[0])
+    best = fit(weighted, best.vector, derivatives="exact")
+    progress((starts + 1) / (starts + 2))
+    # Those that are near go on with the derivatives of the best; the others are weighed alike.
+    others = [_gone_on(each.weighed(weighted), best) for each in fits]
+    every_one = _in_order([best, *others])
+    residuals = Residuals.of(every_one[0].errors, recording)
+    beside = informations_beside(every_one[0])
     progress(1.0)
-    return Fits(in_order, residuals, beside)
+    return Fits(every_one, residuals, beside)
+
+
+def _gone_on(end: Fit, best: Fit) -> Fit:
+    """Return where a start ends that goes on where the best one ended, if it is about as good."""
+    if end.cost - best.cost > _NEARLY_AS_GOOD:
+        return end
+    further = fit(best.objective, end.vector, derivatives=best.jacobian)
+    return further if further.cost < end.cost else end
 
 
 def _cost(fit: Fit) -> float:

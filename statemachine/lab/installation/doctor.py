@@ -93,9 +93,9 @@ class DoctorPage(PageContent):
 _PACKAGES = (
     ("pillow", "pictures and films", ("render",)),
     ("matplotlib", "plots", ("plot", "docs", "notebook")),
-    ("pyarrow", "parquet traces, sweeps", ("parquet", "sweep")),
+    ("pyarrow", "parquet traces, sweeps, recordings of an arm", ("parquet", "sweep", "recordings")),
     ("joblib", "sweeps", ("sweep",)),
-    ("scipy", "sweeps", ("sweep",)),
+    ("scipy", "sweeps, fits of an arm", ("sweep", "recordings")),
     ("distributed", "sweeps through Dask", ("cluster",)),
     ("gymnasium", "reinforcement learning", ("gym",)),
     ("onnxruntime", "walking policies", ("policy",)),

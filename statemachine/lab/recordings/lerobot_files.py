@@ -84,7 +84,7 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
         is_pointer = start.read(len(_LFS_POINTER)) == _LFS_POINTER
     if is_pointer:
         raise _pointer_error(path)
-    require_extra("pyarrow.parquet", "a recording of LeRobot", "pyarrow", "parquet")
+    require_extra("pyarrow.parquet", "a recording of LeRobot", "pyarrow", "recordings")
     try:
         columns = _columns_of(path, names)
     except BadInputError:
