@@ -13,6 +13,7 @@ import pytest
 from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.interface import Model
+from statemachine.lab.identification.recorded_gap import gap_elsewhere
 from statemachine.lab.identification.results import IdentificationResult
 from statemachine.lab.identification.written_model import check_written, with_written
 from statemachine.lab.runs.robot import SO101_JOINTS
@@ -138,6 +139,26 @@ def test_a_figure_that_the_file_cannot_say_is_told(
     arm.write_text(text)
     rewritten, _ = written(fitted, tmp_path / "f.xml", arm)
     assert "kp of elbow_flex" in {each.cause for each in rewritten.not_written}
+
+
+def test_the_file_is_played_on_what_was_not_fitted(
+    fitted: IdentificationResult, tmp_path: Path
+) -> None:
+    nothing = with_verdicts(fitted.parameters, lambda _: False)
+    as_it_is, _ = written(replace(fitted, parameters=nothing), tmp_path / "same.xml")
+    assert as_it_is.gap == gap_elsewhere(fitted.arm, fitted.recordings)
+    changed, _ = written(fitted, tmp_path / "changed.xml")
+    assert changed.gap != pytest.approx(as_it_is.gap, rel=0.01)
+    assert changed.before == fitted.gap.model
+
+
+def test_of_an_arm_without_servos_no_gap_is_told(
+    fitted: IdentificationResult, tmp_path: Path
+) -> None:
+    text = ARM.read_text("utf-8").replace('meshdir="look"', f'meshdir="{ARM.parent}/look"')
+    arm = tmp_path / "arm.xml"
+    arm.write_text(text.replace("<position name=", "<velocity name="))
+    assert gap_elsewhere(load(arm), fitted.recordings) is None
 
 
 def test_nothing_is_written_where_that_is_not_asked(fitted: IdentificationResult) -> None:

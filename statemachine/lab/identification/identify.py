@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import DivergedError
 from ...interface import Array, Model
-from ..recordings.arm_recording import ArmRecording, ArmRecordings
 from ..runs.drive import Progress, no_progress
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
@@ -16,15 +15,13 @@ from .fit import Objective
 from .hypotheses import tried_hypotheses
 from .motions import motion_informations
 from .parameters import ArmParameters
-from .recorded_gap import Asked, asked_of, gap_between
+from .recorded_gap import Asked, asked_of, gap_between, parts_of
 from .residuals import Residuals
 from .results import IdentificationResult, RecordingRequest, StartOutcome
 from .shares import cause_shares
 from .simulation import ArmSimulation
 from .starts import Fits, fits_from_starts
 from .verdicts import fitted_parameters
-
-_FITTED = 2.0 / 3.0  # of the only episode; the rest shows whether it holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +66,7 @@ def fitted_arm(asked: Asked, starts: int, seed: int, progress: Progress = no_pro
     """
     parameters = asked.parameters
     parameters.check_factors()
-    fitted_part, elsewhere, first = _parts(asked.recordings)
+    fitted_part, elsewhere, first = parts_of(asked.recordings)
     objective = Objective(
         simulation=ArmSimulation.of(parameters, fitted_part),
         deviation=fitted_part.resolution,
@@ -136,15 +133,6 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         arm=arm,
         fitted_arm=arm_after,
     )
-
-
-def _parts(recordings: ArmRecordings) -> tuple[ArmRecording, ArmRecording, int]:
-    """Return what is fitted, what is not, and from which frame on that was not fitted."""
-    whole = recordings.fitted
-    if recordings.held_out is not None:
-        return whole, recordings.held_out, 0
-    frames = round(_FITTED * len(whole.state))
-    return replace(whole, action=whole.action[:frames], state=whole.state[:frames]), whole, frames
 
 
 def _outcomes(fits: Fits) -> tuple[StartOutcome, ...]:

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from ...backends import load
-from ...errors import DivergedError
+from ...errors import DivergedError, UnsupportedError
 from ...installed import DEFAULT
-from ...interface import Array
+from ...interface import Array, Model
 from ..recordings.arm_recording import ArmRecording, ArmRecordings
 from ..recordings.arm_source import read_arm_recordings
 from ..runs.provenance import provenance
@@ -20,6 +20,7 @@ from .results import JointGap, RecordingGap, RecordingRequest, RecordingResult
 from .simulation import ArmSimulation
 
 _SECONDS = 20.0  # of an episode, where nobody says how much
+_FITTED = 2.0 / 3.0  # of the only episode; the rest shows whether it holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,15 @@ def shortened(recording: ArmRecording, seconds: float) -> ArmRecording:
     return replace(recording, action=recording.action[:frames], state=recording.state[:frames])
 
 
+def parts_of(recordings: ArmRecordings) -> tuple[ArmRecording, ArmRecording, int]:
+    """Return what is fitted, what is not, and from which frame on that was not fitted."""
+    whole = recordings.fitted
+    if recordings.held_out is not None:
+        return whole, recordings.held_out, 0
+    frames = round(_FITTED * len(whole.state))
+    return replace(whole, action=whole.action[:frames], state=whole.state[:frames]), whole, frames
+
+
 def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> RecordingResult:
     """Play the commands of a recording into the model as it is, and compare the angles.
 
@@ -81,6 +91,23 @@ def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> RecordingRe
         recordings=asked.recordings,
         arm=asked.parameters.model,
     )
+
+
+def gap_elsewhere(model: Model, recordings: ArmRecordings) -> float | None:
+    """Return how far a model is, as it is, from what was not fitted [rad].
+
+    None where its joints have no servos, or its simulation diverges.
+    """
+    _, elsewhere, first = parts_of(recordings)
+    try:
+        parameters = ArmParameters.of(model, elsewhere.joints)
+    except UnsupportedError:
+        return None
+    simulation = ArmSimulation.of(parameters, elsewhere)
+    angles = simulation.angles(np.zeros(len(parameters)))
+    if not np.isfinite(angles).all():
+        return None
+    return gap_between(simulation, angles, first=first).model
 
 
 def gap_between(

@@ -1,7 +1,9 @@
 """The fitted figures, written into the text of the model's file.
 
 What the recording determines is written as attributes of the elements themselves. The file is
-loaded, and a figure that it then has otherwise is taken back and told with its reason.
+loaded, and a figure that it then has otherwise is taken back and told with its reason. What is not
+determined stays as it was, and figures that stand in for each other then fit together no more: so
+the commands of what was not fitted are played into the file, and the gap that stays is told.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from ...interface import Model
 from ...models import resolve
 from ..why.rewriting import RewrittenFile, changes_of, check_target, text_at
 from .parameter_texts import name_of_parameter
+from .recorded_gap import gap_elsewhere
 from .results import FittedParameter, IdentificationResult, RecordingRequest
 
 _SUFFIXES = (".xml", ".mjcf")
@@ -107,10 +110,11 @@ class _FittedFile:
         """Write the file, and return what was written of it."""
         planned = list(self._plan())
         with beside(self._target) as (part,):
-            compiled = self._loaded(Path(part), planned).compiled
-            good = [each for each in planned if _has(compiled, each.edits)]
+            model = self._loaded(Path(part), planned)
+            good = [each for each in planned if _has(model.compiled, each.edits)]
             if len(good) < len(planned):
-                self._loaded(Path(part), good)
+                model = self._loaded(Path(part), good)
+        gap = gap_elsewhere(model, self._result.recordings)
         for each in planned:
             if each not in good:
                 self._not_written.append(UnwrittenChange(each.name, _OTHERWISE))
@@ -120,6 +124,10 @@ class _FittedFile:
             of=self._model.path.name,
             written=changes_of(texts),
             not_written=tuple(self._not_written),
+            gap=gap,
+            before=self._result.gap.model,
+            quantity="joints",
+            unit="rad",
         )
 
     def _plan(self) -> Iterator[_Planned]:
