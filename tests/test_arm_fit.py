@@ -267,6 +267,19 @@ def test_what_only_the_force_limit_tells_is_not_told_of_a_weaker_arm(parameters)
     assert said[5].high > 1.4 * said[5].fitted
 
 
+def test_a_joint_that_the_recording_shows_not_to_be_weaker_stays_as_sure(parameters):
+    # Far beyond the limit of its force, a weaker gripper would move otherwise.
+    beyond = vector(parameters, {"kp": SOFT, "viscous": -0.8})
+    beyond[[5, 11, 17, 23]] += 1.3
+    recording = recording_of(parameters, swings(parameters, 2.0, rate=1.0), beyond)
+    kinds = ("kp", "viscous", "friction", "armature")
+    best = fit(objective_of(parameters, recording, kinds, NOISE), beyond)
+    fits = Fits((best,), Residuals.of(best.errors, recording), informations_beside(best))
+    of_best = least_certain([best.information], best.objective.prior_deviations)[5]
+    assert of_best < 0.1
+    assert fits.deviations[5] < 1.5 * of_best
+
+
 # What other motions would tell.
 
 

@@ -16,7 +16,8 @@ _AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
 _NEAR_THE_END = 1e-3  # of the sum of squares, where a start waits for the best one
 _NEARLY_AS_GOOD = 30.0  # half the sum of squares: such a start may still become as good
 _FIRST_NOISE = 0.6  # counts: taken for the noise before any residual is known
-_WEAKER = (0.15, 0.3)  # logarithms of the factors by which an arm is taken to be weaker
+_WEAKER = (0.15, 0.3)  # logarithms of the factors by which joints are taken to be weaker
+_POSSIBLE = 2.0 * _AS_GOOD  # half the sum of squares: a joint that is weaker fits hardly worse
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class Fits:
     Attributes:
         each: At least one; `cost` of each is by the noise that the best one leaves.
         residuals: Of the best one.
-        beside: Fisher informations (free, free) of arms that are weaker than the best fit.
+        beside: Fisher informations (free, free) of arms with joints that are weaker.
     """
 
     each: tuple[Fit, ...]
@@ -74,21 +75,38 @@ def least_certain(informations: Sequence[Array], prior: Array) -> Array:
 
 
 def informations_beside(best: Fit) -> tuple[Array, ...]:
-    """Return the Fisher informations (free, free) of arms that are weaker than the best fit.
+    """Return the Fisher informations (free, free) of arms with joints that are weaker.
 
     A fit may end where a servo just reaches its force limit: beyond, angles change with the common
     scale of a joint's gains, friction and armature, and below they do not. The information there
-    is that of one side, and an interval from it would be too narrow towards the other.
+    is that of one side, and an interval from it would be too narrow towards the other. Joints that
+    the recording shows not to be weaker stay as they are.
     """
     objective = best.objective
     parameters = objective.parameters
-    is_factor = np.array([each.is_factor for each in parameters.each])
+    numbers = objective.free.tolist()
+    weakened = np.zeros((len(parameters.joints), len(parameters)))
+    for world, joint in enumerate(parameters.joints):
+        mine = [i for i in numbers if parameters.each[i].joint == joint]
+        weakened[world, mine] = [parameters.each[i].is_factor for i in mine]
     informations: list[Array] = []
     for weaker in _WEAKER:
-        vector = np.maximum(best.vector - weaker * is_factor, parameters.low)
-        jacobian = objective.jacobian(vector[objective.free])[: -len(objective.free)]
-        informations.append(jacobian.T @ jacobian)
+        vectors = np.maximum(best.vector - weaker * weakened, parameters.low)
+        possible = np.array(_costs(objective, vectors)) - best.cost < _POSSIBLE
+        if possible.any():
+            vector = vectors[possible].min(axis=0)
+            jacobian = objective.jacobian(vector[objective.free])[: -len(objective.free)]
+            informations.append(jacobian.T @ jacobian)
     return tuple(informations)
+
+
+def _costs(objective: Objective, vectors: Array) -> list[float]:
+    """Return half the sum of squares of each of some vectors (W, P)."""
+    angles = objective.simulation.angles_of_each(vectors)
+    return [
+        0.5 * float(np.square(objective.residuals(vector[objective.free], angles[world])).sum())
+        for world, vector in enumerate(vectors)
+    ]
 
 
 def first_objective(objective: Objective) -> Objective:
