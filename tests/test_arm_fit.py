@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from statemachine.lab.identification.fit import fit, starting_points
-from statemachine.lab.identification.hypotheses import tried_hypotheses
+from statemachine.lab.identification.hypotheses import tried_hypotheses, tried_reading
 from statemachine.lab.identification.identify import fitted_model
 from statemachine.lab.identification.motions import MOTIONS, middle_and_width, motion_informations
 from statemachine.lab.identification.parameters import ArmParameters
@@ -346,6 +346,14 @@ def test_the_other_sign_of_a_lifting_joint_fits_better_where_it_is_the_true_one(
     verdicts = {each.name: each.verdict for each in tried_hypotheses(found, saturated=0.0)}
     assert verdicts["the other sign of shoulder_lift"] == "fits better"
     assert verdicts["the other sign of elbow_flex"] != "fits better"
+
+
+def test_a_reading_whose_angles_are_no_nearer_does_not_fit_better(fits):
+    objective = fits.best.objective
+    far = replace(fits, residuals=replace(fits.residuals, rms=2 * fits.residuals.rms))
+    near = replace(fits, residuals=replace(fits.residuals, rms=0.5 * fits.residuals.rms))
+    assert tried_reading("other", objective, far, cost=1e6).verdict == "fits better"
+    assert tried_reading("other", objective, near, cost=1e6).verdict == "cannot tell"
 
 
 def test_where_viscous_friction_acts_is_tried_at_the_force_limit(fits):

@@ -53,19 +53,29 @@ def tried_hypotheses(
     as_it_is = fit(objective, best.vector, runs=_RUNS)
     tried: list[Hypothesis] = []
     for number, (name, other) in enumerate(readings):
-        tried.append(_tried(name, replace(objective, simulation=other), fits, as_it_is.cost))
+        tried.append(tried_reading(name, replace(objective, simulation=other), fits, as_it_is.cost))
         progress((number + 1) / len(readings))
     return tuple(tried)
 
 
-def _tried(name: str, objective: Objective, fits: Fits, cost: float) -> Hypothesis:
-    """Return how well another reading fits, from the best fit and from the model as it is."""
+def tried_reading(name: str, objective: Objective, fits: Fits, cost: float) -> Hypothesis:
+    """Return how well another reading fits, from the two best fits.
+
+    It fits better where its angles are nearer, too: where no reading fits, sums of squares differ
+    by where a fit ends.
+
+    Args:
+        name: Of the reading.
+        objective: With that reading.
+        fits: With the reading as it is.
+        cost: Half the sum of squares of the reading as it is.
+    """
     ends = [fit(objective, each.vector, runs=_RUNS) for each in fits.each[:2]]
     end = min(ends, key=lambda each: each.cost)
     evidence = cost - end.cost
     residual = float(np.sqrt(np.square(end.errors).mean()))
     if not math.isfinite(residual) or evidence < -_EVIDENCE:
         return Hypothesis(name, residual, evidence, "fits worse")
-    if evidence > _EVIDENCE:
+    if evidence > _EVIDENCE and residual < fits.residuals.overall:
         return Hypothesis(name, residual, evidence, "fits better")
     return Hypothesis(name, residual, evidence, "cannot tell")
