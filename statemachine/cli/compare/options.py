@@ -44,7 +44,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         f"  {PROGRAM} compare walk.py:policy A.xml B.xml --every 5 --keyframe home\n"
         f"  {PROGRAM} compare walk.onnx A.xml A.xml@pybullet --contract C.yaml\n"
         f"  {PROGRAM} compare run.npz A.xml B.xml\n"
-        f"  {PROGRAM} compare lerobot:DIR#3 so101 --why"
+        f"  {PROGRAM} compare lerobot:synthetic so101 --why"
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"

@@ -20,6 +20,7 @@ from .results import UNITS, CauseShare, FittedParameter, IdentificationResult, K
 
 UNKNOWN = "?"
 _OF_MODEL = "the model"
+_LEFT_OUT = "…"
 _MOST_KINDS = 4  # columns for which there is room
 
 
@@ -42,7 +43,7 @@ def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
     for joint in joints[:most]:
         rows.append([joint or "", *(cells.get((joint, kind), NO_NUMBER) for kind in kinds)])
     if len(joints) > most:
-        rows.append([f"{len(joints) - most} more", *[NO_NUMBER] * len(kinds)])
+        rows.append([f"{len(joints) - most} more", *[_LEFT_OUT] * len(kinds)])
     if rows:
         rows.append([_OF_MODEL, *(_model_text(of_joints, kind) for kind in kinds)])
     headers = ["fitted", *(f"{kind}, {unit_text(kind)}" for kind in kinds)]
