@@ -23,6 +23,8 @@ from statemachine.show.blocks import Page, Question, Table, Verdict
 from .support.pages import blocks, lesson_result, need_engines_of
 from .support.processes import Cli
 
+pytestmark = pytest.mark.slow  # the lesson fits for some eight seconds of the processor
+
 
 @cache
 def _lesson() -> RecordingLessonResult:

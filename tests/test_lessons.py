@@ -235,7 +235,12 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(arm: sm.Model) -> Non
     refused((StateMachineError, "closed", lambda: sm.step(arm, data)))
 
 
-@pytest.mark.parametrize("name", list(LESSONS))
+# The lesson on a recording fits for seconds.
+_SLOW = {"recording"}
+_RUNS = [pytest.param(name, marks=[pytest.mark.slow] if name in _SLOW else []) for name in LESSONS]
+
+
+@pytest.mark.parametrize("name", _RUNS)
 def test_the_run_of_a_lesson_is_the_one_that_is_seen(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
