@@ -9,7 +9,7 @@ import pytest
 
 from statemachine.lab.identification.fit import fit, starting_points
 from statemachine.lab.identification.hypotheses import tried_hypotheses, tried_reading
-from statemachine.lab.identification.identify import fitted_model
+from statemachine.lab.identification.identify import FittedArm, fitted_model
 from statemachine.lab.identification.motions import MOTIONS, middle_and_width, motion_informations
 from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.residuals import Residuals
@@ -190,6 +190,44 @@ def test_an_error_that_changes_from_frame_to_frame_is_no_noise_where_it_is_large
 
 def test_angles_that_are_no_numbers_are_never_at_the_floor(recording):
     assert not Residuals.of(np.full(recording.state.shape, np.nan), recording).at_floor
+
+
+def test_elsewhere_more_is_left_where_the_fit_is_uncertain(recording):
+    # An error of the model of twice the noise, which is to be expected of an uncertain fit alone.
+    random = np.random.default_rng(0)
+    slow = 2 * NOISE * np.sin(np.arange(len(recording.state)) / 10)[:, None]
+    left = Residuals.of(random.normal(0.0, NOISE, recording.state.shape) + slow, recording)
+    assert not left.holds(np.zeros(6))
+    assert not left.holds(np.full(6, 0.2 * NOISE))
+    assert left.holds(np.full(6, 2 * NOISE))
+
+
+def test_what_a_recording_hardly_tells_makes_other_angles_uncertain(parameters, fits):
+    # Of slow swings the delay is told less than of fast ones, which depend on it more.
+    predicted: list[float] = []
+    for rate in (0.2, 2.0):
+        motion = ArmSimulation.of_motion(parameters, swings(parameters, 2.0, rate), 30.0)
+        angles = motion.angles(fits.best.vector)
+        arm = FittedArm(fits, motion, 0, angles, angles)
+        predicted.append(float(arm.predicted.max()))
+    assert predicted[0] < predicted[1]
+
+
+def test_of_the_last_frames_alone_only_these_count(parameters, fits):
+    motion = ArmSimulation.of_motion(parameters, swings(parameters, 2.0), 30.0)
+    angles = motion.angles(fits.best.vector)
+    whole = FittedArm(fits, motion, 0, angles, angles).predicted
+    last = FittedArm(fits, motion, 40, angles, angles).predicted
+    first = FittedArm(fits, replace_frames(motion, 40), 0, angles[:40], angles[:40]).predicted
+    together = np.sqrt((40 * first**2 + 20 * last**2) / 60)
+    assert together == pytest.approx(whole, rel=1e-6)
+
+
+def replace_frames(motion: ArmSimulation, frames: int) -> ArmSimulation:
+    """Return the simulation of the first frames of a motion."""
+    recording = motion.recording
+    shorter = replace(recording, action=recording.action[:frames], state=recording.state[:frames])
+    return replace(motion, recording=shorter)
 
 
 def test_a_still_joint_may_be_off_by_less_than_a_count(recording):

@@ -83,7 +83,8 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
     began = time.process_time()
     asked = asked_of(RecordingRequest(f"lerobot:{folder}", "so101"))
     fitted = fitted_arm(asked, starts, seed=0)
-    parameters = fitted_parameters(fitted.fits, fitted.holds, ())
+    holds = fitted.holds
+    parameters = fitted_parameters(fitted.fits, holds, ())
     seconds = time.process_time() - began
     best = fitted.fits.best.objective
     true = _true_vector(asked.parameters, truth)
@@ -112,7 +113,7 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
         name=folder.name,
         parameters=tuple(each),
         at_floor=fitted.fits.residuals.at_floor,
-        holds=fitted.holds,
+        holds=holds,
         as_good=len(fitted.fits.as_good),
         seconds=seconds,
     )

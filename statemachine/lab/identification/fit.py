@@ -78,6 +78,20 @@ class Objective:
         scaled = np.where(np.isfinite(scaled), scaled, _PULLED)
         return np.concatenate([scaled.ravel(), values / self.prior_deviations])
 
+    def costs(self, vectors: Array, with_error: bool = False) -> list[float]:
+        """Return half the sum of squares of each of some vectors (W, P).
+
+        Args:
+            vectors: Of the parameters.
+            with_error: As of `ArmSimulation.angles_of_each`.
+        """
+        angles = self.simulation.angles_of_each(vectors, with_error)
+        costs: list[float] = []
+        for world, vector in enumerate(vectors):
+            residuals = self.residuals(vector[self.free], angles[world])
+            costs.append(0.5 * float(residuals @ residuals))
+        return costs
+
     def jacobian(self, values: Array, with_error: bool = False) -> Array:
         """Return the Jacobian of the residuals, by one run of worlds.
 
@@ -239,9 +253,5 @@ def starting_points(objective: Objective, starts: int, seed: int) -> list[Array]
     drawn = np.clip(drawn, parameters.low, parameters.high)
     fixed = np.setdiff1d(np.arange(len(parameters)), objective.free)
     drawn[:, fixed] = objective.fixed[fixed]
-    angles = objective.simulation.angles_of_each(drawn, with_error=True)
-    costs = [
-        float(np.square(objective.residuals(vector[objective.free], angles[i])).sum())
-        for i, vector in enumerate(drawn)
-    ]
+    costs = objective.costs(drawn, with_error=True)
     return [drawn[place] for place in np.argsort(costs, kind="stable")[:starts]]

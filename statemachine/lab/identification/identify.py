@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,10 +44,28 @@ class FittedArm:
 
     @property
     def holds(self) -> bool:
-        """Tell whether the best fit leaves hardly more than noise of what was not fitted."""
-        rows = slice(max(self.first, self.elsewhere.first_frame), None)
-        errors = (self.after - self.elsewhere.state)[rows]
-        return Residuals.of(errors, self.elsewhere.recording).holds
+        """Tell whether of what was not fitted no more is left than is to be expected."""
+        errors = (self.after - self.elsewhere.state)[self._first_row :]
+        return Residuals.of(errors, self.elsewhere.recording).holds(self.predicted)
+
+    @property
+    def predicted(self) -> Array:
+        """Return the standard deviation (n,) of the angles of what was not fitted [rad].
+
+        By the covariance of the fit: what was not fitted may depend on what it hardly tells.
+        """
+        objective = replace(self.fits.best.objective, simulation=self.elsewhere)
+        free = objective.free
+        jacobian = objective.jacobian(self.fits.best.vector[free])[: -len(free)]
+        by_joint = jacobian.reshape(-1, len(objective.deviation), len(free))
+        rows = by_joint[self._first_row - self.elsewhere.first_frame :]
+        variance = np.einsum("kni,ij,knj->n", rows, self.fits.covariance, rows) / len(rows)
+        return objective.deviation * np.sqrt(variance)
+
+    @property
+    def _first_row(self) -> int:
+        """Return the first frame of what was not fitted that counts."""
+        return max(self.first, self.elsewhere.first_frame)
 
 
 def fitted_arm(asked: Asked, starts: int, seed: int, progress: Progress = no_progress) -> FittedArm:
@@ -95,6 +113,7 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         fitted = fitted_arm(asked, request.starts, request.seed, progress)
     fits, held_out = fitted.fits, fitted.elsewhere
     simulation, best = fits.best.objective.simulation, fits.best.vector
+    holds = fitted.holds
     saturated = float(simulation.saturated(best).max())
     with reporter.stage("trying other motions"):
         motions = motion_informations(fits.best)
@@ -107,12 +126,11 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
     fitted_gap = gap_between(simulation, as_it_is, simulation.angles(best))
     gap = gap_between(held_out, fitted.before, fitted.after, part, fitted.first)
     source = provenance(asked.parameters.model, request.seed)
-    parameters = fitted_parameters(fits, fitted.holds, motions)
+    parameters = fitted_parameters(fits, holds, motions)
     starts = _outcomes(fits)
     recording, residuals = simulation.recording, fits.residuals
     arm, recordings = asked.parameters.model, asked.recordings
     arm_after = fitted_model(asked.parameters, best)
-    holds = fitted.holds
     return IdentificationResult(
         request=request,
         provenance=source,

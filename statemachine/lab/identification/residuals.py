@@ -17,7 +17,8 @@ from ..recordings.arm_recording import ArmRecording
 
 UNCERTAIN_TIME = 0.003  # standard deviation of when a frame was read [s]
 _ABOVE_NOISE = 1.15  # residual of a joint, by its noise
-_ABOVE_ELSEWHERE = 1.3  # the same of what was not fitted: parameters have errors, too
+_ABOVE_ELSEWHERE = 1.3  # the same of what was not fitted
+_QUANTILE = 1.96  # of the normal distribution, for 95 %
 _STILL = 0.7  # counts: a joint that hardly moves has an error of this size, and no noise
 
 
@@ -72,13 +73,18 @@ class Residuals:
         """Tell whether nothing but noise is left, in any joint."""
         return self._is_noise(_ABOVE_NOISE)
 
-    @property
-    def holds(self) -> bool:
-        """Tell whether a model that was fitted elsewhere leaves hardly more than noise."""
-        return self._is_noise(_ABOVE_ELSEWHERE)
+    def holds(self, predicted: Array) -> bool:
+        """Tell whether a model that was fitted elsewhere leaves no more than is to be expected.
 
-    def _is_noise(self, factor: float) -> bool:
+        Args:
+            predicted: (n,) standard deviation of its angles, by that of what was fitted [rad].
+        """
+        return self._is_noise(_ABOVE_ELSEWHERE, _QUANTILE * predicted)
+
+    def _is_noise(self, factor: float, beside: Array | float = 0.0) -> bool:
+        """Tell whether no joint has more than so much of its noise, and another error beside it."""
         if not np.isfinite(self.rms).all():
             return False
-        allowed = np.maximum(factor * np.minimum(self.noise, self.most), _STILL * self.resolution)
+        noise = np.hypot(factor * np.minimum(self.noise, self.most), beside)
+        allowed = np.maximum(noise, _STILL * self.resolution)
         return bool((self.rms <= allowed).all())

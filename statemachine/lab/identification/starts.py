@@ -56,10 +56,22 @@ class Fits:
         By the noise of each joint; where more than noise is left, by so much more. Of the best fit
         or of an arm beside it, whichever tells less.
         """
-        left = self.residuals.rms / np.minimum(self.residuals.noise, self.residuals.most)
-        more = max(1.0, float(np.sqrt(np.square(left).mean())))
         prior = self.best.objective.prior_deviations
+        more = self._more_than_noise
         return least_certain([each / more**2 for each in self.informations], prior)
+
+    @property
+    def covariance(self) -> Array:
+        """Return the covariance (free, free) of the best fit, with the prior."""
+        precision = np.diag(1.0 / np.square(self.best.objective.prior_deviations))
+        information = self.best.information / self._more_than_noise**2 + precision
+        return np.asarray(np.linalg.inv(information), np.float64)
+
+    @property
+    def _more_than_noise(self) -> float:
+        """Return what is left by its noise, over all joints; at least 1."""
+        left = self.residuals.rms / np.minimum(self.residuals.noise, self.residuals.most)
+        return max(1.0, float(np.sqrt(np.square(left).mean())))
 
 
 def least_certain(informations: Sequence[Array], prior: Array) -> Array:
@@ -92,21 +104,12 @@ def informations_beside(best: Fit) -> tuple[Array, ...]:
     informations: list[Array] = []
     for weaker in _WEAKER:
         vectors = np.maximum(best.vector - weaker * weakened, parameters.low)
-        possible = np.array(_costs(objective, vectors)) - best.cost < _POSSIBLE
+        possible = np.array(objective.costs(vectors)) - best.cost < _POSSIBLE
         if possible.any():
             vector = vectors[possible].min(axis=0)
             jacobian = objective.jacobian(vector[objective.free])[: -len(objective.free)]
             informations.append(jacobian.T @ jacobian)
     return tuple(informations)
-
-
-def _costs(objective: Objective, vectors: Array) -> list[float]:
-    """Return half the sum of squares of each of some vectors (W, P)."""
-    angles = objective.simulation.angles_of_each(vectors)
-    return [
-        0.5 * float(np.square(objective.residuals(vector[objective.free], angles[world])).sum())
-        for world, vector in enumerate(vectors)
-    ]
 
 
 def first_objective(objective: Objective) -> Objective:
