@@ -13,7 +13,7 @@ from statemachine.lab.identification.results import IdentificationResult, Record
 from tools.arm_recordings.arm_truth import Fault
 from tools.arm_recordings.plans import SHIPPED_FOLDER
 from tools.arm_recordings.recordings import Plan, make, write
-from tools.arm_recordings.score import ScoredRecording, scored, summary
+from tools.arm_recordings.score import ScoredRecording, score_of, scored
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("scipy")
@@ -69,10 +69,10 @@ def by_hand(tmp_path_factory) -> ScoredRecording:
 
 
 def test_what_a_hand_like_motion_determines_is_true(by_hand):
-    figures = summary([by_hand])
-    assert figures["determined"] > 0.3
-    assert figures["covered"] >= 0.8
-    assert figures["width"] < 3.0
+    score = score_of([by_hand])
+    assert score.determined > 0.3
+    assert score.covered >= 0.8
+    assert score.width < 3.0
 
 
 def test_the_wrong_sign_of_a_joint_is_found(tmp_path):

@@ -144,51 +144,85 @@ def _bound(objective: Objective, true: np.ndarray) -> np.ndarray:
     return np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
 
 
-def summary(recordings: Sequence[ScoredRecording]) -> dict[str, float]:
-    """Return what the recordings of a group have in common."""
+@dataclass(frozen=True)
+class Score:
+    """What the recordings of a group have in common.
+
+    Attributes:
+        recordings: How many.
+        determined: Part of gains, viscous and dry frictions, delays and payloads that is determined.
+        covered: Part of all that is determined whose interval has the truth in it; None for none.
+        width: Median width of these intervals by that of the bound; None for none.
+        at_floor: Recordings of which the fit leaves noise alone.
+    """
+
+    recordings: int
+    determined: float
+    covered: float | None
+    width: float | None
+    at_floor: int
+
+
+def score_of(recordings: Sequence[ScoredRecording]) -> Score:
+    """Return what recordings have in common."""
     all_of = [each for recording in recordings for each in recording.parameters]
     counted = [each for each in all_of if each.kind in COUNTED]
     determined = [each for each in all_of if each.determined]
-    return {
-        "recordings": len(recordings),
-        "determined": float(np.mean([each.determined for each in counted])),
-        "covered": float(np.mean([each.covered for each in determined])) if determined else np.nan,
-        "width": float(np.median([each.width for each in determined])) if determined else np.nan,
-        "at_floor": sum(recording.at_floor for recording in recordings),
-    }
+    covered = width = None
+    if determined:
+        covered = float(np.mean([each.covered for each in determined]))
+        width = float(np.median([each.width for each in determined]))
+    return Score(
+        recordings=len(recordings),
+        determined=float(np.mean([each.determined for each in counted])),
+        covered=covered,
+        width=width,
+        at_floor=sum(recording.at_floor for recording in recordings),
+    )
 
 
 def group_of(name: str) -> str:
-    """Return the group of a recording: its name without its seed."""
-    return name.rpartition("-")[0]
+    """Return the group of a recording: its name without its seed; those with a fault are one."""
+    group = name.rpartition("-")[0]
+    if group.startswith(("zero", "sign", "gripper")):
+        return "faults"
+    return "pybullet" if group.startswith("pybullet") else group
+
+
+def scores_by_group(recordings: Sequence[ScoredRecording]) -> dict[str, Score]:
+    """Return the score of each group, and of all that MuJoCo simulated."""
+    groups: dict[str, list[ScoredRecording]] = {}
+    for recording in recordings:
+        groups.setdefault(group_of(recording.name), []).append(recording)
+    scores = {group: score_of(members) for group, members in groups.items()}
+    of_mujoco = [each for each in recordings if group_of(each.name) != "pybullet"]
+    if of_mujoco:
+        scores["all of MuJoCo"] = score_of(of_mujoco)
+    return scores
 
 
 def main() -> None:
     """Score all recordings of a folder, print a line for each and for each group."""
     parser = argparse.ArgumentParser(prog="python -m tools.arm_recordings.score")
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--write", type=Path, metavar="FILE.json")
+    parser.add_argument("--write", type=Path, metavar="FILE.json", help="scores of the groups")
     options = parser.parse_args()
     recordings: list[ScoredRecording] = []
     for folder in sorted(path.parent for path in options.folder.glob("*/truth.json")):
         recordings.append(scored(folder))
         last = recordings[-1]
-        print(
-            last.name,
-            summary([last]),
-            last.holds,
-            last.as_good,
-            f"{last.seconds:.0f} s",
-            flush=True,
-        )
+        missed = [
+            f"{each.kind} {each.joint or ''}".strip()
+            for each in last.parameters
+            if each.determined and not each.covered
+        ]
+        print(last.name, score_of([last]), f"holds={last.holds}", f"as_good={last.as_good}")
+        print(f"  {last.seconds:.0f} s; missed: {', '.join(missed) or 'none'}", flush=True)
         if options.write is not None:
-            options.write.write_text(json.dumps([asdict(each) for each in recordings], indent=1))
-    groups: dict[str, list[ScoredRecording]] = {}
-    for recording in recordings:
-        groups.setdefault(group_of(recording.name), []).append(recording)
-    for group, members in groups.items():
-        print(group, summary(members))
-    print("all", summary(recordings))
+            groups = {name: asdict(score) for name, score in scores_by_group(recordings).items()}
+            options.write.write_text(json.dumps(groups, indent=1) + "\n")
+    for name, score in scores_by_group(recordings).items():
+        print(name, score)
 
 
 if __name__ == "__main__":
