@@ -150,7 +150,7 @@ class Score:
 
     Attributes:
         recordings: How many.
-        determined: Part of gains, viscous and dry frictions, delays and payloads that is determined.
+        determined: Part that is determined of gains, frictions, delays and payloads.
         covered: Part of all that is determined whose interval has the truth in it; None for none.
         width: Median width of these intervals by that of the bound; None for none.
         at_floor: Recordings of which the fit leaves noise alone.
