@@ -134,7 +134,7 @@ class RecordingLessonPage(PageContent):
         return int(np.argmax([figure.information for figure in self._of_choices()]))
 
     @property
-    def right_untold(self) -> int | None:
+    def right_undetermined(self) -> int | None:
         """Return the number of the right choice: what the recording cannot tell."""
         return self.least if self.blind.information > _TOLD else None
 
@@ -157,7 +157,7 @@ class RecordingLessonPage(PageContent):
         return round(self.result.fps)
 
     @property
-    def pan_is_untold(self) -> bool:
+    def pan_is_undetermined(self) -> bool:
         """Tell whether the recording tells nothing of the offset of the vertical axis."""
         return self.result.figure("offset", "shoulder_pan").information > 0.99
 

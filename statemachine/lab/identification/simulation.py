@@ -25,7 +25,7 @@ COUNTS = 4096  # of a turn of the servos (Feetech STS3215)
 _STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
-_UNTOLD = 0.5  # time after a start in motion that the unknown commands before it act on [s]
+_AFTER_UNKNOWN = 0.5  # commands before a start in motion act on so long [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class ArmSimulation:
         """
         if not self._moving_at_first.any():
             return 0
-        return min(round(_UNTOLD * self.recording.fps), len(self.recording.state) // 2)
+        return min(round(_AFTER_UNKNOWN * self.recording.fps), len(self.recording.state) // 2)
 
     @property
     def _moving_at_first(self) -> Array:
