@@ -44,7 +44,7 @@ class _Arm:
     def sent(self, action: Array) -> Array:
         """Return what the servos are told, (K, n): LeRobot truncates it to counts.
 
-        So does `_unnormalize` of its `motors/motors_bus.py`, after it clamps what is not in
+        So does _unnormalize of its `motors/motors_bus.py`, after it clamps what is not in
         degrees to the range. Of a joint that does not move the counts are not known.
         """
         sent = action.copy()

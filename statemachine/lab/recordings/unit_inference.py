@@ -1,6 +1,6 @@
 """Unit and scale of each joint of a recording, which its columns do not say.
 
-A servo measures in whole counts, 4096 to a turn. What LeRobot makes of a count is in `_normalize`
+A servo measures in whole counts, 4096 to a turn. What LeRobot makes of a count is in _normalize
 of its `motors/motors_bus.py`:
 
     degrees        (count - middle) * 360 / 4095
@@ -10,7 +10,7 @@ of its `motors/motors_bus.py`:
 So every measured value lies on a grid, whose width, the quantum, tells the unit: 360 / 4095 at
 all joints means degrees, and 200 / quantum is else the number of counts of the range that was
 swept at calibration. Such a degree is 4095/4096 of one, as the divisor is LeRobot's
-`model_resolution_table` less one; before June 2025 it was 4096. Of the commands nothing is taken:
+model_resolution_table less one; before June 2025 it was 4096. Of the commands nothing is taken:
 their quantum is that of the leader.
 """
 
