@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -83,3 +84,54 @@ def test_what_the_verdict_demands_is_what_the_page_says() -> None:
 def test_the_speed_of_the_script_is_that_of_the_page() -> None:
     assert f"at most {record_chirps.FASTEST:.0f}° a\nsecond" in PAGE
     assert f"for twice {record_chirps.SECONDS:.0f} s" in PAGE
+
+
+# How often it is right: a run of minutes, whose outcome is kept.
+
+
+GROUPS = {
+    "soft, chirps": "soft-chirps",
+    "soft, hand": "soft-hand",
+    "stiff, chirps": "stiff-chirps",
+    "stiff, hand": "stiff-hand",
+    "soft, a fault": "faults",
+    "soft, PyBullet": "pybullet",
+}
+
+
+def _scores() -> dict[str, dict[str, float | None]]:
+    file = ROOT / "tools" / "arm_recordings" / "thirty.json"
+    return json.loads(file.read_text("utf-8"))
+
+
+def _cell(part: float | None) -> str:
+    return "–" if part is None else f"{100 * part:.0f} %"
+
+
+@pytest.mark.parametrize("label", GROUPS)
+def test_the_table_of_scores_is_that_of_the_thirty(label):
+    score = _scores()[GROUPS[label]]
+    width = "–" if score["width"] is None else f"{score['width']:.2f}"
+    cells = [
+        label,
+        str(score["recordings"]),
+        _cell(score["determined"]),
+        _cell(score["covered"]),
+        width,
+    ]
+    assert f"| {' | '.join(cells)} |" in PAGE
+
+
+def test_of_soft_servos_and_chirps_most_is_determined():
+    assert _scores()["soft-chirps"]["determined"] >= 0.6
+
+
+def test_what_is_called_determined_is_true_and_no_wider_than_it_must_be():
+    score = _scores()["all of MuJoCo"]
+    assert score["covered"] >= 0.85
+    assert score["width"] <= 3.0
+
+
+def test_there_are_thirty():
+    scores = _scores()
+    assert scores["all of MuJoCo"]["recordings"] + scores["pybullet"]["recordings"] == 30
