@@ -95,7 +95,7 @@ def test_readme_and_guides_are_short() -> None:
     words = {name: len(PAGES[f"docs/{name}.md"].split()) for name in guides}
     assert sum(words.values()) - words["api"] <= 10_900  # which names what autodoc inserts
     # A page about one question; its tables and what it cannot tell are not to be left out.
-    assert len(PAGES["docs/real_arm.md"].split()) <= 960
+    assert len(PAGES["docs/real_arm.md"].split()) <= 1_000
 
 
 @pytest.mark.slow
