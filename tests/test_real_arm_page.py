@@ -134,4 +134,7 @@ def test_what_is_called_determined_is_true_and_no_wider_than_it_must_be():
 
 def test_there_are_thirty():
     scores = _scores()
-    assert scores["all of MuJoCo"]["recordings"] + scores["pybullet"]["recordings"] == 30
+    of_mujoco, of_pybullet = (
+        scores[group]["recordings"] for group in ("all of MuJoCo", "pybullet")
+    )
+    assert (of_mujoco, of_pybullet) == (26, 4)
