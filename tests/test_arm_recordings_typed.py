@@ -16,8 +16,8 @@ from statemachine.lab.identification import question, recorded_gap
 from statemachine.lab.identification.results import (
     IdentificationResult,
     RecordingRequest,
-    is_arm_recording,
 )
+from statemachine.lab.recordings.arm_recording import is_arm_recording
 
 from .support.arm_recordings import identification_result, recording_result, request
 from .support.requirements import need_engine

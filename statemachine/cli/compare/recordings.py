@@ -33,7 +33,7 @@ _EXAMPLE = f"{PROGRAM} compare lerobot:DIR#3 so101"
 
 def names_recording(options: argparse.Namespace) -> bool:
     """Tell whether a recording of a real arm is among the words."""
-    from ...lab.identification.results import is_arm_recording
+    from ...lab.recordings.arm_recording import is_arm_recording
 
     return any(map(is_arm_recording, options.what))
 
@@ -73,7 +73,7 @@ def _model_of(options: argparse.Namespace) -> str:
         StateMachineError: There is no such model.
     """
     from ...lab.compare.typed_sides import parse_sides
-    from ...lab.identification.results import is_arm_recording
+    from ...lab.recordings.arm_recording import is_arm_recording
 
     recording, *words = options.what
     if not is_arm_recording(recording):

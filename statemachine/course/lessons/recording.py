@@ -14,7 +14,7 @@ from ...interface import Array, Model
 from ...lab.identification.fit import Fit, Objective
 from ...lab.identification.fit import fit as fit_objective
 from ...lab.identification.parameters import ArmParameters
-from ...lab.identification.residuals import Residuals
+from ...lab.identification.residuals import Residuals, root_mean_square
 from ...lab.identification.results import CAUSES, UNITS, Cause, Kind
 from ...lab.identification.simulation import ArmSimulation
 from ...lab.identification.starts import Fits, first_objective, informations_beside
@@ -275,7 +275,7 @@ def _reading(end: Fit, other: ArmSimulation, before: float) -> FittedReading:
         parameters.each[number].figure(float(end.vector[number]))
         for number in parameters.of_kind("kp").tolist()
     ]
-    here = float(np.sqrt(np.square(end.errors).mean()))
+    here = root_mean_square(end.errors)
     elsewhere = _gap(other, other.angles(end.vector))
     return FittedReading(
         causes=tuple(cause for cause in CAUSES if cause in fitted),
@@ -291,14 +291,14 @@ def _reading(end: Fit, other: ArmSimulation, before: float) -> FittedReading:
 def _gap(simulation: ArmSimulation, angles: Array) -> float:
     """Return the root mean square of simulated angles (K, n) less the measured ones [rad]."""
     errors = (angles - simulation.state)[simulation.first_frame :]
-    gap = float(np.sqrt(np.square(errors).mean()))
+    gap = root_mean_square(errors)
     return gap if np.isfinite(gap) else np.inf
 
 
 def _commanded(recording: ArmRecording) -> float:
     """Return how far the arm is from where it was told to be, a frame before it is read [rad]."""
     errors = recording.state[1:] - recording.action[:-1]
-    return float(np.sqrt(np.square(errors).mean()))
+    return root_mean_square(errors)
 
 
 def _shares(readings: Sequence[FittedReading], before: float) -> dict[str, float | None]:

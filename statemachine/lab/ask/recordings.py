@@ -43,7 +43,7 @@ def recording(
 
     Raises:
         BadInputError: The recording cannot be read, or its numbers can mean several things.
-        MissingEngineError: The extra `parquet` is not installed.
+        MissingEngineError: The extra `recordings` is not installed.
         StateMachineError: The model cannot be loaded.
     """
     arguments = locals()
@@ -95,7 +95,7 @@ def identify(
     Raises:
         BadInputError: The recording cannot be read, its numbers can mean several things, or the
             file cannot be written.
-        MissingEngineError: The extra `parquet` is not installed.
+        MissingEngineError: The extra `recordings` is not installed.
         StateMachineError: The model cannot be loaded.
     """
     arguments = locals()

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..runs.drive import Progress, no_progress
 from .fit import Objective, fit
+from .residuals import root_mean_square
 from .results import Hypothesis
 from .simulation import ArmSimulation
 from .starts import Fits
@@ -73,7 +74,7 @@ def tried_reading(name: str, objective: Objective, fits: Fits, cost: float) -> H
     ends = [fit(objective, each.vector, runs=_RUNS) for each in fits.each[:2]]
     end = min(ends, key=lambda each: each.cost)
     evidence = cost - end.cost
-    residual = float(np.sqrt(np.square(end.errors).mean()))
+    residual = root_mean_square(end.errors)
     if not math.isfinite(residual) or evidence < -_EVIDENCE:
         return Hypothesis(name, residual, evidence, "fits worse")
     if evidence > _EVIDENCE and residual < fits.residuals.overall:

@@ -16,6 +16,7 @@ from ..recordings.arm_source import read_arm_recordings
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from .parameters import ArmParameters
+from .residuals import root_mean_square
 from .results import JointGap, RecordingGap, RecordingRequest, RecordingResult
 from .simulation import ArmSimulation
 
@@ -137,9 +138,9 @@ def gap_between(
         joints.append(
             JointGap(
                 joint=joint,
-                commanded=_rms(of_told[:, place]),
-                model=_rms(of_model[:, place]),
-                fitted=None if of_fitted is None else _rms(of_fitted[:, place]),
+                commanded=root_mean_square(of_told[:, place]),
+                model=root_mean_square(of_model[:, place]),
+                fitted=None if of_fitted is None else root_mean_square(of_fitted[:, place]),
             )
         )
     return RecordingGap(
@@ -147,11 +148,7 @@ def gap_between(
         part=part,
         seconds=len(of_told) / simulation.recording.fps,
         joints=tuple(joints),
-        commanded=_rms(of_told),
-        model=_rms(of_model),
-        fitted=None if of_fitted is None else _rms(of_fitted),
+        commanded=root_mean_square(of_told),
+        model=root_mean_square(of_model),
+        fitted=None if of_fitted is None else root_mean_square(of_fitted),
     )
-
-
-def _rms(errors: Array) -> float:
-    return float(np.sqrt(np.square(errors).mean()))

@@ -22,6 +22,11 @@ _QUANTILE = 1.96  # of the normal distribution, for 95 %
 _STILL = 0.7  # counts: a joint that hardly moves has an error of this size, and no noise
 
 
+def root_mean_square(errors: Array) -> float:
+    """Return the root mean square over all entries of errors, in their unit."""
+    return float(np.sqrt(np.square(errors).mean()))
+
+
 @dataclass(frozen=True, eq=False)
 class Residuals:
     """What is left between fitted and measured angles.
@@ -61,12 +66,12 @@ class Residuals:
     @property
     def overall(self) -> float:
         """Return the root mean square over all joints [rad]."""
-        return float(np.sqrt(np.square(self.rms).mean()))
+        return root_mean_square(self.rms)
 
     @property
     def floor(self) -> float:
         """Return what the measurement alone leaves, over all joints [rad]."""
-        return float(np.sqrt(np.square(np.minimum(self.noise, self.most)).mean()))
+        return root_mean_square(np.minimum(self.noise, self.most))
 
     @property
     def at_floor(self) -> bool:

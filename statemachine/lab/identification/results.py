@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -293,8 +292,3 @@ class IdentificationResult(ShownResult):
         """Return what the recording tells of each parameter as columns."""
         names = ("kind", "joint", "unit", "model", "fitted", "low", "high", "verdict")
         return columns_of(self.parameters, names)
-
-
-def is_arm_recording(what: object) -> bool:
-    """Tell whether a word names a recording of a real arm."""
-    return isinstance(what, str | os.PathLike) and os.fspath(what).startswith("lerobot:")

@@ -16,6 +16,7 @@ from ...interface import Array
 from ..runs.drive import Progress, no_progress
 from ..why.shapley import shapley
 from .fit import fit
+from .residuals import root_mean_square
 from .results import CAUSES, Cause, CauseShare
 from .simulation import ArmSimulation
 from .starts import Fits
@@ -76,4 +77,4 @@ def gap_of(simulation: ArmSimulation, vector: Array) -> float:
     """Return the root mean square over joints and frames of a vector's angles [rad]."""
     angles = simulation.angles(vector)
     errors = (angles - simulation.state)[simulation.first_frame :]
-    return float(np.sqrt(np.square(errors).mean()))
+    return root_mean_square(errors)

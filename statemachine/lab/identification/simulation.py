@@ -9,7 +9,6 @@ extrapolation from two step lengths.
 
 from __future__ import annotations
 
-import math
 import warnings
 from dataclasses import dataclass
 
@@ -19,9 +18,9 @@ from ...errors import DivergedWarning
 from ...interface import Array
 from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
+from ..recordings.unit_inference import COUNT
 from .parameters import ArmParameters
 
-COUNTS = 4096  # of a turn of the servos (Feetech STS3215)
 _STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
@@ -53,7 +52,7 @@ class ArmSimulation:
     def of_motion(cls, parameters: ArmParameters, action: Array, fps: float) -> ArmSimulation:
         """Return the simulation of commands (K, n) [rad] that start at rest."""
         at_rest = np.tile(action[:1], (len(action), 1))
-        resolution = np.full(action.shape[1], math.tau / COUNTS)
+        resolution = np.full(action.shape[1], COUNT)
         recording = ArmRecording(
             source="",
             episode=0,

@@ -10,7 +10,7 @@ import numpy as np
 from ...interface import Array
 from ..runs.drive import Progress, no_progress
 from .fit import Fit, Objective, fit, starting_points
-from .residuals import Residuals
+from .residuals import Residuals, root_mean_square
 
 _AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
 _NEAR_THE_END = 1e-3  # of the sum of squares, where a start waits for the best one
@@ -71,7 +71,7 @@ class Fits:
     def _more_than_noise(self) -> float:
         """Return what is left by its noise, over all joints; at least 1."""
         left = self.residuals.rms / np.minimum(self.residuals.noise, self.residuals.most)
-        return max(1.0, float(np.sqrt(np.square(left).mean())))
+        return max(1.0, root_mean_square(left))
 
 
 def least_certain(informations: Sequence[Array], prior: Array) -> Array:

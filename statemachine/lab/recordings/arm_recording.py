@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 from ...interface import Array
 from .joint_units import JointUnit
+
+PREFIX = "lerobot:"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,3 +50,8 @@ class ArmRecordings:
 
     fitted: ArmRecording
     held_out: ArmRecording | None
+
+
+def is_arm_recording(what: object) -> bool:
+    """Tell whether a word names a recording of a real arm."""
+    return isinstance(what, str | os.PathLike) and os.fspath(what).startswith(PREFIX)

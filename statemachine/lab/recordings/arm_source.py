@@ -11,14 +11,13 @@ import numpy as np
 from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array, JointType, Model
 from ...models import AnyPath
-from .arm_recording import ArmRecording, ArmRecordings
+from .arm_recording import PREFIX, ArmRecording, ArmRecordings
 from .calibration import read_calibration
 from .joint_units import JointUnit
 from .lerobot import FEWEST_FRAMES, LerobotDataSet, LerobotEpisode, open_data_set
 from .lerobot_description import joint_name
 from .unit_inference import COUNT, MeasuredJoint, infer_units, measured_joint
 
-PREFIX = "lerobot:"
 _FORM = f"{PREFIX}DIR or {PREFIX}DIR#EPISODE"
 SYNTHETIC = "synthetic"  # the recording that comes with the package
 _SYNTHETIC_FOLDER = Path(__file__).resolve().parent / "synthetic"
@@ -105,9 +104,7 @@ def folder_and_episode(source: str) -> tuple[Path, int | None]:
         BadInputError: It does not begin with "lerobot:", or its episode is no number.
     """
     if not source.startswith(PREFIX):
-        raise BadInputError(
-            f"a recording is {PREFIX}DIR or {PREFIX}DIR#EPISODE; got {shown(source)}"
-        )
+        raise BadInputError(f"a recording is {_FORM}; got {shown(source)}")
     named = source.removeprefix(PREFIX)
     folder, mark, episode = named.rpartition("#")
     if not mark or Path(named).is_dir():
@@ -115,9 +112,7 @@ def folder_and_episode(source: str) -> tuple[Path, int | None]:
     elif not (episode.isascii() and episode.isdigit()):
         raise BadInputError(f"an episode is a number, as in {PREFIX}DIR#3; got {shown(source)}")
     if not folder:
-        raise BadInputError(
-            f"a recording is {PREFIX}DIR or {PREFIX}DIR#EPISODE; got {shown(source)}"
-        )
+        raise BadInputError(f"a recording is {_FORM}; got {shown(source)}")
     path = _SYNTHETIC_FOLDER if folder == SYNTHETIC else Path(folder).expanduser()
     return path, int(episode) if episode else None
 
