@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import shlex
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -56,20 +57,65 @@ def _said(command: str, folder: str | Path) -> Any:
 
 
 def shape(value: Any) -> Any:
-    """Return keys with the shapes under them, the shapes of a list, or the name of a type."""
+    """Return keys with the shapes under them, the shapes of a list, or the name of a type.
+
+    Objects of a list that have the same keys are one shape: which of them stand there is for the
+    tests of the figures, and may hang on the processor.
+    """
     if isinstance(value, dict):
         return {
-            name: "number or null"
+            name: {"either": ["null", "number"]}
             if name in MAY_BE_NULL and isinstance(inner, int | float | None)
             else shape(inner)
             for name, inner in value.items()
         }
     if isinstance(value, list):
-        shapes = {json.dumps(shape(inner), sort_keys=True) for inner in value}
-        return [json.loads(text) for text in sorted(shapes)]
+        return _shapes_in_a_list(shape(inner) for inner in value)
     return {bool: "true or false", int: "number", float: "number", str: "text"}.get(
         type(value), "null"
     )
+
+
+def _shapes_in_a_list(shapes: Iterable[Any]) -> list[Any]:
+    """Return each shape once, those of objects with the same keys as one."""
+    by_kind: dict[str, Any] = {}
+    for found in shapes:
+        kind = _kind(found)
+        if kind not in by_kind:
+            by_kind[kind] = found
+        elif isinstance(found, list):
+            by_kind[kind] = _shapes_in_a_list([*by_kind[kind], *found])
+        elif isinstance(found, dict):
+            by_kind[kind] = {name: _either(by_kind[kind][name], found[name]) for name in found}
+    return [by_kind[kind] for kind in sorted(by_kind)]
+
+
+def _kind(found: Any) -> str:
+    """Return what two shapes that become one have in common."""
+    if isinstance(found, list):
+        return "list"
+    return json.dumps(sorted(found)) if isinstance(found, dict) else found
+
+
+def _either(one: Any, other: Any) -> Any:
+    """Return the shape of what has one of two shapes."""
+    shapes = _shapes_in_a_list([*_alternatives(one), *_alternatives(other)])
+    return shapes[0] if len(shapes) == 1 else {"either": shapes}
+
+
+def _alternatives(found: Any) -> list[Any]:
+    """Return the shapes of which something has one."""
+    if isinstance(found, dict) and set(found) == {"either"}:
+        return found["either"]
+    return [found]
+
+
+def test_objects_with_the_same_keys_are_one_shape() -> None:
+    found = [{"low": 1.0, "reasons": []}, {"low": None, "reasons": ["far"]}, {"name": "a"}]
+    assert shape(found) == [
+        {"low": {"either": ["null", "number"]}, "reasons": ["text"]},
+        {"name": "text"},
+    ]
 
 
 @pytest.mark.slow
