@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from ...measures.text import grouped
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits, with_answer
-from ...show.templates import PageContent, render, render_blocks
-from ..runs.provenance import Provenance
+from ...show.templates import render, render_blocks
 from .identification_details import IdentificationDetails
+from .page_of_recording import PageOfRecording
 from .parameter_table import UNKNOWN, joint_table, ranked_shares
 from .parameter_texts import figure_text, interval_text
 from .results import (
@@ -21,9 +21,8 @@ from .results import (
     FittedParameter,
     Hypothesis,
     IdentificationResult,
-    RecordingGap,
 )
-from .typed_question import recording_name, typed_question
+from .typed_question import typed_question
 from .units_page import units_blocks
 from .unknown import TellingMotion, motions_of
 from .written_page import written_blocks
@@ -34,7 +33,7 @@ _MOST_ROWS = 6
 
 
 @dataclass(frozen=True)
-class IdentificationPage(PageContent):
+class IdentificationPage(PageOfRecording):
     """What the page of an identification shows.
 
     Attributes:
@@ -53,30 +52,10 @@ class IdentificationPage(PageContent):
     further: Sequence[Block]
 
     @property
-    def gap(self) -> RecordingGap:
-        """Return how far everything is from the arm on what was not fitted."""
-        return self.result.gap
-
-    @property
-    def provenance(self) -> Provenance:
-        """Return what it was computed with."""
-        return self.result.provenance
-
-    @property
     def engine(self) -> str:
         """Return the engine and its version."""
         source = self.result.provenance
         return f"{source.backend} {source.versions[source.backend]}"
-
-    @property
-    def recording(self) -> str:
-        """Return the recording, without its folder."""
-        return recording_name(self.result.request.recording)
-
-    @property
-    def model_file(self) -> str:
-        """Return the name of the model's file."""
-        return self.provenance.model_file.rpartition("/")[2]
 
     @property
     def is_last_third(self) -> bool:

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from ...measures.text import degrees
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import with_answer
-from ...show.templates import PageContent, render
-from ..runs.provenance import Provenance
+from ...show.templates import render
+from .page_of_recording import PageOfRecording
 from .results import RecordingGap, RecordingResult
-from .typed_question import recording_name, typed_question
+from .typed_question import typed_question
 from .units_page import units_blocks
 
 ALL_JOINTS = "all joints"
 
 
 @dataclass(frozen=True)
-class RecordingPage(PageContent):
+class RecordingPage(PageOfRecording):
     """What the page of a recording shows.
 
     Attributes:
@@ -29,26 +29,6 @@ class RecordingPage(PageContent):
     template = "recording.md.j2"
     result: RecordingResult
     units: Sequence[Block]
-
-    @property
-    def gap(self) -> RecordingGap:
-        """Return how far commands and model are from the arm."""
-        return self.result.gap
-
-    @property
-    def provenance(self) -> Provenance:
-        """Return what it was computed with."""
-        return self.result.provenance
-
-    @property
-    def recording(self) -> str:
-        """Return the recording, without its folder."""
-        return recording_name(self.result.request.recording)
-
-    @property
-    def model_file(self) -> str:
-        """Return the name of the model's file."""
-        return self.provenance.model_file.rpartition("/")[2]
 
     @property
     def is_nearer(self) -> bool:
