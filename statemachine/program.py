@@ -10,8 +10,9 @@ import sys
 from pathlib import Path
 
 NAME = "statemachine"
-# A command of ours within a text: the name of the program, and a word behind it.
-_COMMAND = re.compile(r"(?<![\w./\\-])statemachine(?= (?:[a-z]|--help))")
+# A command of ours within a text: the name of the program, and a word behind it. In a program of
+# Python's, `import statemachine as sm` and `from statemachine import lab` name the package.
+_COMMAND = re.compile(r"(?<![\w./\\-])(?<!import )(?<!from )statemachine(?= (?:[a-z]|--help))")
 
 
 def program() -> str:
