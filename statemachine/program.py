@@ -13,6 +13,8 @@ NAME = "statemachine"
 # A command of ours within a text: the name of the program, and a word behind it. In a program of
 # Python's, `import statemachine as sm` and `from statemachine import lab` name the package.
 _COMMAND = re.compile(r"(?<![\w./\\-])(?<!import )(?<!from )statemachine(?= (?:[a-z]|--help))")
+# Python before the file of a program.
+_SCRIPT = re.compile(r"(?<![\w./\\-])python(?= [\w./\\-]+\.py\b)")
 
 
 def program() -> str:
@@ -34,11 +36,12 @@ def program() -> str:
 
 
 def as_called(text: str) -> str:
-    """Return a text whose commands of ours begin as the user called this program.
+    """Return a text whose commands begin as the user types them here.
 
     Args:
-        text: In which the program is called `statemachine`.
+        text: In which the program is called `statemachine`, and Python `python`.
     """
+    text = _SCRIPT.sub(lambda _: python(), text)
     return _COMMAND.sub(lambda _: program(), text)
 
 
@@ -48,7 +51,7 @@ def command_as_called(command: str) -> str:
     Args:
         command: In which the program is called `statemachine`, and Python `python`.
     """
-    if command.startswith("python "):
+    if command.startswith("python -"):
         command = python() + command.removeprefix("python")
     return as_called(command)
 

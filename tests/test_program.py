@@ -88,12 +88,15 @@ def test_in_another_program_it_is_called_by_its_name(called: Call) -> None:
         ("pip install statemachine-sim", "pip install statemachine-sim"),
         ("import statemachine as sm", "import statemachine as sm"),
         ("from statemachine import lab", "from statemachine import lab"),
+        ("python exercises/step_loop.py", "x/python exercises/step_loop.py"),
+        ("python 3.11.7", "python 3.11.7"),
     ],
 )
 def test_commands_alone_are_called_so(
     text: str, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(program, "program", lambda: "x/statemachine")
+    monkeypatch.setattr(program, "python", lambda: "x/python")
     assert program.as_called(text) == expected
 
 
