@@ -76,6 +76,11 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
     return Html(f"<{name}{said}>{inner}</{name}>")
 
 
+def lines_of_code(lines: Iterable[str]) -> Html:
+    """Return lines as they are, each on a line of its own."""
+    return Html("\n".join(literal(line) for line in lines))
+
+
 def joined(parts: Iterable[object]) -> Html:
     """Join parts one after the other."""
     return Html("".join(escaped(part) for part in parts))
