@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,12 +13,14 @@ import pytest
 from statemachine import cli, lab
 from statemachine.cli.compare.recordings import OPTIONS_OF_RECORDINGS, recording_request_of
 from statemachine.errors import BadInputError, StateMachineError
+from statemachine.lab.compare.typed_sides import split_words
 from statemachine.lab.identification import question, recorded_gap
 from statemachine.lab.identification.results import (
     IdentificationResult,
     RecordingRequest,
 )
 from statemachine.lab.recordings.arm_recording import is_arm_recording
+from tools.arm_recordings.plans import SHIPPED_FOLDER
 
 from .support.arm_recordings import identification_result, recording_result, request
 from .support.requirements import need_engine
@@ -109,6 +112,12 @@ def test_what_is_no_question_of_a_recording_is_refused_in_one_line(
     with pytest.raises(BadInputError, match=says) as refusal:
         asked(*words)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("word", ["synthetic", f"{SHIPPED_FOLDER}#1"])
+def test_the_prefix_of_a_recording_is_told_where_it_lacks(word: str) -> None:
+    with pytest.raises(BadInputError, match=re.escape(f"is typed lerobot:{word}")):
+        split_words([word, "so101"])
 
 
 def test_a_model_that_is_not_there_is_refused() -> None:

@@ -181,7 +181,7 @@ def _add_why(group: argparse._ArgumentGroup) -> None:
         type=file_name,
         metavar="FILE",
         help="write the right's file with the left's values, run it, and tell what stays; with "
-        "--models, too",
+        "--models, too; of a recorded arm, the model's file with the fitted values",
     )
     add_jobs(group)
 

@@ -54,7 +54,7 @@ def request_of(options: argparse.Namespace) -> Question:
     if not options.what:
         raise BadInputError(
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION, "
-            f"POLICY.onnx or traces: {PROGRAM} compare hold"
+            f"POLICY.onnx, traces or a recorded arm (lerobot:DIR): {PROGRAM} compare hold"
         )
     what, sides = split_words(options.what, options.menagerie)
     if len(sides) > len(PAIR) or _names_several_backends(options):

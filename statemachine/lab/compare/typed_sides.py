@@ -19,6 +19,7 @@ from ...interface.records import READ_OPTIONS
 from ...measures.text import command
 from ...models import SUFFIXES as MODELS
 from ...typed_numbers import typed_float
+from ..recordings.arm_recording import check_prefix
 from ..runs.controllers import is_controller, is_policy
 from ..runs.scenarios import SCENARIOS
 from .sides import Side
@@ -146,7 +147,8 @@ def split_words(
         menagerie: A menagerie folder to look names up in.
 
     Raises:
-        BadInputError: Sides without an experiment, or one side of an engine.
+        BadInputError: Sides without an experiment, or one side of an engine, or a recording of a
+            real arm without its prefix.
         StateMachineError: As `parse_sides` does.
     """
     size = len(list(takewhile(is_trace, words)))
@@ -158,6 +160,8 @@ def split_words(
     for word in rest:
         if is_trace(word):
             raise BadInputError(f"{word} is a recorded run: type statemachine compare {word} FILE")
+    if not (is_run or is_side):
+        check_prefix(what[0])
     if rest and not (is_run or is_side):
         raise unknown_name("experiment", what[0], SCENARIOS)
     if any(word in SCENARIOS for word in rest) or not (is_run or is_side):

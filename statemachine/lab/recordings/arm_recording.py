@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
+from ...errors import BadInputError, printable
 from ...interface import Array
 from .joint_units import JointUnit
 
 PREFIX = "lerobot:"
+SYNTHETIC = "synthetic"  # the recording that comes with the package
+DESCRIPTION = "meta/info.json"  # of a data set, below its folder
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +59,17 @@ class ArmRecordings:
 def is_arm_recording(what: object) -> bool:
     """Tell whether a word names a recording of a real arm."""
     return isinstance(what, str | os.PathLike) and os.fspath(what).startswith(PREFIX)
+
+
+def check_prefix(what: str) -> None:
+    """Refuse a recording of a real arm that is named without its prefix.
+
+    Args:
+        what: A word that names nothing else.
+
+    Raises:
+        BadInputError: It is the folder of a data set, or the recording of this package.
+    """
+    folder = what.partition("#")[0]
+    if folder == SYNTHETIC or (Path(folder).expanduser() / DESCRIPTION).is_file():
+        raise BadInputError(f"a recording of a real arm is typed {PREFIX}{printable(what)}")

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array, JointType, Model
 from ...models import AnyPath
-from .arm_recording import PREFIX, ArmRecording, ArmRecordings
+from .arm_recording import PREFIX, SYNTHETIC, ArmRecording, ArmRecordings
 from .calibration import read_calibration
 from .joint_units import JointUnit
 from .lerobot import FEWEST_FRAMES, LerobotDataSet, LerobotEpisode, open_data_set
@@ -19,7 +19,6 @@ from .lerobot_description import joint_name
 from .unit_inference import COUNT, MeasuredJoint, infer_units, measured_joint
 
 _FORM = f"{PREFIX}DIR or {PREFIX}DIR#EPISODE"
-SYNTHETIC = "synthetic"  # the recording that comes with the package
 _SYNTHETIC_FOLDER = Path(__file__).resolve().parent / "synthetic"
 _MOST_EPISODES = 100  # whose values are looked at for their quantum
 _FURTHEST = 360.0  # degrees: a servo turns once, and its counts are from -180 to 180

@@ -10,6 +10,7 @@ from typing import cast
 
 from ...errors import BadInputError, printable, shown
 from ...models import kind_of_path
+from .arm_recording import DESCRIPTION
 from .lerobot_files import parse_object, read_columns, read_text
 
 STATE, ACTION = "observation.state", "action"
@@ -68,13 +69,14 @@ def read_description(folder: Path) -> DataSetDescription:
         kind = kind_of_path(folder)
         if kind == "nothing":
             raise BadInputError(
-                f"there is no folder {folder}; lerobot: takes the folder of a data set, and "
-                "lerobot:synthetic is the recording that comes with this package"
+                f"there is no folder {folder}; lerobot: takes the folder of a data set, which "
+                "LeRobot keeps in ~/.cache/huggingface/lerobot; lerobot:synthetic is the "
+                "recording that comes with this package"
             )
         raise BadInputError(f"{folder} is {kind}; lerobot: takes the folder of a data set")
-    path = folder / "meta" / "info.json"
+    path = folder / DESCRIPTION
     if not path.is_file():
-        raise BadInputError(f"{folder} has no meta/info.json: it is not a data set of LeRobot")
+        raise BadInputError(f"{folder} has no {DESCRIPTION}: it is not a data set of LeRobot")
     info = parse_object(read_text(path), path)
     version = info.get("codebase_version")
     if not isinstance(version, str) or version not in VERSIONS:
@@ -146,7 +148,7 @@ def _places_of_lines(folder: Path, chunk_size: object) -> dict[int, EpisodePlace
     path = folder / "meta" / "episodes.jsonl"
     if not path.is_file():
         raise BadInputError(f"{folder} has no meta/episodes.jsonl, which version 2 has")
-    size = _whole(chunk_size, "chunks_size", folder / "meta" / "info.json")
+    size = _whole(chunk_size, "chunks_size", folder / DESCRIPTION)
     if size == 0:
         raise BadInputError(f"{folder}/meta/info.json: chunks_size is 0")
     places: dict[int, EpisodePlace] = {}
