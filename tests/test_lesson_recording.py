@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine import lab
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.recording import READINGS, RecordingLessonResult, ToldFigure
 from statemachine.course.lessons.recording_page import ASKED
@@ -58,7 +59,8 @@ def test_the_program_s_angles_are_compared_with_the_measured_ones(
 ) -> None:
     recording = read_arm_recordings("lerobot:synthetic", sm.load("so101"), None, {}).fitted
     assert np.array_equal(result.measured, recording.state)
-    assert result.commanded == pytest.approx(_rms(recording.state[1:] - recording.action[:-1]))
+    gap = lab.recording("lerobot:synthetic", "so101").gap
+    assert (result.commanded, result.here) == pytest.approx((gap.commanded, gap.model))
     # The program steps by implicitfast, the fits by Euler without the error of a step.
     assert _rms(result.typed - recording.state) == pytest.approx(result.here, rel=0.05)
 
@@ -183,6 +185,19 @@ def test_a_sum_of_parts_that_is_no_more_than_the_whole_is_not_called_standing_in
 ) -> None:
     apart = _with_taken(result, 0.3, 0.3)
     assert len(blocks(_page(apart), Verdict)) == len(blocks(_page(result), Verdict)) - 1
+
+
+@pytest.mark.parametrize(("missed", "too_narrow"), [(0, False), (4, False), (5, True)])
+def test_intervals_are_too_narrow_where_more_miss_than_by_chance(
+    missed: int, too_narrow: bool, result: RecordingLessonResult
+) -> None:
+    figures = [replace(figure, truth=figure.fitted) for figure in result.figures]
+    for place in range(missed):
+        figures[place] = replace(figures[place], truth=figures[place].high + 1.0)
+    shown = replace(result, figures=tuple(figures))
+    [content] = contents({"mujoco": shown}, _frame(shown)).values()
+    assert (len(figures), content.expected) == (32, 30)
+    assert content.is_too_narrow == too_narrow
 
 
 def test_an_axis_that_is_told_makes_no_claim_that_it_is_not(result: RecordingLessonResult) -> None:

@@ -14,6 +14,7 @@ from ...interface import Array, Model
 from ...lab.identification.fit import Fit, Objective
 from ...lab.identification.fit import fit as fit_objective
 from ...lab.identification.parameters import ArmParameters
+from ...lab.identification.recorded_gap import gap_between
 from ...lab.identification.residuals import Residuals, root_mean_square
 from ...lab.identification.results import CAUSES, UNITS, Cause, Kind
 from ...lab.identification.simulation import ArmSimulation
@@ -186,7 +187,7 @@ def run(play: CodeRun, options: Options, progress: Progress) -> RecordingLessonR
     readings = [_reading(fit, other, elsewhere) for fit in fits]
     residuals = Residuals.of(fits[-1].errors, recording)
     time = np.arange(len(recording.state)) / recording.fps
-    commanded, here = _commanded(recording), _gap(simulation, simulation.angles(nothing))
+    gap = gap_between(simulation, simulation.angles(nothing))
     figures, shares = _figures(fits[-1], residuals), _shares(readings, elsewhere)
     return RecordingLessonResult(
         joints=parameters.joints,
@@ -194,8 +195,8 @@ def run(play: CodeRun, options: Options, progress: Progress) -> RecordingLessonR
         time=time,
         measured=recording.state,
         typed=typed,
-        commanded=commanded,
-        here=here,
+        commanded=gap.commanded,
+        here=gap.model,
         elsewhere=elsewhere,
         readings=tuple(readings),
         shares=shares,
@@ -293,12 +294,6 @@ def _gap(simulation: ArmSimulation, angles: Array) -> float:
     errors = (angles - simulation.state)[simulation.first_frame :]
     gap = root_mean_square(errors)
     return gap if np.isfinite(gap) else np.inf
-
-
-def _commanded(recording: ArmRecording) -> float:
-    """Return how far the arm is from where it was told to be, a frame before it is read [rad]."""
-    errors = recording.state[1:] - recording.action[:-1]
-    return root_mean_square(errors)
 
 
 def _shares(readings: Sequence[FittedReading], before: float) -> dict[str, float | None]:

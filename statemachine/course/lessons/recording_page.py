@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ from .recording import FittedReading, RecordingLessonResult, ToldFigure
 
 _SAY = TableLabels(__name__, "recording_labels.md.j2")
 _MOST = 0.5  # of the gap: a reading that takes away more explains most of it
+_CONFIDENCE = 0.95  # of an interval
 _TOLD = 0.3  # standard deviation after a fit by that before it, below which a figure is told
 _WATCHED = "shoulder_lift"  # the joint that is drawn and looked at
 _CURVE = 4.0  # [s] of it that are drawn
@@ -175,6 +177,18 @@ class RecordingLessonPage(PageContent):
     def within(self) -> int:
         """Return how many intervals have the truth in them."""
         return sum(figure.is_within for figure in self.result.figures)
+
+    @property
+    def expected(self) -> int:
+        """Return how many would have the truth in them if each had it with 95 %."""
+        return round(_CONFIDENCE * len(self.result.figures))
+
+    @property
+    def is_too_narrow(self) -> bool:
+        """Tell whether fewer intervals have the truth in them than chance makes of 95 %."""
+        figures = len(self.result.figures)
+        deviation = math.sqrt(figures * _CONFIDENCE * (1.0 - _CONFIDENCE))
+        return self.within < _CONFIDENCE * figures - 2.0 * deviation
 
 
 def contents(
