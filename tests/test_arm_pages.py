@@ -9,7 +9,11 @@ import pytest
 
 from statemachine.lab.identification.identification_page import IdentificationPage, page
 from statemachine.lab.identification.recording_page import RecordingPage, gap_table
-from statemachine.lab.identification.results import IdentificationResult, RecordingResult
+from statemachine.lab.identification.results import (
+    Hypothesis,
+    IdentificationResult,
+    RecordingResult,
+)
 from statemachine.lab.identification.units_page import UnitsPart
 from statemachine.show.blocks import Headline, Table
 from statemachine.show.first_screen import LINES, lines_of
@@ -170,6 +174,32 @@ def test_a_reading_that_fits_better_is_on_the_first_screen(fitted: Identificatio
     assert content(better).better[0].name == "the sign of elbow_flex"
     assert "the sign of elbow_flex" in shown(page(better))
     assert "the sign of elbow_flex" not in shown(page(fitted))
+
+
+def with_play(fitted: IdentificationResult) -> IdentificationResult:
+    """Return a result in which play of two joints fits better, and of one it cannot be told."""
+    said = {"elbow_flex": "fits better", "wrist_flex": "fits better", "gripper": "cannot tell"}
+    tried = [
+        Hypothesis(f"play of {joint}", math.radians(0.06), 30.0, verdict, math.radians(0.31))  # pyright: ignore[reportArgumentType]
+        for joint, verdict in said.items()
+    ]
+    return replace(fitted, hypotheses=(*fitted.hypotheses, *tried))
+
+
+def test_what_the_model_lacks_is_told_with_its_size_and_is_no_other_reading(
+    fitted: IdentificationResult,
+) -> None:
+    play = content(with_play(fitted))
+    assert play.lacking == ["play of elbow_flex (0.31°)", "play of wrist_flex (0.31°)"]
+    assert play.better == []
+    assert content(fitted).lacking == []
+
+
+def test_play_is_on_the_first_screen_which_stays_one(fitted: IdentificationResult) -> None:
+    first = page(with_play(fitted))
+    assert "play of wrist_flex" in shown(first)
+    assert lines_of(first) <= LINES
+    assert not wide_lines(shown(page(with_play(fitted), details=True)).splitlines())
 
 
 def test_only_joints_of_which_something_is_determined_have_a_row(

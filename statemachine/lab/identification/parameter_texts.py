@@ -19,6 +19,8 @@ REASON_WORDS: dict[Reason, str] = {
     "residual above the floor": "residual",
     "starts disagree": "starts",
     "does not hold elsewhere": "elsewhere",
+    "play fits as well": "play",
+    "a tilted base fits as well": "tilt",
 }
 
 
