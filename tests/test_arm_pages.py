@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from statemachine.lab.identification.identification_page import IdentificationPage, page
+from statemachine.lab.identification.parameter_texts import half_width_text
 from statemachine.lab.identification.recording_page import RecordingPage, gap_table
 from statemachine.lab.identification.results import (
     Hypothesis,
@@ -210,7 +211,7 @@ def test_only_joints_of_which_something_is_determined_have_a_row(
         *("fitted", "kp, N·m/rad", "viscous, N·m·s/rad", "friction, N·m")
     ]
     assert [row[0] for row in table.rows] == ["shoulder_lift", "elbow_flex", "the model"]
-    assert table.rows[0][1] == "8.50 ± 0.17"
+    assert table.rows[0][1] == "8.50 ± 2 %"
     assert table.rows[-1][1:] == ["998", "3.33", "0.0520"]
 
 
@@ -271,6 +272,19 @@ def test_details_have_both_tables_of_parameters(fitted: IdentificationResult) ->
     titles = {table.title: table for table in blocks(fitted.page(details=True), Table)}
     assert len(titles["What this recording determines"].rows) == 8
     assert len(titles["What this recording cannot tell"].rows) == 24
+
+
+def test_a_wide_interval_is_seen_to_be_wide(fitted: IdentificationResult) -> None:
+    kp = next(each for each in fitted.parameters if each.verdict == "determined")
+    wide = replace(kp, fitted=36.0, low=14.0, high=58.0)
+    assert half_width_text(wide) == "61 %"
+
+
+def test_what_the_model_has_none_of_has_an_interval_in_its_unit(
+    fitted: IdentificationResult,
+) -> None:
+    delay = next(each for each in fitted.parameters if each.kind == "delay")
+    assert half_width_text(replace(delay, low=0.030, high=0.032)) == "1.0"
 
 
 def test_a_determined_figure_says_how_many_times_that_of_the_model_it_is(
