@@ -57,6 +57,20 @@ def headline(result: RecordingResult | IdentificationResult) -> Headline:
 # A recording and the model as it is.
 
 
+@pytest.mark.parametrize(
+    ("robot", "is_told"), [("my_own_arm", True), ("so100_follower", False), ("", False)]
+)
+def test_a_robot_that_is_no_so_arm_is_told_on_both_pages(
+    recorded: RecordingResult, fitted: IdentificationResult, robot: str, is_told: bool
+) -> None:
+    for result in (recorded, fitted):
+        recordings = result.recordings
+        of_robot = replace(recordings, fitted=replace(recordings.fitted, robot=robot))
+        screen = replace(result, recordings=of_robot).page()
+        assert ("a robot called" in shown(screen)) == is_told
+    assert lines_of(screen) <= LINES
+
+
 def test_the_model_is_nearer_where_its_gap_is_smaller_than_that_of_the_commands(
     recorded: RecordingResult,
 ) -> None:

@@ -24,7 +24,7 @@ from .results import (
     RecordingGap,
 )
 from .typed_question import recording_name, typed_question
-from .units_page import units_blocks
+from .units_page import other_robot, units_blocks
 from .unknown import TellingMotion, motions_of
 from .written_page import written_blocks
 
@@ -72,6 +72,11 @@ class IdentificationPage(PageContent):
     def recording(self) -> str:
         """Return the recording, without its folder."""
         return recording_name(self.result.request.recording)
+
+    @property
+    def other_robot(self) -> str:
+        """Return the robot that the data set is of; "" for an SO-100 or SO-101, and for no word."""
+        return other_robot(self.result.recordings.fitted)
 
     @property
     def model_file(self) -> str:

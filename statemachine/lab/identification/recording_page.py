@@ -12,7 +12,7 @@ from ...show.templates import PageContent, render
 from ..runs.provenance import Provenance
 from .results import RecordingGap, RecordingResult
 from .typed_question import recording_name, typed_question
-from .units_page import units_blocks
+from .units_page import other_robot, units_blocks
 
 ALL_JOINTS = "all joints"
 
@@ -44,6 +44,11 @@ class RecordingPage(PageContent):
     def recording(self) -> str:
         """Return the recording, without its folder."""
         return recording_name(self.result.request.recording)
+
+    @property
+    def other_robot(self) -> str:
+        """Return the robot that the data set is of; "" for an SO-100 or SO-101, and for no word."""
+        return other_robot(self.result.recordings.fitted)
 
     @property
     def model_file(self) -> str:

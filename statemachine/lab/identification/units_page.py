@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from ...measures.text import NO_NUMBER, degrees, fixed, grouped, significant
 from ...show.blocks import Block, Table
 from ...show.templates import PageContent, render_blocks
+from ..recordings.arm_recording import ArmRecording
 from ..recordings.joint_units import JointUnit, Unit, UnitSource
+from ..recordings.robot_types import is_so_arm
 
 _WIDTHS: dict[Unit, float] = {"degrees": 360.0, "-100 to 100": 200.0, "0 to 100": 100.0}
 _SAME_ZERO = math.radians(0.05)  # what rounds to 0.0°
@@ -84,6 +86,11 @@ class UnitsPart(PageContent):
         """Return a table with a row for each joint."""
         headers = ("joint", "unit", "1 is", "0 is at", "counts", "step", "taken from")
         return Table(headers, [_row_of(unit) for unit in self.units], words=frozenset({0, 1, 6}))
+
+
+def other_robot(recording: ArmRecording) -> str:
+    """Return the robot of a recording; "" for an SO-100 or SO-101, and where it does not say."""
+    return "" if is_so_arm(recording.robot) else recording.robot
 
 
 def _row_of(unit: JointUnit) -> tuple[str, ...]:
