@@ -25,6 +25,9 @@ _ABANDONED = 3600.0  # seconds since anything was written into one: its process 
 def check_place(target: Path, suffixes: Sequence[str] = (), what: str = "the output") -> None:
     """Refuse a place where no file can be written, before anything is run.
 
+    An empty file is made beside the place and deleted again: what a folder permits does not say
+    whether its filesystem takes a file, above all for root.
+
     Args:
         target: The place.
         suffixes: What it may end in; empty for anything.
@@ -52,6 +55,11 @@ def check_place(target: Path, suffixes: Sequence[str] = (), what: str = "the out
         raise BadInputError(f"{cannot}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise BadInputError(f"{cannot}: its folder is read-only for you")
+    try:
+        with _part_of(target):
+            pass
+    except OSError as error:
+        raise BadInputError(f"{cannot}: {error.strerror}") from None
 
 
 @contextmanager

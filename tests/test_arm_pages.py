@@ -8,8 +8,13 @@ from dataclasses import replace
 import pytest
 
 from statemachine.lab.identification.identification_page import IdentificationPage, page
+from statemachine.lab.identification.parameter_texts import half_width_text
 from statemachine.lab.identification.recording_page import RecordingPage, gap_table
-from statemachine.lab.identification.results import IdentificationResult, RecordingResult
+from statemachine.lab.identification.results import (
+    Hypothesis,
+    IdentificationResult,
+    RecordingResult,
+)
 from statemachine.lab.identification.units_page import UnitsPart
 from statemachine.show.blocks import Headline, Table
 from statemachine.show.first_screen import LINES, lines_of
@@ -50,6 +55,20 @@ def headline(result: RecordingResult | IdentificationResult) -> Headline:
 
 
 # A recording and the model as it is.
+
+
+@pytest.mark.parametrize(
+    ("robot", "is_told"), [("my_own_arm", True), ("so100_follower", False), ("", False)]
+)
+def test_a_robot_that_is_no_so_arm_is_told_on_both_pages(
+    recorded: RecordingResult, fitted: IdentificationResult, robot: str, is_told: bool
+) -> None:
+    for result in (recorded, fitted):
+        recordings = result.recordings
+        of_robot = replace(recordings, fitted=replace(recordings.fitted, robot=robot))
+        screen = replace(result, recordings=of_robot).page()
+        assert ("a robot called" in shown(screen)) == is_told
+    assert lines_of(screen) <= LINES
 
 
 def test_the_model_is_nearer_where_its_gap_is_smaller_than_that_of_the_commands(
@@ -172,6 +191,32 @@ def test_a_reading_that_fits_better_is_on_the_first_screen(fitted: Identificatio
     assert "the sign of elbow_flex" not in shown(page(fitted))
 
 
+def with_play(fitted: IdentificationResult) -> IdentificationResult:
+    """Return a result in which play of two joints fits better, and of one it cannot be told."""
+    said = {"elbow_flex": "fits better", "wrist_flex": "fits better", "gripper": "cannot tell"}
+    tried = [
+        Hypothesis(f"play of {joint}", math.radians(0.06), 30.0, verdict, math.radians(0.31))  # pyright: ignore[reportArgumentType]
+        for joint, verdict in said.items()
+    ]
+    return replace(fitted, hypotheses=(*fitted.hypotheses, *tried))
+
+
+def test_what_the_model_lacks_is_told_with_its_size_and_is_no_other_reading(
+    fitted: IdentificationResult,
+) -> None:
+    play = content(with_play(fitted))
+    assert play.lacking == ["play of elbow_flex (0.31°)", "play of wrist_flex (0.31°)"]
+    assert play.better == []
+    assert content(fitted).lacking == []
+
+
+def test_play_is_on_the_first_screen_which_stays_one(fitted: IdentificationResult) -> None:
+    first = page(with_play(fitted))
+    assert "play of wrist_flex" in shown(first)
+    assert lines_of(first) <= LINES
+    assert not wide_lines(shown(page(with_play(fitted), details=True)).splitlines())
+
+
 def test_only_joints_of_which_something_is_determined_have_a_row(
     fitted: IdentificationResult,
 ) -> None:
@@ -180,7 +225,7 @@ def test_only_joints_of_which_something_is_determined_have_a_row(
         *("fitted", "kp, N·m/rad", "viscous, N·m·s/rad", "friction, N·m")
     ]
     assert [row[0] for row in table.rows] == ["shoulder_lift", "elbow_flex", "the model"]
-    assert table.rows[0][1] == "8.50 ± 0.17"
+    assert table.rows[0][1] == "8.50 ± 2 %"
     assert table.rows[-1][1:] == ["998", "3.33", "0.0520"]
 
 
@@ -241,6 +286,19 @@ def test_details_have_both_tables_of_parameters(fitted: IdentificationResult) ->
     titles = {table.title: table for table in blocks(fitted.page(details=True), Table)}
     assert len(titles["What this recording determines"].rows) == 8
     assert len(titles["What this recording cannot tell"].rows) == 24
+
+
+def test_a_wide_interval_is_seen_to_be_wide(fitted: IdentificationResult) -> None:
+    kp = next(each for each in fitted.parameters if each.verdict == "determined")
+    wide = replace(kp, fitted=36.0, low=14.0, high=58.0)
+    assert half_width_text(wide) == "61 %"
+
+
+def test_what_the_model_has_none_of_has_an_interval_in_its_unit(
+    fitted: IdentificationResult,
+) -> None:
+    delay = next(each for each in fitted.parameters if each.kind == "delay")
+    assert half_width_text(replace(delay, low=0.030, high=0.032)) == "1.0"
 
 
 def test_a_determined_figure_says_how_many_times_that_of_the_model_it_is(

@@ -113,3 +113,15 @@ def test_a_joint_without_a_servo_is_refused(tmp_path):
     )
     with pytest.raises(UnsupportedError, match="no position servo"):
         ArmParameters.of(sm.load(file), ["hip"])
+
+
+def test_a_servo_with_a_gear_is_refused(tmp_path):
+    file = tmp_path / "geared.xml"
+    file.write_text(
+        "<mujoco><worldbody><body><joint name='hip' armature='0.1' frictionloss='0.1'/>"
+        "<geom size='0.1'/></body></worldbody>"
+        "<actuator><position joint='hip' kp='10' kv='1' gear='2'/></actuator></mujoco>"
+    )
+    with pytest.raises(UnsupportedError, match=r"hip in geared\.xml has gear 2") as refused:
+        ArmParameters.of(sm.load(file), ["hip"])
+    assert refused.value.feature == "gear"

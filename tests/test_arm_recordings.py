@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.lab.recordings.arm_recording import ArmRecordings
 from statemachine.lab.recordings.arm_source import read_arm_recordings
 from statemachine.lab.recordings.lerobot_files import MOST_ROWS, read_columns
+from statemachine.lab.recordings.robot_types import is_so_arm
 
 from .support.arm_data_sets import (
     COUNT,
@@ -217,6 +219,42 @@ def test_several_files_of_version_3_are_one_data_set(arm: sm.Model, tmp_path: Pa
     set_columns(meta, **{"data/file_index": [0, 1]})
     found = recordings(source, arm)
     assert (found.fitted.episode, found.held_out.episode) == (0, 1)
+
+
+SO_ARMS = ["so101_follower", "so100", "so100_follower_end_effector", "so_follower", "so101_sim"]
+
+
+@pytest.mark.parametrize("robot", [*SO_ARMS, "my_own_arm"])
+def test_the_robot_is_that_of_the_data_set(robot: str, arm: sm.Model, tmp_path: Path) -> None:
+    source = written(tmp_path, replace(data_set(DEGREES), robot=robot))
+    assert recordings(source, arm).fitted.robot == robot
+    assert is_so_arm(robot) == (robot in SO_ARMS)
+
+
+@pytest.mark.parametrize("robot", [None, "unknown"])
+def test_a_data_set_may_not_say_which_robot_it_is_of(
+    robot: str | None, arm: sm.Model, tmp_path: Path
+) -> None:
+    source = written(tmp_path, data_set(DEGREES))
+    set_info(tmp_path, robot_type=robot)
+    assert recordings(source, arm).fitted.robot == ""
+
+
+@pytest.mark.parametrize("robot", ["koch_follower", "koch", "aloha", "bi_so101_follower", "moss"])
+def test_another_arm_with_joints_of_the_same_names_is_refused(
+    robot: str, arm: sm.Model, tmp_path: Path
+) -> None:
+    source = written(tmp_path, replace(data_set(DEGREES), robot=robot))
+    with pytest.raises(BadInputError, match=f"of a {robot} .* another arm"):
+        recordings(source, arm)
+
+
+def test_another_arm_is_read_with_a_model_of_its_own(arm: sm.Model, tmp_path: Path) -> None:
+    shutil.copytree(arm.path.parent, tmp_path / "koch")
+    file = tmp_path / "koch" / "koch.xml"
+    (tmp_path / "koch" / arm.path.name).rename(file)
+    source = written(tmp_path / "recorded", replace(data_set(DEGREES), robot="koch_follower"))
+    assert recordings(source, sm.load(file)).fitted.robot == "koch_follower"
 
 
 # What is refused, in one clear error.

@@ -96,6 +96,47 @@ def test_the_gripper_has_0_to_100_from_the_lower_limit_of_the_model(unit: str) -
     assert gripper.radians == pytest.approx(COUNTS[5] * COUNT / 100)
 
 
+@pytest.mark.parametrize("degree", [360 / 4095, 360 / 4096])
+@pytest.mark.parametrize("unit", ["degrees", "-100 to 100"])
+def test_a_gripper_in_degrees_is_refused_though_all_are_in_0_to_100(
+    unit: str, degree: float
+) -> None:
+    counts = moved_counts(servos(unit))
+    state = frames_of(servos(unit), counts).state
+    state[:, 5] = (counts[:, 5] - counts[:, 5].min()) * degree
+    assert 0 <= state[:, 5].min() < state[:, 5].max() < 100
+    with pytest.raises(BadInputError, match="gripper have the step of degrees"):
+        infer_units(joints_of(state))
+
+
+@pytest.mark.parametrize("moves", [True, False])
+@pytest.mark.parametrize("shift", [-60.0, 60.0])
+def test_a_gripper_out_of_0_to_100_is_refused(moves: bool, shift: float) -> None:
+    state = frames_of(servos("degrees"), moved_counts(servos("degrees"))).state
+    if not moves:
+        state[:, 5] = state[0, 5]
+    state[:, 5] += shift
+    with pytest.raises(BadInputError, match="gripper reach from"):
+        infer_units(joints_of(state))
+
+
+def test_before_2025_a_gripper_may_be_a_little_out_of_0_to_100() -> None:
+    each = servos("degrees")
+    state = frames_of(each, moved_counts(each)).state
+    state[:, :5] *= 4095 / 4096
+    state[:, 5] += -5.0 - state[:, 5].min()
+    units = infer_units(joints_of(state), has_old_zero=True)
+    assert (units[5].unit, units[5].counts) == ("0 to 100", COUNTS[5])
+    with pytest.raises(BadInputError, match="gripper reach from"):
+        infer_units(joints_of(state))
+
+
+@pytest.mark.parametrize("counts", [1137, 1138])
+def test_a_gripper_with_nearly_the_step_of_degrees_is_read(counts: int) -> None:
+    units = units_of(servos("degrees", (*COUNTS[:5], counts)))
+    assert (units["gripper"].unit, units["gripper"].counts) == ("0 to 100", counts)
+
+
 @pytest.mark.parametrize("counts", [850, 1250, 1391])
 def test_another_scale_of_the_gripper_is_told_by_its_quantum(counts: int) -> None:
     units = units_of(servos("degrees", (*COUNTS[:5], counts)))

@@ -13,7 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.atomic_files import check_place, replace_file
-from statemachine.errors import ModelFileError, TraceError
+from statemachine.errors import BadInputError, ModelFileError, TraceError
 from statemachine.interface import JointType
 from statemachine.lab.compare import compare, witness
 from statemachine.lab.recordings import (
@@ -228,6 +228,16 @@ def test_models_compare_alike_whatever_strings_hash_to(cli: Cli) -> None:
     words = ("compare", "--models", "so101", "so101", "--json")
     one, two = (cli(*words, PYTHONHASHSEED=seed, code=0).stdout for seed in ("1", "77"))
     assert one == two
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no /proc, which takes no file")
+def test_a_filesystem_that_takes_no_file_is_refused_before_anything_is_run() -> None:
+    refused((BadInputError, "cannot be written", lambda: check_place(Path("/proc/fitted.xml"))))
+
+
+def test_looking_at_a_place_leaves_nothing_there(tmp_path: Path) -> None:
+    check_place(tmp_path / "fitted.xml")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")

@@ -46,7 +46,9 @@ def _plan(options: argparse.Namespace) -> Plan:
     zero = ()
     if options.zero is not None:
         zero = ((options.zero[0], math.radians(float(options.zero[1]))),)
-    fault = Fault(zero, options.reversed, options.gripper_scale)
+    play = tuple((joint, math.radians(float(width))) for joint, width in options.play)
+    tilt = (math.radians(options.tilt[0]), math.radians(options.tilt[1]))
+    fault = Fault(zero, options.reversed, options.gripper_scale, play, tilt)
     return Plan(
         name=options.folder.name,
         servos=options.servos,
@@ -79,6 +81,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--zero", nargs=2, metavar=("JOINT", "DEGREES"), help="a zero that is off")
     parser.add_argument("--reversed", default="", metavar="JOINT", help="a sign that is reversed")
     parser.add_argument("--gripper-scale", type=float, default=1.0)
+    pair = ("JOINT", "DEGREES")
+    parser.add_argument(
+        "--play", nargs=2, metavar=pair, action="append", default=[], help="of a joint's encoder"
+    )
+    parser.add_argument("--tilt", nargs=2, type=float, metavar=("X", "Y"), default=(0.0, 0.0))
     return parser
 
 

@@ -34,11 +34,15 @@ class Fault:
         zero: By how much the zero of a joint is off, by its name [rad].
         reversed_joint: A joint that is recorded with the other sign; "" for none.
         gripper_scale: Recorded opening of the gripper by its true one.
+        play: Between a joint and its encoder, by the joint's name [rad].
+        tilt: Of the base, about the x and the y axis of the world [rad].
     """
 
     zero: tuple[tuple[str, float], ...] = ()
     reversed_joint: str = ""
     gripper_scale: float = 1.0
+    play: tuple[tuple[str, float], ...] = ()
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 NO_FAULT = Fault()
@@ -61,6 +65,8 @@ class ArmTruth:
         offset: [rad]
         scale: 1; -1 of a joint whose sign is reversed.
         pivot: [rad]
+        play: Between joint and encoder [rad].
+        gravity: (3,) in the axes of the base [m/s²].
         delay: Of all that is measured [s].
         payload: Mass added to the body `gripper` [kg].
     """
@@ -74,6 +80,8 @@ class ArmTruth:
     offset: Array
     scale: Array
     pivot: Array
+    play: Array
+    gravity: Array
     delay: float
     payload: float
 
@@ -93,6 +101,7 @@ class ArmTruth:
             frictionloss=self.friction,
             armature=self.armature,
             mass=mass,
+            gravity=self.gravity,
         )
 
     def recorded(self, angles: Array) -> Array:
@@ -115,6 +124,8 @@ class ArmTruth:
             "offset": self.offset,
             "scale": self.scale,
             "pivot": self.pivot,
+            "play": self.play,
+            "gravity": self.gravity,
         }
         figures: dict[str, object] = {name: array.tolist() for name, array in arrays.items()}
         return {
@@ -164,6 +175,9 @@ def drawn_truth(
         scale[model.joint_id(fault.reversed_joint)] = -1.0
     for joint, angle in fault.zero:
         offset[model.joint_id(joint)] += angle
+    play = np.zeros(count)
+    for joint, angle in fault.play:
+        play[model.joint_id(joint)] = angle
     return ArmTruth(
         joints=model.joint_names,
         kp=kp * factors["kp"],
@@ -174,6 +188,16 @@ def drawn_truth(
         offset=offset,
         scale=scale,
         pivot=pivot,
+        play=play,
+        gravity=_tilted(np.array(model.gravity), *fault.tilt),
         delay=delay,
         payload=payload,
     )
+
+
+def _tilted(gravity: Array, about_x: float, about_y: float) -> Array:
+    """Return gravity (3,) in the axes of a base that is turned about x, then about y [rad]."""
+    x, y, z = gravity
+    y, z = np.cos(about_x) * y + np.sin(about_x) * z, np.cos(about_x) * z - np.sin(about_x) * y
+    x, z = np.cos(about_y) * x - np.sin(about_y) * z, np.cos(about_y) * z + np.sin(about_y) * x
+    return np.array([x, y, z])

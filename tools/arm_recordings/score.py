@@ -23,6 +23,7 @@ from statemachine.lab.identification.fit import Objective
 from statemachine.lab.identification.identify import fitted_arm
 from statemachine.lab.identification.parameters import ArmParameters, Parameter
 from statemachine.lab.identification.recorded_gap import asked_of
+from statemachine.lab.identification.refinements import tried_refinements
 from statemachine.lab.identification.results import FEWEST_STARTS, FittedParameter, RecordingRequest
 from statemachine.lab.identification.verdicts import fitted_parameters
 
@@ -84,7 +85,7 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
     asked = asked_of(RecordingRequest(f"lerobot:{folder}", "so101"))
     fitted = fitted_arm(asked, starts, seed=0)
     holds = fitted.holds
-    parameters = fitted_parameters(fitted.fits, holds, ())
+    parameters = fitted_parameters(fitted.fits, holds, (), tried_refinements(fitted.fits))
     seconds = time.process_time() - began
     best = fitted.fits.best.objective
     true = _true_vector(asked.parameters, truth)

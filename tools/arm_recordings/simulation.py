@@ -38,27 +38,35 @@ def measured_angles(model: Model, truth: ArmTruth, action: Array) -> Array:
     """
     arm = truth.applied_to(model)
     commands = truth.real(action)
-    once = _seen(arm, commands, STEPS_PER_FRAME, truth.delay)
-    twice = _seen(arm, commands, 2 * STEPS_PER_FRAME, truth.delay)
+    once = _seen(arm, commands, STEPS_PER_FRAME, truth)
+    twice = _seen(arm, commands, 2 * STEPS_PER_FRAME, truth)
     return truth.recorded(2.0 * twice - once)
 
 
-def _seen(arm: Model, commands: Array, steps: int, delay: float) -> Array:
-    """Return where the arm was one delay before each frame, (K, n) [rad]."""
+def _seen(arm: Model, commands: Array, steps: int, truth: ArmTruth) -> Array:
+    """Return where the encoders saw the arm one delay before each frame, (K, n) [rad].
+
+    An encoder behind play stays where it is until the joint has crossed the play, and is then
+    half of it behind. While the arm settles, it starts in the middle.
+    """
     timestep = 1.0 / (FPS * steps)
     stepped = arm.replace(timestep=timestep)
     with sm.make_data(stepped) as data:
         data.qpos[:] = commands[0]
         data.ctrl[:] = commands[0]
-        sm.step(stepped, data, _SETTLING * steps)
-        angles = [data.qpos.copy()]
+        seen, half = data.qpos.copy(), 0.5 * truth.play
+        for _ in range(_SETTLING * steps):
+            sm.step(stepped, data)
+            seen = np.clip(seen, data.qpos - half, data.qpos + half)
+        angles = [seen]
         for command in commands:
             data.ctrl[:] = command
             for _ in range(steps):
                 sm.step(stepped, data)
-                angles.append(data.qpos.copy())
+                seen = np.clip(seen, data.qpos - half, data.qpos + half)
+                angles.append(seen)
     times = np.arange(len(angles)) * timestep
-    moments = np.arange(len(commands)) / FPS - delay
+    moments = np.arange(len(commands)) / FPS - truth.delay
     history = np.stack(angles)
     columns = [np.interp(moments, times, history[:, joint]) for joint in range(arm.nq)]
     return np.stack(columns, axis=1)

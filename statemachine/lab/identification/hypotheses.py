@@ -10,12 +10,12 @@ import numpy as np
 from ..runs.drive import Progress, no_progress
 from .fit import Objective, fit
 from .residuals import root_mean_square
-from .results import Hypothesis
+from .results import Hypothesis, HypothesisVerdict
 from .simulation import ArmSimulation
 from .starts import Fits
 
 _RUNS = 12  # simulations of each fit
-_EVIDENCE = 5.0  # half the sum of squares: odds of 150 to 1
+EVIDENCE = 5.0  # half the sum of squares: odds of 150 to 1
 _SATURATED = 0.01  # part of the frames at the force limit, below which it does not matter
 
 
@@ -75,8 +75,19 @@ def tried_reading(name: str, objective: Objective, fits: Fits, cost: float) -> H
     end = min(ends, key=lambda each: each.cost)
     evidence = cost - end.cost
     residual = root_mean_square(end.errors)
-    if not math.isfinite(residual) or evidence < -_EVIDENCE:
+    if not math.isfinite(residual):
         return Hypothesis(name, residual, evidence, "fits worse")
-    if evidence > _EVIDENCE and residual < fits.residuals.overall:
-        return Hypothesis(name, residual, evidence, "fits better")
-    return Hypothesis(name, residual, evidence, "cannot tell")
+    is_nearer = residual < fits.residuals.overall
+    return Hypothesis(name, residual, evidence, verdict_of(evidence, is_nearer))
+
+
+def verdict_of(evidence: float, is_nearer: bool) -> HypothesisVerdict:
+    """Return what is said of a reading.
+
+    Args:
+        evidence: As of `Hypothesis`.
+        is_nearer: Whether its angles are nearer to the measured ones, too.
+    """
+    if evidence < -EVIDENCE:
+        return "fits worse"
+    return "fits better" if evidence > EVIDENCE and is_nearer else "cannot tell"

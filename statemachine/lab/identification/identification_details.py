@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import degrees, fixed
+from ...measures.text import NO_NUMBER, degrees, fixed
 from ...show.blocks import Table
 from ...show.templates import PageContent
 from .parameter_table import determined_table, share_table, undetermined_table
@@ -64,12 +64,18 @@ class IdentificationDetails(PageContent):
     @property
     def hypotheses(self) -> Table:
         """Return a table of the other readings that were tried."""
-        headers = ("reading", "RMS", "evidence", "verdict")
+        headers = ("reading", "size", "RMS", "evidence", "verdict")
         rows: list[tuple[str, ...]] = []
         for each in self.result.hypotheses:
             residual, evidence = degrees(each.residual, 3), fixed(each.evidence, 1)
-            rows.append((each.name, residual, evidence, each.verdict))
-        return Table(headers, rows, words=frozenset({0, 3}))
+            size = NO_NUMBER if each.size is None else degrees(each.size, 2)
+            rows.append((each.name, size, residual, evidence, each.verdict))
+        return Table(headers, rows, words=frozenset({0, 4}))
+
+    @property
+    def has_play(self) -> bool:
+        """Tell whether play was tried."""
+        return any(each.name.startswith("play ") for each in self.result.hypotheses)
 
     @property
     def starts(self) -> Sequence[StartOutcome]:

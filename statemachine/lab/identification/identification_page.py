@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import grouped
+from ...measures.text import degrees, grouped
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits, with_answer
 from ...show.templates import render, render_blocks
@@ -86,7 +86,17 @@ class IdentificationPage(PageOfRecording):
 
     @property
     def better(self) -> list[Hypothesis]:
-        """Return the other readings that fit better."""
+        """Return the other readings of the numbers that fit better."""
+        return [each for each in self._better if each.size is None]
+
+    @property
+    def lacking(self) -> list[str]:
+        """Return what the model lacks and fits better with, and how much of it."""
+        sized = [(each.name, each.size) for each in self._better]
+        return [f"{name} ({degrees(size, 2)})" for name, size in sized if size is not None]
+
+    @property
+    def _better(self) -> list[Hypothesis]:
         return [each for each in self.result.hypotheses if each.verdict == "fits better"]
 
     @property

@@ -16,6 +16,7 @@ from .hypotheses import tried_hypotheses
 from .motions import motion_informations
 from .parameters import ArmParameters
 from .recorded_gap import Asked, asked_of, gap_between, parts_of
+from .refinements import tried_refinements
 from .residuals import Residuals
 from .results import IdentificationResult, RecordingRequest, StartOutcome
 from .shares import cause_shares
@@ -118,7 +119,9 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
     with reporter.stage("trying other motions"):
         motions = motion_informations(fits.best)
     with reporter.stage("trying other readings") as progress:
+        refinements = tried_refinements(fits)
         hypotheses = tried_hypotheses(fits, saturated, progress)
+        hypotheses += tuple(each.hypothesis for each in refinements)
     with reporter.stage("dividing the gap among its causes") as progress:
         shares = cause_shares(fits, held_out, progress)
     as_it_is = simulation.angles(np.zeros(len(best)))
@@ -126,7 +129,7 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
     fitted_gap = gap_between(simulation, as_it_is, simulation.angles(best))
     gap = gap_between(held_out, fitted.before, fitted.after, part, fitted.first)
     source = provenance(asked.parameters.model, request.seed)
-    parameters = fitted_parameters(fits, holds, motions)
+    parameters = fitted_parameters(fits, holds, motions, refinements)
     starts = _outcomes(fits)
     recording, residuals = simulation.recording, fits.residuals
     arm, recordings = asked.parameters.model, asked.recordings

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...show.templates import PageContent
+from ..recordings.robot_types import is_so_arm
 from ..runs.provenance import Provenance
 from .results import IdentificationResult, RecordingGap, RecordingResult
 from .typed_question import recording_name
@@ -34,6 +35,12 @@ class PageOfRecording(PageContent):
     def recording(self) -> str:
         """Return the recording, without its folder."""
         return recording_name(self.result.request.recording)
+
+    @property
+    def other_robot(self) -> str:
+        """Return the robot that the data set is of; "" for an SO-100 or SO-101, and for no word."""
+        robot = self.result.recordings.fitted.robot
+        return "" if is_so_arm(robot) else robot
 
     @property
     def model_file(self) -> str:

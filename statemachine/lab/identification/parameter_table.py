@@ -54,9 +54,7 @@ def _cell_of(parameter: FittedParameter) -> str:
     """Return a figure with half of its interval; a question mark where it cannot be told."""
     if parameter.verdict != "determined":
         return UNKNOWN
-    half = 0.5 * (parameter.high - parameter.low)
-    width = half_width_text(parameter.kind, half)
-    return f"{number_text(parameter.kind, parameter.fitted)} ± {width}"
+    return f"{number_text(parameter.kind, parameter.fitted)} ± {half_width_text(parameter)}"
 
 
 def _model_text(parameters: Sequence[FittedParameter], kind: Kind) -> str:

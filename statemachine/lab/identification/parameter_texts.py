@@ -19,6 +19,8 @@ REASON_WORDS: dict[Reason, str] = {
     "residual above the floor": "residual",
     "starts disagree": "starts",
     "does not hold elsewhere": "elsewhere",
+    "play fits as well": "play",
+    "a tilted base fits as well": "tilt",
 }
 
 
@@ -45,9 +47,12 @@ def number_text(kind: Kind, value: float) -> str:
     return figure(value)
 
 
-def half_width_text(kind: Kind, width: float) -> str:
-    """Return half of an interval with two digits, without its unit; the rest as `number_text`."""
-    return number_text(kind, width) if kind in _ADDED else rough(width)
+def half_width_text(parameter: FittedParameter) -> str:
+    """Return half of a parameter's interval: by its figure, or as `number_text` of an added one."""
+    half = 0.5 * (parameter.high - parameter.low)
+    if parameter.kind in _ADDED:
+        return number_text(parameter.kind, half)
+    return f"{rough(100.0 * half / parameter.fitted)} %"
 
 
 def figure_text(kind: Kind, value: float) -> str:

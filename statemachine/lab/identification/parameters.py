@@ -112,7 +112,7 @@ class ArmParameters:
         """Return the parameters of these joints.
 
         Raises:
-            UnsupportedError: A joint has no position servo.
+            UnsupportedError: A joint has no position servo, or one with a gear.
             UnknownNameError: There is no such joint.
         """
         numbers = [model.joint_id(name) for name in joints]
@@ -127,6 +127,7 @@ class ArmParameters:
                     feature="actuator",
                     reason="model",
                 )
+            _check_gear(model, name, int(mine[0]))
             servos.append(int(mine[0]))
         dof = np.array(model.jnt_dofadr)[numbers]
         servo = np.array(servos)
@@ -219,6 +220,20 @@ class ArmParameters:
             "armature": armature,
             "mass": mass,
         }
+
+
+def _check_gear(model: Model, joint: str, servo: int) -> None:
+    """Refuse a servo whose command is not the angle of its joint."""
+    gear = float(model.actuator_gear[servo])
+    if gear != 1.0:
+        raise UnsupportedError(
+            f"a recording has commands that are angles of joints, and the servo of {joint} in "
+            f"{model.path.name} has gear {gear:g}, so that its are not: write gear 1, kp and kv "
+            f"times {gear * gear:g}, and the ranges of its force and of its command accordingly",
+            backend=model.backend,
+            feature="gear",
+            reason="model",
+        )
 
 
 def _of_each_joint(model: Model, joints: Sequence[str], dof: Ints, servo: Ints) -> list[Parameter]:

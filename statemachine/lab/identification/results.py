@@ -41,7 +41,10 @@ Reason = Literal[
     "residual above the floor",
     "starts disagree",
     "does not hold elsewhere",  # on what was not fitted
+    "play fits as well",  # of a joint, and with it the figure would be another one
+    "a tilted base fits as well",
 ]
+HypothesisVerdict = Literal["fits better", "fits worse", "cannot tell"]
 FEWEST_STARTS = 8
 _MOST_STARTS = 64
 
@@ -167,7 +170,8 @@ class FittedParameter:
         unit: Of all its figures.
         model: Its figure in the model.
         fitted: Its figure in the best fit.
-        low, high: Interval in which it is with 95 %, with what the starts are apart.
+        low, high: Interval in which it is with 95 %, with what the starts are apart and what play
+            that fits as well makes of it.
         information: Standard deviation after the fit by that before it: 1 where the recording
             tells nothing.
         verdict: Whether the recording determines it.
@@ -212,17 +216,20 @@ class Hypothesis:
     """Another reading of the recording or of the model, and how well it fits.
 
     Attributes:
-        name: What is otherwise, such as "the sign of elbow_flex" or "viscous friction outside of
-            the force limit".
+        name: What is otherwise, such as "the sign of elbow_flex", "viscous friction outside of
+            the force limit" or "play of elbow_flex".
         residual: Of its best fit [rad].
         evidence: How much half the sum of squares falls by it; above 5 it fits better.
         verdict: Whether the recording tells.
+        size: How wide the play is, how far the base is tilted [rad]; of play at least a count. None
+            of what has no size.
     """
 
     name: str
     residual: float
     evidence: float
-    verdict: Literal["fits better", "fits worse", "cannot tell"]
+    verdict: HypothesisVerdict
+    size: float | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ extrapolation from two step lengths.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
 from ..recordings.unit_inference import COUNT
 from .parameters import ArmParameters
+from .play import behind_play
 
 _STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
@@ -36,12 +37,17 @@ class ArmSimulation:
         recording: What is played.
         signs: (n,) 1, or -1 for a joint whose angles are taken with the other sign.
         viscous_outside: As of `ArmParameters.options`.
+        play: (n,) widths of the play between each joint and its encoder [rad], or (W, n) of each
+            world, of which there may be more than of vectors; None for no play.
+        gravity: (3,) in the axes of the base [m/s²]; None for that of the model.
     """
 
     parameters: ArmParameters
     recording: ArmRecording
     signs: Array
     viscous_outside: bool = False
+    play: Array | None = None
+    gravity: Array | None = None
 
     @classmethod
     def of(cls, parameters: ArmParameters, recording: ArmRecording) -> ArmSimulation:
@@ -118,6 +124,17 @@ class ArmSimulation:
         once = self._played(vectors, self._steps)
         return once if with_error else 2.0 * self._played(vectors, 2 * self._steps) - once
 
+    def angles_with_play(self, vector: Array, widths: Array) -> Array:
+        """Return the angles (M, K, n) of one arm with play of each of some widths at all joints.
+
+        Args:
+            vector: (P,) of the parameters.
+            widths: (M,) [rad].
+        """
+        readings = replace(self, play=widths[:, None])
+        once = readings._played(vector[None], self._steps)
+        return 2.0 * readings._played(vector[None], 2 * self._steps) - once
+
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
         limits = self.parameters.model.actuator_forcerange[self.parameters.servo]
@@ -137,6 +154,8 @@ class ArmSimulation:
         timestep = 1.0 / (self.recording.fps * steps)
         model = parameters.model.replace(timestep=timestep, integrator="euler", contacts=False)
         options = parameters.options(vectors, self.viscous_outside)
+        if self.gravity is not None:
+            options["gravity"] = np.tile(self.gravity, (len(vectors), 1))
         with make_worlds(model, len(vectors), derived=(), **options) as worlds:
             worlds.qpos[:, parameters.position] = first
             worlds.qvel[:, parameters.dof] = self.first_velocity
@@ -150,10 +169,11 @@ class ArmSimulation:
                 positions = record(worlds, total, ctrl=commands)["qpos"][:, :, parameters.position]
             diverged = sorted(worlds.diverged)
         history = np.concatenate([first[:, None], positions], axis=1)
+        history[diverged] = np.nan
+        if self.play is not None:
+            history = behind_play(history, self.play)
         delays = vectors[:, parameters.of_kind("delay")[0]]
-        angles = _late(history, delays / timestep, steps, len(action)) + offsets[:, None]
-        angles[diverged] = np.nan
-        return angles
+        return _late(history, delays / timestep, steps, len(action)) + offsets[:, None]
 
     def _forces(self, vector: Array) -> Array:
         """Return the servo forces before the limit (K, n), from angles and commands [N·m]."""

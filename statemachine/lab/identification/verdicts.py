@@ -6,19 +6,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...interface import Array
 from .motions import MotionInformation
 from .parameters import Parameter
+from .refinements import Refinement
 from .results import UNITS, FittedParameter, Reason
 from .starts import Fits, least_certain
 
 _TELLS = 0.3  # standard deviation after the fit, by that before it
 _QUANTILE = 1.96  # of the normal distribution, for 95 %
+_MOVED = 0.5  # standard deviations: an interval of 95 % that is off by that covers 92 %
 _FEWEST_AS_GOOD = 3  # starts that end in the same fit, before it is taken for the best there is
 
 
 def fitted_parameters(
-    fits: Fits, holds: bool, motions: Sequence[MotionInformation]
+    fits: Fits,
+    holds: bool,
+    motions: Sequence[MotionInformation],
+    refinements: Sequence[Refinement] = (),
 ) -> tuple[FittedParameter, ...]:
     """Return what the recording tells of each parameter that was fitted.
 
@@ -26,6 +33,7 @@ def fitted_parameters(
         fits: From all starts.
         holds: Whether the best one holds on what was not fitted.
         motions: What other motions would tell, in the order in which they are advised.
+        refinements: What the model lacks and the arm may have.
     """
     objective = fits.best.objective
     deviations = fits.deviations
@@ -34,8 +42,16 @@ def fitted_parameters(
     low, high = values - _QUANTILE * deviations, values + _QUANTILE * deviations
     ends = np.array([fit.vector[objective.free] for fit in fits.as_good])
     agree = np.all((ends >= low) & (ends <= high), axis=0).tolist()
-    low = np.maximum(np.minimum(low, ends.min(axis=0)), objective.parameters.low[objective.free])
+    low = np.minimum(low, ends.min(axis=0))
     high = np.maximum(high, ends.max(axis=0))
+    changed: dict[Reason, NDArray[np.bool_]] = {
+        each.reason: np.zeros(len(prior), bool) for each in refinements
+    }
+    for each in refinements:
+        low = np.minimum(low, values + each.least)
+        high = np.maximum(high, values + each.most)
+        changed[each.reason] |= _changed_by(each, deviations)
+    low = np.maximum(low, objective.parameters.low[objective.free])
     told = (deviations / prior).tolist()
     fitted: list[FittedParameter] = []
     for place, number in enumerate(objective.free.tolist()):
@@ -43,9 +59,19 @@ def fitted_parameters(
         agrees = agree[place] and len(ends) >= _FEWEST_AS_GOOD
         motion = "" if told[place] < _TELLS else _motion_for(place, fits, motions)
         reasons = _reasons(told[place], fits, agrees, holds)
+        others: list[Reason] = [reason for reason, mine in changed.items() if mine[place]]
         parameter = objective.parameters.each[number]
-        fitted.append(_verdict(parameter, interval, told[place], reasons, motion))
+        fitted.append(_verdict(parameter, interval, told[place], (*reasons, *others), motion))
     return tuple(fitted)
+
+
+def _changed_by(refinement: Refinement, deviations: Array) -> NDArray[np.bool_]:
+    """Tell of each parameter (free,) whether it is another one with a refinement.
+
+    Where that fits better, a parameter may hardly move; where it fits as well, within its interval.
+    """
+    allowed = _MOVED if refinement.fits_better else _QUANTILE
+    return np.maximum(-refinement.least, refinement.most) > allowed * deviations
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ class ArmRecording:
         state: (K, n) measured angles [rad], in the model's zero.
         resolution: (n,) angle of one count of the servos [rad].
         units: What the numbers of the file mean, one for each joint.
+        robot: Type of the robot as the data set has it; "" where it does not say.
     """
 
     source: str
@@ -41,6 +42,7 @@ class ArmRecording:
     state: Array
     resolution: Array
     units: tuple[JointUnit, ...]
+    robot: str = ""
 
 
 @dataclass(frozen=True, eq=False)

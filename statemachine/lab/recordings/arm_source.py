@@ -16,6 +16,7 @@ from .calibration import read_calibration
 from .joint_units import JointUnit
 from .lerobot import FEWEST_FRAMES, LerobotDataSet, LerobotEpisode, open_data_set
 from .lerobot_description import joint_name
+from .robot_types import check_robot
 from .unit_inference import COUNT, MeasuredJoint, infer_units, measured_joint
 
 _FORM = f"{PREFIX}DIR or {PREFIX}DIR#EPISODE"
@@ -70,9 +71,9 @@ def read_arm_recordings(
         names: Joints of the recording that have other names in the model.
 
     Raises:
-        BadInputError: The source names no episode of a data set; or it is damaged, does not fit
-            the model, has a unit that cannot be told, commands no servo reaches, or an arm that
-            does not move.
+        BadInputError: The source names no episode of a data set; or it is damaged, is of another
+            arm, does not fit the model, has a unit that cannot be told, commands no servo reaches,
+            or an arm that does not move.
         MissingEngineError: pyarrow is not installed.
     """
     folder, number = folder_and_episode(source)
@@ -80,6 +81,7 @@ def read_arm_recordings(
     if number is None:
         number = data_set.episodes[0]
     data_set.place(number)
+    check_robot(data_set.robot, model)
     joints = _joints_of(data_set, model, names)
     motors = None
     if calibration is not None:
@@ -177,6 +179,7 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
         state=_angles(episode.state, arm.units),
         resolution=resolution,
         units=arm.units,
+        robot=arm.data_set.robot,
     )
 
 

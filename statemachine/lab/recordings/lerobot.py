@@ -71,6 +71,11 @@ class LerobotDataSet:
         return tuple(joint_name(column) for column in self.description.columns)
 
     @property
+    def robot(self) -> str:
+        """Return the type of its robot; "" where it does not say."""
+        return self.description.robot
+
+    @property
     def has_old_zero(self) -> bool:
         """Tell whether it was recorded before LeRobot's calibration took the middle as zero.
 

@@ -44,6 +44,7 @@ class DataSetDescription:
         fps: Frames per second [1/s].
         columns: (n,) names of the columns of state and action, as the file has them.
         places: Where each episode lies, by its number.
+        robot: Type of the robot, such as "so101_follower"; "" where it does not say.
     """
 
     folder: Path
@@ -51,6 +52,7 @@ class DataSetDescription:
     fps: float
     columns: tuple[str, ...]
     places: Mapping[int, EpisodePlace]
+    robot: str
 
 
 def joint_name(column: str) -> str:
@@ -85,13 +87,23 @@ def read_description(folder: Path) -> DataSetDescription:
         )
     fps = _checked_fps(info.get("fps"), path)
     columns = _checked_columns(info.get("features"), path)
+    robot = _checked_robot(info.get("robot_type"), path)
     if version in _ONE_FILE_EACH:
         places = _places_of_lines(folder, info.get("chunks_size", _CHUNK_SIZE))
     else:
         places = _places_of_tables(folder)
     if not places:
         raise BadInputError(f"{folder} has no episode")
-    return DataSetDescription(folder, version, fps, columns, places)
+    return DataSetDescription(folder, version, fps, columns, places, robot)
+
+
+def _checked_robot(robot: object, path: Path) -> str:
+    """Return the type of the robot; "" where there is none, or LeRobot did not know it."""
+    if robot is None or robot == "unknown":
+        return ""
+    if not isinstance(robot, str) or printable(robot) != robot:
+        raise BadInputError(f"{path}: robot_type is {shown(robot)}, which is no word")
+    return robot
 
 
 def _checked_fps(fps: object, path: Path) -> float:

@@ -35,6 +35,7 @@ _DEGREES = (360.0 / (COUNTS_OF_A_TURN - 1), 360.0 / COUNTS_OF_A_TURN)
 _ALIKE = 1e-4  # two quanta, as parts: a joint with one count less than 2275 has 4e-4 more
 _WHOLE = 0.1  # counts: a number of counts that near to a whole one is whole
 _BEYOND = 0.01  # what float32 may add to 100
+_BEYOND_OLD = 10.0  # units: LeRobot bounds values to 0 and 100, and before June 2025 to -10 and 110
 # LeRobot's examples/backward_compatibility/replay.py: angles of before are 90 - a and a - 90.
 _OLD_ZEROS = {"shoulder_lift": (-1.0, 0.5 * math.pi), "elbow_flex": (1.0, -0.5 * math.pi)}
 
@@ -117,9 +118,35 @@ def infer_units(
         return _by_calibration(joints, calibration, degree)
     units: list[JointUnit] = []
     for joint in joints:
+        if joint.is_gripper:
+            _check_gripper(joint, _BEYOND_OLD if has_old_zero else _BEYOND)
         unit = _told_by_quanta(joint, degree)
         units.append(_with_old_zero(unit, joint.name) if has_old_zero else unit)
     return tuple(units)
+
+
+def _check_gripper(joint: MeasuredJoint, beyond: float) -> None:
+    """Refuse a gripper that is not in 0 to 100, such as one in degrees.
+
+    Raises:
+        BadInputError: A value is further out of that range than `beyond`, or the quantum is that
+            of degrees, at which 100 units are 1137 counts and a half.
+    """
+    low, high = float(joint.levels[0]), float(joint.levels[-1])
+    is_in_degrees = joint.grid is not None and any(
+        _alike(joint.grid.quantum, degree) for degree in _DEGREES
+    )
+    if low < -beyond or high > 100.0 + beyond:
+        found = f"reach from {low:.4g} to {high:.4g}"
+    elif is_in_degrees:
+        found = "have the step of degrees"
+    else:
+        return
+    raise BadInputError(
+        f"the measured values of {joint.name} {found}, and LeRobot writes a gripper as 0 (shut) to "
+        "100 (open), even where the other joints are in degrees: give the recording as LeRobot "
+        "wrote it"
+    )
 
 
 def _quantum_of_degrees(arm: Sequence[MeasuredJoint]) -> float | None:
@@ -142,6 +169,8 @@ def _by_calibration(
             raise BadInputError(
                 f"the calibration has no motor {joint.name}; it has {', '.join(calibration)}"
             )
+        if joint.is_gripper:
+            _check_gripper(joint, _BEYOND)
         motor = calibration[joint.name]
         if degree is not None and not joint.is_gripper:
             degrees = _degrees(joint, degree)
@@ -181,8 +210,7 @@ def _by_quantum(joint: MeasuredJoint) -> JointUnit:
     if joint.grid is None:
         unit = _of_counts(joint, (joint.high - joint.low) / COUNT)
         return replace(unit, counts=None, source="model range")
-    lowest = 100.0 - joint.width
-    is_within = joint.levels[0] > lowest - _BEYOND and joint.levels[-1] < 100.0 + _BEYOND
+    is_within = joint.is_gripper or np.abs(joint.levels).max() < 100.0 + _BEYOND
     counts = joint.width / joint.grid.quantum
     if not is_within or counts < FEWEST_COUNTS:
         raise _on_no_grid(joint)
