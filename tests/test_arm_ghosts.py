@@ -9,7 +9,9 @@ import pytest
 
 from statemachine import lab, load
 from statemachine.interface import Model
+from statemachine.lab.compare import Comparison
 from statemachine.lab.identification import ghosts
+from statemachine.lab.identification.arm_report import compared_arms
 from statemachine.lab.identification.results import IdentificationResult, RecordingResult
 
 from .support.arm_recordings import FPS, identification_result, recording, recording_result
@@ -96,3 +98,17 @@ def test_a_page_draws_one_arm_solid_and_one_as_a_ghost(tmp_path: Path) -> None:
         assert tab.locator("#stage canvas, canvas").count() >= 1
         assert "the fitted model" in tab.inner_text("body")
         tab.nothing_wrong()
+
+
+def test_a_fitted_arm_agrees_within_what_measuring_makes(arm: Model) -> None:
+    frames, result = recording(), identification_result()
+    measured = ghosts.trace_of_angles(arm, frames, frames.state, "measured")
+    off = ghosts.trace_of_angles(arm, frames, frames.state + 3.0 * result.floor, "off")
+    farther = ghosts.trace_of_angles(arm, frames, frames.state + 5.0 * result.floor, "farther")
+    assert _verdicts(compared_arms(result, measured, off)) == {"agrees"}
+    assert _verdicts(compared_arms(result, measured, farther)) == {"differs"}
+    assert _verdicts(compared_arms(recording_result(), measured, off)) == {"differs"}
+
+
+def _verdicts(comparison: Comparison) -> set[str]:
+    return {each.verdict for each in comparison.agreements if each.kind == "joint"}

@@ -16,6 +16,8 @@ from statemachine.lab.identification.results import (
     RecordingResult,
 )
 from statemachine.lab.identification.units_page import UnitsPart
+from statemachine.lab.identification.written_page import WrittenPart
+from statemachine.lab.why.rewriting import RewrittenFile
 from statemachine.show.blocks import Headline, Table
 from statemachine.show.first_screen import LINES, lines_of
 
@@ -180,7 +182,7 @@ def test_causes_do_not_stand_in_where_alone_they_take_away_what_they_do_together
 
 
 def test_the_largest_cause_comes_first(fitted: IdentificationResult) -> None:
-    assert [share.cause for share in content(fitted).ranked][:2] == ["gains", "delay"]
+    assert [share.cause for share in content(fitted).large][:2] == ["gains", "delay"]
 
 
 def test_a_reading_that_fits_better_is_on_the_first_screen(fitted: IdentificationResult) -> None:
@@ -255,8 +257,36 @@ def test_delay_and_payload_are_told_in_the_units_that_people_use(
     ]
 
 
-def test_reasons_are_counted(fitted: IdentificationResult) -> None:
-    assert content(fitted).reasons == ["too little information 24"]
+def test_above_the_floor_the_reading_that_fits_best_is_in_the_verdict(
+    fitted: IdentificationResult,
+) -> None:
+    sign, other = fitted.hypotheses[:2]
+    best = replace(sign, verdict="fits better", residual=0.5 * other.residual)
+    second = replace(other, verdict="fits better")
+    result = replace(fitted, at_floor=False, hypotheses=(second, best))
+    assert content(result).likely == best
+    assert content(result).better == [second]
+    assert best.name in headline(result).lead
+
+
+def test_a_written_file_that_lacks_figures_is_told_to_be_farther(
+    fitted: IdentificationResult,
+) -> None:
+    rewritten = RewrittenFile("a.xml", "so101.xml", (), (), 0.1, 0.2, "joints", "rad")
+    far, near = (
+        WrittenPart(replace(fitted, rewritten=rewritten), replace(rewritten, gap=gap), False)
+        for gap in (2.0 * (fitted.gap.fitted or 0.0), fitted.gap.fitted)
+    )
+    assert (far.is_farther, near.is_farther) == (True, False)
+    assert far.unchanged == len(content(fitted).undetermined)
+
+
+def test_reasons_are_counted_where_there_are_several(fitted: IdentificationResult) -> None:
+    assert content(fitted).reasons == ["too little information"]
+    told, *others = fitted.parameters
+    lacking = replace(others[-1], verdict="cannot tell", reasons=("starts disagree",))
+    both = replace(fitted, parameters=(told, *others[:-1], lacking))
+    assert content(both).reasons == ["too little information 24", "starts disagree 1"]
 
 
 def test_the_motion_that_tells_the_most_is_named(fitted: IdentificationResult) -> None:

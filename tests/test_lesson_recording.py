@@ -14,7 +14,7 @@ import statemachine as sm
 from statemachine import lab
 from statemachine.course.lessons import LESSONS
 from statemachine.course.lessons.recording import READINGS, RecordingLessonResult, ToldFigure
-from statemachine.course.lessons.recording_page import ASKED
+from statemachine.course.lessons.recording_page import ASKED, contents
 from statemachine.course.lessons.session import LessonRun, page_of_lesson
 from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.lab.recordings.arm_source import read_arm_recordings
@@ -36,6 +36,9 @@ def _lesson() -> RecordingLessonResult:
 def result() -> RecordingLessonResult:
     need_engines_of("recording")
     return _lesson()
+
+
+NOWHERE: Any = None  # what the page shows beside its figures
 
 
 def _page(result: Any) -> Page:
@@ -195,7 +198,7 @@ def test_intervals_are_too_narrow_where_more_miss_than_by_chance(
     for place in range(missed):
         figures[place] = replace(figures[place], truth=figures[place].high + 1.0)
     shown = replace(result, figures=tuple(figures))
-    [content] = contents({"mujoco": shown}, _frame(shown)).values()
+    [content] = contents({"mujoco": shown}, NOWHERE).values()
     assert (len(figures), content.expected) == (32, 30)
     assert content.is_too_narrow == too_narrow
 

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...measures import ENCODER_COUNT
 from ...show.blocks import Block, Page
 from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison, compare
+from ..recordings import Trace
 from ..questions.events import events_of
 from ..questions.run_files import RunFiles, ShownModels, write_page
 from ..questions.stage.both_runs import BothRuns
@@ -19,6 +21,7 @@ from .results import IdentificationResult, RecordingResult
 from .typed_question import recording_name, typed_question
 
 _SPOKEN = 2  # charts that are spoken as the slider moves
+_PEAK = 4.0  # times the floor: the largest of some thousand errors with that root mean square
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class ArmReport(PageContent):
         runs: Both arms in 3-D.
         answer: What the recording tells.
         curves: A chart for each quantity.
+        tolerance: How far apart a joint may be that was fitted [rad]; None where none was.
         command: What makes the page again.
     """
 
@@ -36,6 +40,7 @@ class ArmReport(PageContent):
     runs: BothRuns
     answer: Sequence[Block]
     curves: Sequence[Block]
+    tolerance: float | None
     command: str
 
 
@@ -52,8 +57,30 @@ def write_arm_page(file: Path, result: RecordingResult | IdentificationResult) -
         result: What the recording tells.
     """
     traces = traces_of(result)
+    comparison = compared_arms(result, *traces)
     shown = ShownModels([result.request.model] * 2, result.request.menagerie)
-    return write_page(file, traces, shown, report_page(result, compare(*traces), file))
+    return write_page(file, traces, shown, report_page(result, comparison, file))
+
+
+def compared_arms(
+    result: RecordingResult | IdentificationResult, measured: Trace, simulated: Trace
+) -> Comparison:
+    """Compare an arm as it was measured with its model.
+
+    A fitted model differs where it is farther off than measuring alone takes it; the model as it is
+    where it is off by a count of an encoder.
+
+    Args:
+        result: What the recording tells.
+        measured: The arm as it was measured.
+        simulated: The arm as it is simulated.
+    """
+    comparison = compare(measured, simulated)
+    if not isinstance(result, IdentificationResult):
+        return comparison
+    larger = max(1.0, _PEAK * result.floor / ENCODER_COUNT)
+    tolerances = {each.kind: larger * each.tolerance for each in comparison.agreements}
+    return compare(measured, simulated, tolerances=tolerances)
 
 
 def report_page(
@@ -82,5 +109,6 @@ def report_page(
     page = result.page(details=True)
     words = ("--why",) if isinstance(result, IdentificationResult) else ()
     command = typed_question(result.request, *words, "--html", file.name, folders=False)
-    blocks = render_blocks(ArmReport(runs, page.blocks, charts, command))
+    tolerance = _PEAK * result.floor if isinstance(result, IdentificationResult) else None
+    blocks = render_blocks(ArmReport(runs, page.blocks, charts, tolerance, command))
     return Page(page.title, page.origin, blocks, page.headline)

@@ -27,7 +27,7 @@ from .units_page import units_blocks
 from .unknown import TellingMotion, motions_of
 from .written_page import written_blocks
 
-_OVERLAP = 0.01  # of the gap: less is rounding
+_OVERLAP = 0.01  # of the gap: less does not count
 _FIXED = "fitted.xml"
 _MOST_ROWS = 6
 
@@ -68,9 +68,14 @@ class IdentificationPage(PageOfRecording):
         return self.result.at_floor and self.result.holds
 
     @property
-    def ranked(self) -> list[CauseShare]:
-        """Return the causes, the largest share first."""
-        return ranked_shares(self.result)
+    def large(self) -> list[CauseShare]:
+        """Return the causes with a part of the gap that counts, the largest first."""
+        return [share for share in ranked_shares(self.result) if share.share >= _OVERLAP]
+
+    @property
+    def others(self) -> float:
+        """Return what the other causes have of the gap, together."""
+        return sum(share.share for share in self.result.shares if share.share < _OVERLAP)
 
     @property
     def standing_in(self) -> list[CauseShare]:
@@ -78,16 +83,29 @@ class IdentificationPage(PageOfRecording):
 
         Empty where all of them alone take away no more than together.
         """
-        alone = sum(share.alone for share in self.ranked)
-        together = sum(share.share for share in self.ranked)
+        ranked = ranked_shares(self.result)
+        alone = sum(share.alone for share in ranked)
+        together = sum(share.share for share in ranked)
         if alone <= together + _OVERLAP:
             return []
-        return [share for share in self.ranked if share.alone > share.share + _OVERLAP]
+        return [share for share in ranked if share.alone > share.share + _OVERLAP]
+
+    @property
+    def likely(self) -> Hypothesis | None:
+        """Return the other reading of the numbers that fits best, where what was fitted does not.
+
+        None where no other one fits better.
+        """
+        if self.result.at_floor:
+            return None
+        readings = [each for each in self._better if each.size is None]
+        return min(readings, key=lambda each: each.residual, default=None)
 
     @property
     def better(self) -> list[Hypothesis]:
-        """Return the other readings of the numbers that fit better."""
-        return [each for each in self._better if each.size is None]
+        """Return the other readings of the numbers that fit better, without the likely one."""
+        likely = self.likely
+        return [each for each in self._better if each.size is None and each is not likely]
 
     @property
     def lacking(self) -> list[str]:
@@ -139,8 +157,10 @@ class IdentificationPage(PageOfRecording):
 
     @property
     def reasons(self) -> list[str]:
-        """Return why parameters are not determined, and of how many that is so."""
+        """Return why parameters are not determined, and of how many that is so, if not of all."""
         by_reason = grouped((reason, 1) for each in self.undetermined for reason in each.reasons)
+        if len(by_reason) == 1:
+            return list(by_reason)
         ranked = sorted(by_reason.items(), key=lambda item: -len(item[1]))
         return [f"{reason} {len(those)}" for reason, those in ranked]
 
@@ -152,9 +172,7 @@ class IdentificationPage(PageOfRecording):
     @property
     def rewritten(self) -> Sequence[Block]:
         """Return what was written of the model's file; empty where that was not asked."""
-        if self.result.rewritten is None:
-            return []
-        return written_blocks(self.result.rewritten, details=bool(self.further))
+        return written_blocks(self.result, details=bool(self.further))
 
     @property
     def next_command(self) -> str:

@@ -8,6 +8,9 @@ from ...engines.description.file_changes import AttributeChange
 from ...show.blocks import Block
 from ...show.templates import PageContent, render_blocks
 from ..why.rewriting import RewrittenFile
+from .results import IdentificationResult
+
+_FARTHER = 1.5  # times as far from the arm as the fit: that needs a reason
 
 
 @dataclass(frozen=True)
@@ -15,13 +18,26 @@ class WrittenPart(PageContent):
     """What was written of the model's file.
 
     Attributes:
+        result: What the recording tells.
         rewritten: The file.
         has_changes: Whether each attribute that was changed has a row.
     """
 
     template = "written_model.md.j2"
+    result: IdentificationResult
     rewritten: RewrittenFile
     has_changes: bool
+
+    @property
+    def is_farther(self) -> bool:
+        """Tell whether the file is farther from the arm than what was fitted."""
+        gap, fitted = self.rewritten.gap, self.result.gap.fitted
+        return gap is not None and fitted is not None and gap > _FARTHER * fitted
+
+    @property
+    def unchanged(self) -> int:
+        """Return how many figures are not determined, and stay as they were."""
+        return sum(each.verdict != "determined" for each in self.result.parameters)
 
     @property
     def has_delay(self) -> bool:
@@ -34,11 +50,15 @@ class WrittenPart(PageContent):
         return self.rewritten.written if self.has_changes else ()
 
 
-def written_blocks(rewritten: RewrittenFile, details: bool) -> list[Block]:
+def written_blocks(result: IdentificationResult, details: bool) -> list[Block]:
     """Return what was written, and what of the determined figures was not, and why.
 
+    Empty where no file was to be written.
+
     Args:
-        rewritten: The file.
+        result: What the recording tells.
         details: Whether each attribute that was changed has a row.
     """
-    return render_blocks(WrittenPart(rewritten, details))
+    if result.rewritten is None:
+        return []
+    return render_blocks(WrittenPart(result, result.rewritten, details))
