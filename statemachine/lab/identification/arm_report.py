@@ -10,11 +10,11 @@ from ...measures import ENCODER_COUNT
 from ...show.blocks import Block, Page
 from ...show.templates import PageContent, render_blocks
 from ..compare import Comparison, compare
-from ..recordings import Trace
 from ..questions.events import events_of
 from ..questions.run_files import RunFiles, ShownModels, write_page
 from ..questions.stage.both_runs import BothRuns
 from ..questions.stage.quantity_chart import charts_of
+from ..recordings import Trace
 from ..runs.reporter import QUIET, Reporter
 from .ghosts import traces_of
 from .results import IdentificationResult, RecordingResult

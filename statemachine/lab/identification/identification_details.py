@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import NO_NUMBER, degrees, fixed
 from ...show.blocks import Table
 from ...show.templates import PageContent
+from .hypotheses import EVIDENCE
 from .parameter_table import determined_table, share_table, undetermined_table
 from .parameter_texts import name_of_parameter
 from .recording_page import gap_table
@@ -71,6 +72,16 @@ class IdentificationDetails(PageContent):
             size = NO_NUMBER if each.size is None else degrees(each.size, 2)
             rows.append((each.name, size, residual, evidence, each.verdict))
         return Table(headers, rows, words=frozenset({0, 4}))
+
+    @property
+    def decisive(self) -> float:
+        """Return the evidence above which a reading fits better."""
+        return EVIDENCE
+
+    @property
+    def has_hypotheses(self) -> bool:
+        """Tell whether other readings were tried."""
+        return bool(self.result.hypotheses)
 
     @property
     def has_play(self) -> bool:
