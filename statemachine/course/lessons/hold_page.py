@@ -172,7 +172,7 @@ def _worst_at(result: HoldResult, time: float) -> str:
     """Say which joint is farthest from its target at a time, and by how much."""
     moment = int(np.argmin(np.abs(result.time - time)))
     gap, joint = largest(result.distances()[moment])
-    return f"{position(gap, result.slides[joint], 3)}  {result.joints[joint]}"
+    return f"{result.joints[joint]}  {position(gap, result.slides[joint], 3)}"
 
 
 def _pose(results: Results[HoldResult], first: HoldResult) -> Table:
