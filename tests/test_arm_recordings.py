@@ -250,9 +250,9 @@ def test_another_arm_with_joints_of_the_same_names_is_refused(
 
 
 def test_another_arm_is_read_with_a_model_of_its_own(arm: sm.Model, tmp_path: Path) -> None:
-    shutil.copytree(arm.path.parent, tmp_path / "koch")
-    file = tmp_path / "koch" / "koch.xml"
-    (tmp_path / "koch" / arm.path.name).rename(file)
+    shutil.copytree(arm.path.parent, tmp_path / "so101")
+    file = tmp_path / "so101" / "koch.xml"
+    (tmp_path / "so101" / arm.path.name).rename(file)
     source = written(tmp_path / "recorded", replace(data_set(DEGREES), robot="koch_follower"))
     assert recordings(source, sm.load(file)).fitted.robot == "koch_follower"
 

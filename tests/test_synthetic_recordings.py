@@ -21,6 +21,7 @@ from tools.arm_recordings.simulation import arm_model, measured_angles
 
 pytest.importorskip("pyarrow")
 COUNT = 2.0 * np.pi / 4096.0  # rad
+ELBOW = 2  # its column
 SHORT = Plan("short", episodes=1, seconds=3.0)
 # What a plan draws does not depend on the fault.
 NO_OTHER_FAULT = replace(SHORT, seed=3)
@@ -156,6 +157,17 @@ def test_the_command_writes_what_its_words_say(
     assert told["plan"]["fault"]["zero"] == [["elbow_flex", pytest.approx(np.radians(5))]]
 
 
+def test_the_command_takes_play_of_several_joints_and_a_tilt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    play = "--play elbow_flex 0.3 --play gripper 0.2"
+    monkeypatch.setattr("sys.argv", f"x {tmp_path} --seconds 1 {play} --tilt 0 2".split())
+    main()
+    told = json.loads((tmp_path / "truth.json").read_text("utf-8"))
+    assert told["play"] == pytest.approx(np.radians([0, 0, 0.3, 0, 0, 0.2]))
+    assert told["gravity"][0] == pytest.approx(9.81 * np.sin(np.radians(2.0)))
+
+
 # Faults.
 
 
@@ -185,6 +197,26 @@ def test_the_scale_of_the_gripper_is_that_of_its_opening(
     shut = arm.jnt_range[5, 0] + without_fault.truth.offset[5]
     openings = (state_of(wider)[:, 5] - shut) / (state_of(without_fault)[:, 5] - shut)
     assert np.median(openings) == pytest.approx(1.2, abs=0.01)
+
+
+def test_an_encoder_behind_play_is_half_of_it_behind_and_stays_where_the_joint_turns(
+    without_fault: SyntheticRecording,
+) -> None:
+    fault = Fault(play=(("elbow_flex", np.radians(2.0)),))
+    change = state_of(make(replace(NO_OTHER_FAULT, fault=fault))) - state_of(without_fault)
+    assert np.abs(change[:, ELBOW]).max() == pytest.approx(np.radians(1.0), abs=3 * COUNT)
+    moving = np.gradient(state_of(without_fault)[:, ELBOW])
+    far = np.abs(moving) > 0.7 * np.abs(moving).max()
+    np.testing.assert_allclose(
+        change[far, ELBOW], -np.radians(1.0) * np.sign(moving[far]), atol=3 * COUNT
+    )
+    assert np.abs(np.delete(change, ELBOW, axis=1)).max() < 0.01 * COUNT
+
+
+def test_a_base_that_is_tilted_has_gravity_from_elsewhere(arm: sm.Model) -> None:
+    truth = drawn_truth(arm, "soft", np.random.default_rng(1), Fault(tilt=(0.0, np.radians(30))))
+    assert truth.gravity == pytest.approx([9.81 * 0.5, 0.0, -9.81 * np.sqrt(0.75)])
+    assert np.array(truth.applied_to(arm).gravity) == pytest.approx(truth.gravity)
 
 
 # The thirty.

@@ -81,11 +81,22 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--zero", nargs=2, metavar=("JOINT", "DEGREES"), help="a zero that is off")
     parser.add_argument("--reversed", default="", metavar="JOINT", help="a sign that is reversed")
     parser.add_argument("--gripper-scale", type=float, default=1.0)
-    pair = ("JOINT", "DEGREES")
     parser.add_argument(
-        "--play", nargs=2, metavar=pair, action="append", default=[], help="of a joint's encoder"
+        "--play",
+        nargs=2,
+        metavar=("JOINT", "DEGREES"),
+        action="append",
+        default=[],
+        help="between a joint and its encoder; may be given several times",
     )
-    parser.add_argument("--tilt", nargs=2, type=float, metavar=("X", "Y"), default=(0.0, 0.0))
+    parser.add_argument(
+        "--tilt",
+        nargs=2,
+        type=float,
+        metavar=("X", "Y"),
+        default=(0.0, 0.0),
+        help="of the base, about its axes x and y [degrees]",
+    )
     return parser
 
 

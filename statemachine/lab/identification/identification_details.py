@@ -84,9 +84,9 @@ class IdentificationDetails(PageContent):
         return bool(self.result.hypotheses)
 
     @property
-    def has_play(self) -> bool:
-        """Tell whether play was tried."""
-        return any(each.name.startswith("play ") for each in self.result.hypotheses)
+    def has_sizes(self) -> bool:
+        """Tell whether something was tried that has a size: play of joints, a tilted base."""
+        return any(each.size is not None for each in self.result.hypotheses)
 
     @property
     def starts(self) -> Sequence[StartOutcome]:

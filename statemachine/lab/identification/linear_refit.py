@@ -53,6 +53,12 @@ class LinearRefit:
         basis, triangle = np.linalg.qr(fit.jacobian)
         return cls(fit, fit.objective.scaled(values, fit.errors), basis, triangle)
 
+    @property
+    def cost(self) -> float:
+        """Return half the sum of squares where the angles stay as they are."""
+        left = self.left(self.residuals)
+        return 0.5 * float(left @ left)
+
     def end(self, change: Array) -> RefitEnd:
         """Return where the fit ends if the angles change.
 

@@ -83,7 +83,7 @@ def _of_play(refit: LinearRefit) -> list[Refinement]:
     if likely.any():
         playing = np.where(likely, widths, 0.0)
         fitted = _fitted(best, replace(best.objective.simulation, play=playing))
-        likely &= fitted.cost < best.cost - EVIDENCE
+        likely &= fitted.cost < refit.cost - EVIDENCE
         for place in np.flatnonzero(likely).tolist():
             shifts[place] = np.vstack([shifts[place], _moved(best, fitted)])
         # Widths come out larger once friction is less, which had stood in for play.
@@ -107,21 +107,22 @@ def _of_tilt(refit: LinearRefit) -> Refinement:
     """Return a tilted base. One that fits no better moves nothing: a base is to stand level."""
     best = refit.fit
     tilt = likeliest_tilt(refit)
-    evidence, residual = best.cost - tilt.end.cost, tilt.end.residual
+    evidence, residual = refit.cost - tilt.end.cost, tilt.end.residual
+    verdict = verdict_of(evidence, is_nearer=False)
     shifts = np.zeros((0, len(best.objective.free)))
-    is_nearer = False
     if evidence > EVIDENCE:
         simulation = best.objective.simulation
         gravity = tilted_gravity(np.array(simulation.parameters.model.gravity), tilt.angles)
         fitted = _fitted(best, replace(simulation, gravity=gravity))
-        evidence, residual = best.cost - fitted.cost, root_mean_square(fitted.errors)
-        is_nearer = residual < root_mean_square(best.errors)
-        shifts = _moved(best, fitted)[None]
+        evidence, residual = refit.cost - fitted.cost, root_mean_square(fitted.errors)
+        verdict = verdict_of(evidence, residual < root_mean_square(best.errors))
+        if verdict == "fits better":
+            shifts = _moved(best, fitted)[None]
     hypothesis = Hypothesis(
         name="a tilted base",
         residual=residual,
         evidence=evidence,
-        verdict=verdict_of(evidence, is_nearer),
+        verdict=verdict,
         size=float(np.linalg.norm(tilt.angles)),
     )
     return Refinement(hypothesis, "a tilted base fits as well", shifts)

@@ -31,15 +31,15 @@ def tilted_gravity(gravity: Array, tilt: Array) -> Array:
     """Return gravity (3,) in the axes of a base that is tilted.
 
     Args:
-        gravity: (3,) of a level base, along its z axis [m/s²].
+        gravity: (3,) of a base that stands as the model's [m/s²].
         tilt: (2,) as of `Tilt.angles` [rad].
     """
     angle = float(np.linalg.norm(tilt))
     if angle == 0.0:
         return gravity.copy()
-    x, y = tilt / angle
-    across = gravity[2] * math.sin(angle)
-    return np.array([-y * across, x * across, gravity[2] * math.cos(angle)])
+    axis = np.array([*tilt, 0.0]) / angle
+    across, along = np.cross(gravity, axis), axis * (axis @ gravity)
+    return along + math.cos(angle) * (gravity - along) + math.sin(angle) * across
 
 
 def likeliest_tilt(refit: LinearRefit) -> Tilt:

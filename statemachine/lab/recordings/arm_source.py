@@ -170,12 +170,13 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
     _check_reach(arm, episode)
     joints = tuple(unit.joint for unit in arm.units)
     resolution = np.full(len(arm.units), COUNT)
+    action = _angles(arm.sent(episode.action), arm.units)
     return ArmRecording(
         source=source,
         episode=episode.number,
         fps=arm.data_set.fps,
         joints=joints,
-        action=_angles(arm.sent(episode.action), arm.units),
+        action=action,
         state=_angles(episode.state, arm.units),
         resolution=resolution,
         units=arm.units,

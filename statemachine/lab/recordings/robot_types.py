@@ -55,10 +55,10 @@ def check_robot(robot: str, model: Model) -> None:
         BadInputError: The data set is of a known arm, and the model's file is that of an SO-100 or
             SO-101.
     """
-    if not robot.lower().startswith(_OTHER_ARMS):
-        return
     path = model.path
-    if _SO_ARM.search(path.stem.lower()) or _SO_ARM.search(path.parent.name.lower()):
+    file, folder = path.stem.lower(), path.parent.name.lower()
+    is_other = robot.lower().startswith(_OTHER_ARMS) and not file.startswith(_OTHER_ARMS)
+    if is_other and (_SO_ARM.search(file) or _SO_ARM.search(folder)):
         raise BadInputError(
             f"the data set is of a {robot} (robot_type in meta/info.json), and {path.name} is "
             "another arm: name a model of that robot"
