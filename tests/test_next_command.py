@@ -51,13 +51,6 @@ def test_a_difference_is_asked_for_its_causes(differs: Finding) -> None:
     assert words[-3:] == ["--why", "--quantity", "turn"]
 
 
-def test_the_short_command_has_dots_for_what_was_typed(differs: Finding) -> None:
-    command = next_command(TWO_FILES, differs, None)
-    assert command.short_text.split() == [
-        *("statemachine", "compare", "...", "--why", "--quantity", "turn")
-    ]
-
-
 @pytest.mark.parametrize(
     ("verdict", "purpose"),
     [

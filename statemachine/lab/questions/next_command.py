@@ -9,7 +9,7 @@ from typing import Literal
 from ...measures import QUANTITIES
 from ..compare.instead import Instead
 from ..compare.sides import Request, Side
-from ..compare.typed_command import TypedCommand, typed_command
+from ..compare.typed_command import typed_command
 from ..runs.call_period import CallPeriods
 from ..runs.scenarios import SCENARIOS
 from .compared_names import name_of
@@ -44,12 +44,10 @@ class NextCommand:
     Attributes:
         purpose: What it is for.
         text: The command, in lines; "" for none.
-        short_text: The same, where dots stand for what was typed already.
     """
 
     purpose: Purpose
     text: str = ""
-    short_text: str = ""
 
 
 def next_command(
@@ -132,15 +130,14 @@ def _same_base(request: Request, finding: Finding) -> NextCommand:
             sides = list(request.sides)
             sides[k] = replace(side, options={**side.options, "base": base})
             same = replace(request, sides=tuple(sides))
-            text = typed_command(same).lines()
-            return NextCommand("same base", text, text)
+            return NextCommand("same base", typed_command(same).lines())
     return NextCommand("nothing")
 
 
 def _same_period(request: Request, periods: CallPeriods) -> NextCommand:
     """Return the comparison with a function that is called as often on both sides."""
-    text = typed_command(replace(request, every=periods.common_word)).lines()
-    return NextCommand("same period", text, text)
+    same = typed_command(replace(request, every=periods.common_word))
+    return NextCommand("same period", same.lines())
 
 
 def _until_then(request: Request, finding: Finding) -> NextCommand:
@@ -149,8 +146,8 @@ def _until_then(request: Request, finding: Finding) -> NextCommand:
     seconds = math.floor(900 * end) / 1000
     if request.is_traces or seconds <= 0:
         return NextCommand("nothing")
-    text = typed_command(replace(request, seconds=seconds)).lines("--why")
-    return NextCommand("why until then", text, text)
+    shorter = typed_command(replace(request, seconds=seconds))
+    return NextCommand("why until then", shorter.lines("--why"))
 
 
 def _more(request: Request, finding: Finding) -> NextCommand:
@@ -163,15 +160,10 @@ def _more(request: Request, finding: Finding) -> NextCommand:
 
 def _instead(request: Request, purpose: Purpose, experiment: str) -> NextCommand:
     """Return the command of a comparison with another experiment, for its own time."""
-    text = typed_command(replace(request, what=(experiment,), every=1, seconds=None)).lines()
-    return NextCommand(purpose, text, text)
+    other = typed_command(replace(request, what=(experiment,), every=1, seconds=None))
+    return NextCommand(purpose, other.lines())
 
 
 def _asking(request: Request, purpose: Purpose, *question: str) -> NextCommand:
     """Return the command of a comparison with a question behind it."""
-    command = typed_command(request)
-    text = command.lines(*question)
-    if not request.is_typed:
-        return NextCommand(purpose, text, text)
-    program, name, *_ = command.words
-    return NextCommand(purpose, text, TypedCommand((program, name, "...")).lines(*question))
+    return NextCommand(purpose, typed_command(request).lines(*question))
