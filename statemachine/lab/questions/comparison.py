@@ -149,21 +149,22 @@ def page(result: CompareResult, details: bool = False) -> Page:
 
 
 def _shorter_pages(result: CompareResult) -> Iterator[Page]:
-    """Yield the page with ever fewer rows.
-
-    A command that can be copied is worth some rows.
-    """
+    """Yield the page with ever fewer rows, then with a shorter command, too."""
     for rows in range(WORST, 0, -1):
         yield _with_rows(result, rows, ())
+    yield _with_rows(result, 1, (), is_short=True)
 
 
-def _with_rows(result: CompareResult, rows: int, details: Sequence[Block]) -> Page:
+def _with_rows(
+    result: CompareResult, rows: int, details: Sequence[Block], is_short: bool = False
+) -> Page:
     """Return the page.
 
     Args:
         result: How far apart two runs are.
         rows: How many of the worst quantities have a row.
         details: What follows.
+        is_short: Whether the command leaves the quantity to itself.
     """
     comparison, finding = result.comparison, result.finding
     worst = worst_of(comparison, finding, result.floor, rows)
@@ -178,7 +179,7 @@ def _with_rows(result: CompareResult, rows: int, details: Sequence[Block]) -> Pa
         rest=rest,
         counts=side_counts(result),
         purpose=following.purpose,
-        command=following.text,
+        command=following.short_text if is_short else following.text,
         details=details,
     )
     headline = headline_of(finding, comparison, result.instead)

@@ -44,10 +44,12 @@ class NextCommand:
     Attributes:
         purpose: What it is for.
         text: The command, in lines; "" for none.
+        short_text: The same where lines are few: the quantity is left to the command.
     """
 
     purpose: Purpose
     text: str = ""
+    short_text: str = ""
 
 
 def next_command(
@@ -77,12 +79,14 @@ def next_command(
     can_step = not request.is_traces or bool(request.sides)
     moves = QUANTITIES[finding.lead.kind].moves
     if can_step and (finding.rounding.verdict in ("as much", "no bound") or not moves):
-        return _asking(request, "one step", "--one-step")
+        return _as_it_is("one step", request, "--one-step")
     if not moves:
         return NextCommand("nothing")
     if _only_timesteps_differ(request):
-        return _asking(request, "converge", "--converge")
-    return _asking(request, "why", "--why", "--quantity", name_of(finding.lead.name))
+        return _as_it_is("converge", request, "--converge")
+    command = typed_command(request)
+    text = command.lines("--why", "--quantity", name_of(finding.lead.name))
+    return NextCommand("why", text, command.lines("--why"))
 
 
 def _same_on_both(
@@ -95,7 +99,7 @@ def _same_on_both(
         parts: list[str] = []
         for missing in finding.missing:
             parts += [f"--{missing.part}", missing.other_side]
-        return _asking(request, "same parts", *parts)
+        return _as_it_is("same parts", request, *parts)
     if periods is not None and periods.differ:
         return _same_period(request, periods)
     return None
@@ -130,14 +134,13 @@ def _same_base(request: Request, finding: Finding) -> NextCommand:
             sides = list(request.sides)
             sides[k] = replace(side, options={**side.options, "base": base})
             same = replace(request, sides=tuple(sides))
-            return NextCommand("same base", typed_command(same).lines())
+            return _as_it_is("same base", same)
     return NextCommand("nothing")
 
 
 def _same_period(request: Request, periods: CallPeriods) -> NextCommand:
     """Return the comparison with a function that is called as often on both sides."""
-    same = typed_command(replace(request, every=periods.common_word))
-    return NextCommand("same period", same.lines())
+    return _as_it_is("same period", replace(request, every=periods.common_word))
 
 
 def _until_then(request: Request, finding: Finding) -> NextCommand:
@@ -146,8 +149,7 @@ def _until_then(request: Request, finding: Finding) -> NextCommand:
     seconds = math.floor(900 * end) / 1000
     if request.is_traces or seconds <= 0:
         return NextCommand("nothing")
-    shorter = typed_command(replace(request, seconds=seconds))
-    return NextCommand("why until then", shorter.lines("--why"))
+    return _as_it_is("why until then", replace(request, seconds=seconds), "--why")
 
 
 def _more(request: Request, finding: Finding) -> NextCommand:
@@ -160,10 +162,10 @@ def _more(request: Request, finding: Finding) -> NextCommand:
 
 def _instead(request: Request, purpose: Purpose, experiment: str) -> NextCommand:
     """Return the command of a comparison with another experiment, for its own time."""
-    other = typed_command(replace(request, what=(experiment,), every=1, seconds=None))
-    return NextCommand(purpose, other.lines())
+    return _as_it_is(purpose, replace(request, what=(experiment,), every=1, seconds=None))
 
 
-def _asking(request: Request, purpose: Purpose, *question: str) -> NextCommand:
-    """Return the command of a comparison with a question behind it."""
-    return NextCommand(purpose, typed_command(request).lines(*question))
+def _as_it_is(purpose: Purpose, request: Request, *question: str) -> NextCommand:
+    """Return the command of a comparison, with a question behind it."""
+    text = typed_command(request).lines(*question)
+    return NextCommand(purpose, text, text)
