@@ -72,8 +72,8 @@ def walk(ending: Ending = "walked", seconds: float = 5.0, vx: float = 0.4) -> Wa
     ("walks", "cost"),
     [
         ([walk()], 0.0),
-        ([walk(vx=0.3)], 0.25),  # 0.1 m/s is all that is tolerated
-        ([walk(vx=0.5), walk()], 0.125),
+        ([walk(vx=0.32)], 0.25),  # 0.08 m/s is all that is tolerated
+        ([walk(vx=0.48), walk()], 0.125),
         ([walk(vx=-3.0)], 1.0),
         ([walk("fell", 5.0)], 1.0),
         ([walk("fell", 0.0)], 2.0),
@@ -95,8 +95,8 @@ def tried(*costs: float | None) -> list[TriedHypothesis]:
         (1.5, [0.1, 0.9], [0.1]),
         (1.5, [0.1, 0.13, 0.2], [0.1, 0.13]),  # equally good
         (0.5, [0.35, 0.4], []),  # less than two fifths better
-        (0.10, [0.03], []),  # better by less than 0.08
-        (0.13, [0.05], [0.05]),
+        (0.20, [0.06], []),  # better by less than 0.15
+        (0.20, [0.04], [0.04]),
         (1.0, [None], []),
     ],
 )
