@@ -47,7 +47,10 @@ def scenes_of(path: Path) -> list[Path]:
     for scene in sorted(path.parent.glob("*.xml")):
         if scene == path or kind_of_path(scene) != "a file":
             continue
-        text = scene.read_text("utf-8", errors="replace")
+        try:
+            text = scene.read_text("utf-8", errors="replace")
+        except OSError:  # what cannot be read is nothing to take
+            continue
         if f'"{path.name}"' in text and any(ground in text for ground in _GROUNDS):
             scenes.append(scene)
     return scenes
