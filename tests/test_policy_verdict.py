@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from statemachine import load
-from statemachine.errors import BadInputError
+from statemachine.backends import BackendChoice
+from statemachine.errors import BadInputError, MissingEngineError
+from statemachine.interface import Model
 from statemachine.lab.policy.command import Command, usual_commands
 from statemachine.lab.policy.contract import Contract
 from statemachine.lab.policy.contract_file import read_contract
@@ -16,6 +18,10 @@ from statemachine.lab.policy.floor import check_floor
 from statemachine.lab.policy.page import page
 from statemachine.lab.policy.request import PolicyRequest, PolicyResult, answer
 from statemachine.lab.policy.walk import Walk
+from statemachine.lab.runs.drive import Progress
+from statemachine.lab.runs.each_backend import on_each_backend
+from statemachine.lab.runs.reporter import QuietReporter
+from statemachine.models import AnyPath
 from statemachine.show.blocks import Code, Verdict
 from tools.policy_faults import FAULTS, written_with
 
@@ -265,3 +271,36 @@ def test_nothing_is_run_without_a_floor(tmp_path: Path, asked: str) -> None:
     request = PolicyRequest(network, contract_file(tmp_path, content()), file)
     with pytest.raises(BadInputError, match="no floor"):
         {"answer": answer, "diagnose": diagnose}[asked](request)
+
+
+# -- which engines ----------------------------------------------------------------
+
+
+class Notes(QuietReporter):
+    """A reporter that keeps its notes."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Keep a note."""
+        self.notes.append(text)
+
+
+def test_of_all_engines_one_that_is_missing_is_noted_once_and_left_out(tmp_path: Path) -> None:
+    need_engine("mujoco")
+    reporter = Notes()
+
+    def load_on_mujoco(backend: BackendChoice, model: AnyPath, menagerie: AnyPath | None) -> Model:
+        if str(backend) != "mujoco":
+            raise MissingEngineError("it is not installed here")
+        return load(model)
+
+    def name_of(_model: Model, backend: str, _progress: Progress) -> str:
+        return backend
+
+    results = on_each_backend(
+        ("all",), "", robot(tmp_path), None, name_of, reporter, load_on_mujoco
+    )
+    assert results == {"mujoco": "mujoco"}
+    assert reporter.notes == ["left out: it is not installed here"]
