@@ -181,10 +181,10 @@ class Walker:
 SLOW_TO_SHOW = "gyroscope in world axes"
 
 
-def quadruped(fault: str) -> Walker:
+def quadruped(fault: str, turning: Command = COMMANDS[1]) -> Walker:
     """Return the robot that we trained, and how long it is to turn."""
     seconds = 10.0 if fault == SLOW_TO_SHOW else 5.0
-    policy, turning = QUADRUPED / "policy.onnx", Command(0.3, 0.0, 0.5)
+    policy = QUADRUPED / "policy.onnx"
     return Walker(policy, contract_text(), "quadruped/scene", turning, seconds)
 
 
@@ -211,14 +211,16 @@ def test_a_fault_is_named_by_what_mends_the_walk(tmp_path: Path, fault: str) -> 
     assert is_named(diagnosed(quadruped(fault), tmp_path, fault, "mujoco"), fault)
 
 
-# All of them take minutes there: python -m tools.policy_faults tries each.
+# All of them take minutes there: python -m tools.policy_faults tries each. What is asked is what a
+# sound contract meets there, too: of 0.3 m/s it makes 0.4.
+FASTEST = Command(0.5, 0.0, 0.6)
 ELSEWHERE = ("velocity in world axes", "swapped legs")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ELSEWHERE)
 def test_a_fault_is_named_on_the_second_engine_too(tmp_path: Path, fault: str) -> None:
-    assert is_named(diagnosed(quadruped(fault), tmp_path, fault, "pybullet"), fault)
+    assert is_named(diagnosed(quadruped(fault, FASTEST), tmp_path, fault, "pybullet"), fault)
 
 
 @pytest.mark.slow
