@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from statemachine import load
-from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.errors import BadInputError, UnknownNameError, nearest_name
 from statemachine.lab.policy.binding import Binding, bind
 
 from .support.policies import contract, robot, servos, with_terms
@@ -52,6 +52,18 @@ def test_a_joint_that_the_model_lacks_is_answered_with_the_nearest(tmp_path: Pat
     changes = {JOINTS: ["right", "leftt"]}
     with pytest.raises(BadInputError, match=r"leftt.*Did you mean left"):
         bound(tmp_path, changes)
+
+
+@pytest.mark.parametrize("joint", ["hip", "lower_left_ankle"])
+def test_a_joint_that_is_near_none_is_answered_with_all(tmp_path: Path, joint: str) -> None:
+    with pytest.raises(BadInputError, match=r"its hinges are left, right$"):
+        bound(tmp_path, {JOINTS: ["right", joint]})
+
+
+def test_of_several_joints_that_are_as_near_none_is_guessed() -> None:
+    hips = ["FL_hip_joint", "FR_hip_joint", "RL_hip_joint"]
+    assert nearest_name("left_hip_joint", hips) == ""
+    assert nearest_name("FL_hipp_joint", hips) == "FL_hip_joint"
 
 
 def test_a_robot_without_a_floating_base_is_refused(tmp_path: Path) -> None:

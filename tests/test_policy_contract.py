@@ -170,10 +170,6 @@ def test_a_misspelt_name_is_answered_with_the_nearest(
     assert str(caught.value).split("Did you mean ")[1].startswith(f"{nearest}?")
 
 
-def test_a_misspelt_field_that_may_be_missing_is_told_as_unread(tmp_path: Path) -> None:
-    assert contract(tmp_path, {f"{ACTION}.dealy_steps": 1}).unread == (f"{ACTION}.dealy_steps",)
-
-
 def test_nothing_of_a_whole_contract_is_unread(tmp_path: Path) -> None:
     changes = {"source.robot": "r", "timing.target_hold": "zoh", f"{ACTUATORS}.integrator": "x"}
     assert contract(tmp_path, changes).unread == ()

@@ -10,14 +10,13 @@ import pytest
 from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.interface import Array, Model
-from statemachine.lab.policy.command import Command, usual_commands
+from statemachine.lab.policy.command import Command
 from statemachine.lab.policy.walk import set_start, walked
 
 from .support.backends import BOTH
 from .support.policies import (
     SIZE,
     constant_network,
-    contract,
     linear_network,
     motors,
     node,
@@ -241,12 +240,3 @@ def test_the_height_of_a_walk_is_that_of_its_base(tmp_path: Path, model: Model) 
     height = walked(policy, Command(0.5), 0.1).walk.height
     assert height is not None
     assert 0.25 < height <= 0.3
-
-
-@pytest.mark.parametrize(("most", "turn"), [(0.4, 0.24), (5.0, 0.5)])
-def test_a_policy_is_asked_to_turn_at_a_part_of_its_limit(
-    tmp_path: Path, most: float, turn: float
-) -> None:
-    limits = {"policy_io.commands.base_velocity.limit": {"wz": [-most, most]}}
-    straight, turning = usual_commands(contract(tmp_path, limits))
-    assert (straight.wz, turning.wz) == (0.0, pytest.approx(turn))

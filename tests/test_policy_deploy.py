@@ -12,6 +12,7 @@ from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.lab.policy.command import Command
 from statemachine.lab.policy.contract import Clock, Contract
+from statemachine.lab.policy.contract_fields import UnreadField
 from statemachine.lab.policy.contract_file import read_contract
 from statemachine.lab.policy.network import Network
 from statemachine.lab.policy.on_model import PolicyOnModel
@@ -220,7 +221,7 @@ def test_nothing_of_such_a_file_is_unread(tmp_path: Path) -> None:
 
 
 def test_what_is_not_known_of_a_file_is_told_as_unread(tmp_path: Path) -> None:
-    assert of_go2(tmp_path, torque_limit=3).unread == ("torque_limit",)
+    assert of_go2(tmp_path, torque_limit=3).unread == (UnreadField("torque_limit"),)
 
 
 @pytest.mark.parametrize(

@@ -72,8 +72,8 @@ def walk(ending: Ending = "walked", seconds: float = 5.0, vx: float = 0.4) -> Wa
     ("walks", "cost"),
     [
         ([walk()], 0.0),
-        ([walk(vx=0.3)], 0.25),  # 0.1 m/s is all that is tolerated
-        ([walk(vx=0.5), walk()], 0.125),
+        ([walk(vx=0.32)], 0.25),  # 0.08 m/s is all that is tolerated
+        ([walk(vx=0.48), walk()], 0.125),
         ([walk(vx=-3.0)], 1.0),
         ([walk("fell", 5.0)], 1.0),
         ([walk("fell", 0.0)], 2.0),
@@ -95,8 +95,8 @@ def tried(*costs: float | None) -> list[TriedHypothesis]:
         (1.5, [0.1, 0.9], [0.1]),
         (1.5, [0.1, 0.13, 0.2], [0.1, 0.13]),  # equally good
         (0.5, [0.35, 0.4], []),  # less than two fifths better
-        (0.10, [0.03], []),  # better by less than 0.08
-        (0.13, [0.05], [0.05]),
+        (0.20, [0.06], []),  # better by less than 0.15
+        (0.20, [0.04], [0.04]),
         (1.0, [None], []),
     ],
 )
@@ -181,10 +181,10 @@ class Walker:
 SLOW_TO_SHOW = "gyroscope in world axes"
 
 
-def quadruped(fault: str) -> Walker:
+def quadruped(fault: str, turning: Command = COMMANDS[1]) -> Walker:
     """Return the robot that we trained, and how long it is to turn."""
     seconds = 10.0 if fault == SLOW_TO_SHOW else 5.0
-    policy, turning = QUADRUPED / "policy.onnx", Command(0.3, 0.0, 0.5)
+    policy = QUADRUPED / "policy.onnx"
     return Walker(policy, contract_text(), "quadruped/scene", turning, seconds)
 
 
@@ -211,14 +211,16 @@ def test_a_fault_is_named_by_what_mends_the_walk(tmp_path: Path, fault: str) -> 
     assert is_named(diagnosed(quadruped(fault), tmp_path, fault, "mujoco"), fault)
 
 
-# All of them take minutes there: python -m tools.policy_faults tries each.
+# All of them take minutes there: python -m tools.policy_faults tries each. What is asked is what a
+# sound contract meets there, too: of 0.3 m/s it makes 0.4.
+FASTEST = Command(0.5, 0.0, 0.6)
 ELSEWHERE = ("velocity in world axes", "swapped legs")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ELSEWHERE)
 def test_a_fault_is_named_on_the_second_engine_too(tmp_path: Path, fault: str) -> None:
-    assert is_named(diagnosed(quadruped(fault), tmp_path, fault, "pybullet"), fault)
+    assert is_named(diagnosed(quadruped(fault, FASTEST), tmp_path, fault, "pybullet"), fault)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from statemachine.lab.probes.conventions import QUESTIONS
 from statemachine.show.blocks import Question
 
 from .support.claims import assert_in
-from .support.files import written_all
+from .support.files import written, written_all
 from .support.motions import opened
 from .support.processes import Cli, of_python
 from .support.requirements import ROOT, need_engine
@@ -49,6 +49,12 @@ COMMANDS = list(
         if line.startswith(("statemachine", "python exercises"))
     )
 )
+# What makes a file for the command behind it, by the name of the file.
+SEDS = {
+    line.split()[-1]: line.partition(" > ")[0]
+    for page in PAGES.values()
+    for line in re.findall(r"^sed .* > \S+$", page, re.MULTILINE)
+}
 # What a page shows: the command is the last that its introduction names.
 SHOWN = [
     pytest.param(shlex.split(command)[1:], part[1].rstrip("\n"), id=f"{name}: {command}")
@@ -109,9 +115,10 @@ def test_a_command_of_the_guides_ends_as_it_should(
     if "mujoco==" in command or "--versions" in command:
         request.getfixturevalue("old_releases")
     solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
-    contract = (ROOT / "models" / "quadruped" / "contract.yaml").read_text("utf-8")
-    files = {"robot.xml": ROBOT, "world_gyro.yaml": contract.replace("frame: body", "frame: world")}
-    written_all(tmp_path, {**files, **dict.fromkeys(SUBMITTED, solution)})
+    written_all(tmp_path, {"robot.xml": ROBOT, **dict.fromkeys(SUBMITTED, solution)})
+    for made, line in SEDS.items():
+        if made in words:
+            written(tmp_path / made, output_of_sed(line))
     if "path/to/menagerie" in words:
         words[words.index("path/to/menagerie")] = str(request.getfixturevalue("menagerie"))
     words = [word.replace("path/to/robot.xml", "robot.xml") for word in words]
@@ -134,6 +141,24 @@ def test_a_command_of_the_guides_ends_as_it_should(
     no = command in SAYS_NO or DIFFERS.match(command)
     assert done.returncode == (1 if no else 0), done.stderr
     assert done.stdout or words[:2] == ["trace", "plot"]
+
+
+def output_of_sed(line: str) -> str:
+    """Return what a line of the guides prints, typed in the checkout."""
+    return subprocess.run(
+        shlex.split(line), cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+
+
+def test_the_contract_that_a_guide_makes_has_its_gyroscope_in_world_axes() -> None:
+    before = (ROOT / "models" / "quadruped" / "contract.yaml").read_text("utf-8")
+    after = output_of_sed(SEDS["world_gyro.yaml"])
+    changed = [
+        pair
+        for pair in zip(before.splitlines(), after.splitlines(), strict=True)
+        if pair[0] != pair[1]
+    ]
+    assert changed == [("  imu: {site: imu, frame: body}", "  imu: {site: imu, frame: world}")]
 
 
 def _make_traces(here: Cli, folder: Path, words: list[str]) -> None:
@@ -310,8 +335,11 @@ def test_what_is_to_be_installed_exists() -> None:
 def test_files_that_are_linked_exist() -> None:
     for name in (*PAGES, "models/so101/README.md"):
         file = ROOT / name
-        for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", file.read_text("utf-8")):
-            if not target.startswith(MADE):
+        page = file.read_text("utf-8")
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", page):
+            if target.startswith(MADE):
+                assert "`make docs`" in page, f"{name}: {target} is not there in a clone"
+            else:
                 assert (file.parent / target).exists(), f"{name}: {target}"
 
 

@@ -149,11 +149,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("contract", type=Path)
     parser.add_argument("model")
     parser.add_argument("--backend", action="append")
-    parser.add_argument("--command", type=float, nargs=3, default=(0.3, 0.0, 0.5))
+    parser.add_argument("--command", type=float, nargs=3)
     parser.add_argument("--seconds", type=float, default=10.0)
     options = parser.parse_args(arguments)
     warnings.simplefilter("ignore", EngineWarning)
     contract = yaml.safe_load(options.contract.read_text("utf-8"))
+    commands = () if options.command is None else (Command(*options.command),)
     missed = 0
     for backend in options.backend or ["mujoco"]:
         for fault in ("", *(name for name in FAULTS if applies(contract, name))):
@@ -163,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     contract=written_with(contract, fault, Path(folder)),
                     model=options.model,
                     backends=(backend,),
-                    commands=(Command(*options.command),),
+                    commands=commands,
                     seconds=options.seconds,
                 )
                 (engine,) = diagnose(request).engines

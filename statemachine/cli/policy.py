@@ -30,8 +30,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "speeds it reaches, whether it falls, and which servos are at their limits."
     )
     parser.epilog = (
-        "Exit code 1: it falls on an engine, or a speed is off by more than 0.1 m/s (rad/s) and a "
-        "quarter of what is asked."
+        "Exit code 1: it falls on an engine, or a speed is off by more than 20 % of what is asked, "
+        "0.05 m/s and 0.1 rad/s at least."
     )
     parser.add_argument("policy", metavar="POLICY.onnx", help="the network")
     parser.add_argument("model", metavar="NAME|FILE", help="the robot, on its ground")
@@ -48,7 +48,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         type=number_list,
         metavar="VX,VY,WZ",
         help="speeds that are asked for [m/s, m/s, rad/s]; may be repeated, a run each (default: "
-        "straight on, and turning)",
+        "straight on, and turning, as fast as the contract allows)",
     )
     parser.add_argument(
         "--seconds",

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...installed import DEFAULT, PAIR
+from ...measures.text import folded_command
 from ..policy.command import typed_speeds
 from .labels import typed_option
 from .python_call import python_call
 from .sides import Request, Side
 from .what import without_folders
 
-_WIDTH = 74  # of a line of a command, which is set in
 _SOME_FOLDER = "DIR"
 _EVERY = "--every"
 
@@ -43,26 +42,14 @@ class TypedCommand:
         return replace(self, words=(*words, _EVERY, period))
 
     def lines(self, *further: str) -> str:
-        """Return the command as one types it, continued on further lines where it is long.
-
-        A word that is longer than a line, such as the path of a file, is not cut: what is printed
-        can be copied.
+        """Return the command as one types it, as of `folded_command`.
 
         Args:
             *further: Words that follow: the question, and its options.
         """
         if self.run is not None:
             return python_call(self.run, *further)
-        typed = [shlex.quote(word) for word in self.words]
-        lines: list[str] = []
-        line = ""
-        for word in (*typed, *map(shlex.quote, further)):
-            if line and len(line) + 1 + len(word) > _WIDTH:
-                lines.append(f"{line} \\")
-                line = f"  {word}"
-            else:
-                line = f"{line} {word}" if line else word
-        return "\n".join([*lines, line])
+        return folded_command((*self.words, *further))
 
 
 def typed_command(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import BadInputError, did_you_mean
+from ...errors import BadInputError, nearest_name
 from ...interface import Array, Data, Ints, JointType, Model
 from ...measures.text import few
 from ...rotations import matrix_from_quat
@@ -79,10 +79,9 @@ def bind(contract: Contract, model: Model) -> Binding:
         )
     missing = [joint for joint in contract.joints if joint not in model.joint_names]
     if missing:
-        hint = did_you_mean(missing[0], model.joint_names)
         raise BadInputError(
-            f"{contract.file} drives joints that {model.path.name} lacks: {few(missing)}{hint}; "
-            f"it has {few([name for name in model.joint_names if name])}"
+            f"{contract.file} drives joints that {model.path.name} lacks: {few(missing)}"
+            f"{_nearest_or_all(missing[0], model)}"
         )
     joints = [model.joint_id(joint) for joint in contract.joints]
     for joint in joints:
@@ -99,6 +98,19 @@ def bind(contract: Contract, model: Model) -> Binding:
         ctrl=np.array([_actuator_of(model, joint) for joint in joints]),
         mounts=_mounts(contract, model, int(model.jnt_bodyid[base])),
     )
+
+
+def _nearest_or_all(joint: str, model: Model) -> str:
+    """Return the end of a message about a joint that is missing: the nearest one, or all."""
+    hinges = [
+        name
+        for name, kind in zip(model.joint_names, model.jnt_type, strict=True)
+        if kind == JointType.HINGE
+    ]
+    nearest = nearest_name(joint, hinges)
+    if nearest:
+        return f". Did you mean {nearest}?"
+    return f"; its hinges are {', '.join(hinges)}"
 
 
 def _actuator_of(model: Model, joint: int) -> int:

@@ -16,7 +16,9 @@ from .command import Command
 from .contract import AXES, Contract
 from .network import NetworkFacts
 
-NoteKind = Literal["unread", "start elsewhere", "outside limits", "command outside limits"]
+NoteKind = Literal[
+    "unread", "misspelt", "start elsewhere", "outside limits", "command outside limits"
+]
 _SAME: Final = 0.01  # [rad] of a joint: poses that are nearer are one
 
 
@@ -28,11 +30,13 @@ class ContractNote:
         kind: What it is.
         names: Of fields, joints or axes.
         value: The largest difference [rad]; None where there is none to tell.
+        nearest: The field that one which nothing reads may mean; "" of other notes.
     """
 
     kind: NoteKind
     names: tuple[str, ...]
     value: float | None = None
+    nearest: str = ""
 
 
 def check_network(contract: Contract, facts: NetworkFacts) -> None:
@@ -74,8 +78,11 @@ def notes_of(
         commands: The speeds that are asked for.
     """
     notes: list[ContractNote] = []
-    if contract.unread:
-        notes.append(ContractNote("unread", contract.unread))
+    unknown = tuple(field.name for field in contract.unread if not field.nearest)
+    if unknown:
+        notes.append(ContractNote("unread", unknown))
+    for field in contract.misspelt:
+        notes.append(ContractNote("misspelt", (field.name,), nearest=field.nearest))
     if start is not None:
         apart = np.abs(start[binding.qpos] - contract.default_joint_pos)
         if apart.max() > _SAME:

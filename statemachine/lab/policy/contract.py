@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ...interface import Array
+from .contract_fields import UnreadField
 
 TermId = Literal[
     "base_lin_vel",
@@ -183,7 +184,7 @@ class Contract:
         timing: How often it is called.
         command_limits: The least and the largest speed that it may be asked for, by axis: vx, vy
             [m/s], wz [rad/s].
-        unread: Fields of the file that nothing here reads, as "section.field".
+        unread: Fields of the file that nothing here reads.
     """
 
     file: str
@@ -198,12 +199,17 @@ class Contract:
     servos: Servos
     timing: CallTiming
     command_limits: dict[str, tuple[float, float]]
-    unread: tuple[str, ...] = ()
+    unread: tuple[UnreadField, ...] = ()
 
     @property
     def observation_size(self) -> int:
         """Return how many numbers the network is given."""
         return self.history.length * sum(term.dim for term in self.terms)
+
+    @property
+    def misspelt(self) -> tuple[UnreadField, ...]:
+        """Return the unread fields that are near to one that is read."""
+        return tuple(field for field in self.unread if field.nearest)
 
     def has_term(self, term: TermId) -> bool:
         """Tell whether a quantity is among the terms."""

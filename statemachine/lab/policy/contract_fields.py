@@ -4,12 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TypeGuard, cast
 
 import numpy as np
 
-from ...errors import BadInputError, did_you_mean, shown
+from ...errors import BadInputError, did_you_mean, nearest_name, shown
 from ...interface import Array
+
+
+@dataclass(frozen=True)
+class UnreadField:
+    """A field of a contract's file that nothing reads.
+
+    Attributes:
+        name: Where it stands: "policy_io.imo".
+        nearest: A field that is read and missing there, which this one may mean: "policy_io.imu";
+            "" where none is near.
+    """
+
+    name: str
+    nearest: str = ""
 
 
 class ContractSection:
@@ -25,6 +40,7 @@ class ContractSection:
         self._content = cast("Mapping[object, object]", content)
         self._file = file
         self._read: set[str] = set()
+        self._looked_for: set[str] = set()
         self._sections: list[ContractSection] = []
         self.path = path
 
@@ -50,6 +66,7 @@ class ContractSection:
 
     def has(self, key: str) -> bool:
         """Tell whether a field is there, and not null."""
+        self._looked_for.add(key)
         return self._content.get(key) is not None
 
     def fields(self) -> list[str]:
@@ -271,7 +288,8 @@ class ContractSection:
                 numbers.append(null)
                 continue
             if not _is_number(number):
-                hint = did_you_mean(joint, [str(name) for name in table])
+                nearest = nearest_name(joint, [str(name) for name in table])
+                hint = f". Did you mean {nearest}?" if nearest else ""
                 raise BadInputError(
                     f"{self._file}: {self.name_of(key)} has no finite number for the joint "
                     f"{joint!r}{hint}"
@@ -290,11 +308,13 @@ class ContractSection:
             raise self.error(key, "numbers from 0 on are expected")
         return numbers
 
-    def unread(self) -> Iterator[str]:
+    def unread(self) -> Iterator[UnreadField]:
         """Yield the fields that nothing has read, and that are not null."""
+        missing = sorted((self._read | self._looked_for) - set(self.fields()))
         for key in self.fields():
-            if key not in self._read and self.has(key):
-                yield self.name_of(key)
+            if key not in self._read and self._content.get(key) is not None:
+                nearest = nearest_name(key, missing)
+                yield UnreadField(self.name_of(key), self.name_of(nearest) if nearest else "")
         for section in self._sections:
             yield from section.unread()
 

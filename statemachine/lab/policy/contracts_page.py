@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import significant
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
+from .contract_fields import UnreadField
 from .page import speed_cells
 from .term_gaps import TermGap
 from .two_contracts import ContractsResult, EngineContracts
@@ -73,6 +74,11 @@ class ContractsPage(PageContent):
     def second(self) -> str:
         """Return the name of the second contract's file."""
         return self.result.second.file
+
+    @property
+    def misspelt(self) -> Sequence[UnreadField]:
+        """Return the fields of either contract that nothing reads, and that are near to one."""
+        return (*self.result.first.misspelt, *self.result.second.misspelt)
 
     @property
     def differences(self) -> int:

@@ -25,9 +25,9 @@ from .term_gaps import TermGap, term_gaps
 from .walk import RecordedWalk, Walk, all_walked
 
 # By how much the outcome must get better: a part of it, and at least so much. `cost_of` says in
-# what; a sound contract that tracks within a third of the tolerance cannot get better by that.
+# what; a sound contract that tracks within three fifths of the tolerance cannot get better by that.
 PART_OF_COST: Final = 0.4
-LEAST_GAIN: Final = 0.08
+LEAST_GAIN: Final = 0.15
 # Two changes whose costs are nearer are equally good.
 _TIE: Final = 0.04
 _PER_TOLERANCE: Final = 0.25  # cost of a speed that is off by all that is tolerated

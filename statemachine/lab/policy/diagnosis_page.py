@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import command, significant
+from ...measures.text import folded_command, significant
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
+from .contract_fields import UnreadField
 from .diagnosis import LEAST_GAIN, PART_OF_COST, DiagnosisResult, EngineDiagnosis, TriedHypothesis
 from .request import words_of_request
 from .term_gaps import TermGap
@@ -84,6 +85,11 @@ class DiagnosisPage(PageContent):
         return self.result.contract.file
 
     @property
+    def misspelt(self) -> Sequence[UnreadField]:
+        """Return the fields of the contract that nothing reads, and that are near to one."""
+        return self.result.contract.misspelt
+
+    @property
     def seconds(self) -> float:
         """Return how long each run is [s]."""
         return self.result.request.seconds
@@ -117,7 +123,7 @@ def page(result: DiagnosisResult, details: bool = False) -> Page:
         parts.append(_EnginePart(engine, _table(tried, engine)))
     following = ""
     if not details:
-        following = command([*words_of_request(result.request), "--faults", "--details"])
+        following = folded_command([*words_of_request(result.request), "--faults", "--details"])
     return render(DiagnosisPage(result, parts, following))
 
 

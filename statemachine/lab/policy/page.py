@@ -5,22 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from ...measures.text import command, percent, significant
+from ...measures.text import folded_command, percent, significant
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
 from .adapted import ContractChange
 from .checks import ContractNote
+from .command import LEAST_TOLERANCE, LEAST_TURN_TOLERANCE, RELATIVE_TOLERANCE
 from .contract import AXES
+from .contract_fields import UnreadField
 from .request import EngineWalks, PolicyResult, words_of_request
 from .walk import Walk
 
 _NO_NUMBER = "–"
+# What came of a run, and which way its worst speed is off.
+_WalkOutcome = Literal["falls", "diverges", "too slow", "too fast", "not asked"]
 
 
 @dataclass(frozen=True)
-class _Trouble:
-    """A run that did not do as it was asked.
+class _EngineWalk:
+    """A run on an engine, and the speed that is farthest from the one asked for.
 
     Attributes:
         backend: As it is typed behind --backend.
@@ -31,9 +36,15 @@ class _Trouble:
     walk: Walk
 
     @property
-    def verdict(self) -> str:
+    def outcome(self) -> _WalkOutcome:
         """Return what came of it."""
-        return self.walk.verdict
+        if self.walk.verdict == "falls":
+            return "falls"
+        if self.walk.verdict == "diverges":
+            return "diverges"
+        if self.asked == 0.0:
+            return "not asked"
+        return "too slow" if self.reached / self.asked < 1.0 else "too fast"
 
     @property
     def axis(self) -> str:
@@ -52,8 +63,23 @@ class _Trouble:
         return self.walk.reached[AXES.index(self.axis)]
 
     @property
+    def off(self) -> float:
+        """Return how far it is off, as a part of the speed that was asked for."""
+        return abs(self.reached / self.asked - 1.0)
+
+    @property
+    def tolerance(self) -> float:
+        """Return how far it may be off [m/s or rad/s]."""
+        return self.walk.command.tolerances[AXES.index(self.axis)]
+
+    @property
+    def tolerated(self) -> float:
+        """Return how far it may be off, as a part of the speed that was asked for."""
+        return self.tolerance / abs(self.asked)
+
+    @property
     def unit(self) -> str:
-        """Return the unit of both."""
+        """Return the unit of the speeds."""
         return "rad/s" if self.axis == "wz" else "m/s"
 
 
@@ -94,7 +120,8 @@ class PolicyPage(PageContent):
 
     Attributes:
         result: What was computed.
-        troubles: The runs that did not do as they were asked.
+        told: The runs that did not do as they were asked; where all did, that whose speed is
+            farthest from the one asked for.
         refused: The engines that refused the contract.
         walks: Table with a row for each engine and command.
         changes: What the contract says otherwise than the model's file.
@@ -103,7 +130,7 @@ class PolicyPage(PageContent):
 
     template = "policy.md.j2"
     result: PolicyResult
-    troubles: Sequence[_Trouble]
+    told: Sequence[_EngineWalk]
     refused: Sequence[EngineWalks]
     walks: Table
     changes: Sequence[_Change]
@@ -151,9 +178,29 @@ class PolicyPage(PageContent):
         return len(self.result.commands)
 
     @property
+    def relative_tolerance(self) -> float:
+        """Return how far a speed may be off, as a part of the one asked for."""
+        return RELATIVE_TOLERANCE
+
+    @property
+    def least_tolerance(self) -> float:
+        """Return how far it may be off at least [m/s]."""
+        return LEAST_TOLERANCE
+
+    @property
+    def least_turn_tolerance(self) -> float:
+        """Return how far it may be off at least, turning [rad/s]."""
+        return LEAST_TURN_TOLERANCE
+
+    @property
+    def misspelt(self) -> Sequence[UnreadField]:
+        """Return the fields of the contract that nothing reads, and that are near to one."""
+        return self.result.contract.misspelt
+
+    @property
     def notes(self) -> Sequence[ContractNote]:
-        """Return what is odd about the contract and the model."""
-        return self.result.notes
+        """Return what else is odd about the contract and the model."""
+        return [note for note in self.result.notes if note.kind != "misspelt"]
 
     @property
     def decimation(self) -> int:
@@ -170,20 +217,25 @@ def page(result: PolicyResult, details: bool = False) -> Page:
         result: What was computed.
         details: Whether lateral way, height and power of each run are shown.
     """
-    troubles: list[_Trouble] = []
-    for engine in result.engines:
-        for walk in engine.walks:
-            if walk.verdict != "walks":
-                troubles.append(_Trouble(engine.backend, walk))
     content = PolicyPage(
         result=result,
-        troubles=troubles,
+        told=_told(result),
         refused=[engine for engine in result.engines if engine.refusal],
         walks=_table_of_walks(result, details),
         changes=[_Change(change) for change in result.engines[0].changes],
         next_command=_next_command(result, details),
     )
     return render(content)
+
+
+def _told(result: PolicyResult) -> list[_EngineWalk]:
+    """Return the runs that the verdict tells of."""
+    walks: list[_EngineWalk] = []
+    for engine in result.engines:
+        walks += [_EngineWalk(engine.backend, walk) for walk in engine.walks]
+    if result.holds:
+        return [max(walks, key=lambda each: each.walk.error)]
+    return [each for each in walks if each.walk.verdict != "walks"]
 
 
 def _table_of_walks(result: PolicyResult, details: bool) -> Table:
@@ -246,5 +298,5 @@ def _next_command(result: PolicyResult, details: bool) -> str:
     """Return what to type next; "" for nothing."""
     words = words_of_request(result.request)
     if not result.holds:
-        return command([*words, "--faults"])
-    return "" if details else command([*words, "--details"])
+        return folded_command([*words, "--faults"])
+    return "" if details else folded_command([*words, "--details"])

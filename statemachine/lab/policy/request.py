@@ -26,6 +26,7 @@ from .checks import ContractNote, check_network, notes_of
 from .command import Command, usual_commands
 from .contract import Contract
 from .contract_file import read_contract
+from .floor import check_floor
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
 from .walk import Walk, all_walked
@@ -45,7 +46,7 @@ class PolicyRequest:
         model: A name or a file of a robot, with the ground that it walks on.
         backends: As `parse_backend` reads them; "all" for those that are installed.
         commands: The speeds that it is asked for, one run each; empty for straight on and turning,
-            within what the contract allows.
+            as fast as the contract allows.
         seconds: Of each run [s].
         keyframe: Where it starts; None for "home" if there is one.
         menagerie: A menagerie folder to look the model's name up in.
@@ -176,9 +177,18 @@ def on_each_engine(
     compute: Callable[[Model, str, Progress], R],
     reporter: Reporter,
 ) -> tuple[R, ...]:
-    """Return what is computed on each engine of a question; the rest as of `on_each_backend`."""
+    """Return what is computed on each engine of a question; the rest as of `on_each_backend`.
+
+    Raises:
+        BadInputError: The model has no floor.
+    """
+
+    def compute_on_floor(model: Model, backend: str, progress: Progress) -> R:
+        check_floor(model)
+        return compute(model, backend, progress)
+
     results = on_each_backend(
-        request.backends, what, request.model, request.menagerie, compute, reporter
+        request.backends, what, request.model, request.menagerie, compute_on_floor, reporter
     )
     return tuple(results.values())
 

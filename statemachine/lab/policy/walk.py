@@ -59,18 +59,22 @@ class Walk:
     @property
     def error(self) -> float:
         """Return how far the speeds are from those asked for, in parts of what is tolerated."""
-        return float(self._apart().max() / self.command.tolerance)
+        return float(self._errors().max())
 
     @property
     def worst_axis(self) -> str:
-        """Return the axis whose speed is farthest from the one asked for."""
-        return AXES[int(self._apart().argmax())]
+        """Return the axis whose speed is farthest from the one asked for, by what is tolerated."""
+        return AXES[int(self._errors().argmax())]
 
-    def _apart(self) -> Array:
-        """Return how far each speed (3,) is from the one asked for; infinite where none is."""
+    def _errors(self) -> Array:
+        """Return how far each speed (3,) is from the one asked for; infinite where none is.
+
+        Each in parts of what is tolerated on its axis.
+        """
         if self.reached is None:
             return np.full(len(AXES), np.inf)
-        return np.abs(np.array(self.reached) - self.command.vector)
+        apart = np.abs(np.array(self.reached) - self.command.vector)
+        return apart / np.array(self.command.tolerances)
 
     @property
     def verdict(self) -> WalkVerdict:

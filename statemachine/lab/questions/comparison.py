@@ -27,7 +27,6 @@ from .policy_outcomes import policy_outcomes_blocks
 from .requests.gap import CompareResult
 from .worst import WORST, worst_of
 
-_FEW_ROWS = 5  # of the table, before the command is shortened
 _TITLE = 30  # characters of a name in the title of the table
 
 
@@ -150,14 +149,10 @@ def page(result: CompareResult, details: bool = False) -> Page:
 
 
 def _shorter_pages(result: CompareResult) -> Iterator[Page]:
-    """Yield the page with ever fewer rows, then with a shorter command, too.
-
-    A command that can be copied is worth some rows.
-    """
-    for rows in range(WORST, _FEW_ROWS - 1, -1):
-        yield _with_rows(result, rows, ())
+    """Yield the page with ever fewer rows, then with a shorter command, too."""
     for rows in range(WORST, 0, -1):
-        yield _with_rows(result, rows, (), is_short=True)
+        yield _with_rows(result, rows, ())
+    yield _with_rows(result, 1, (), is_short=True)
 
 
 def _with_rows(
@@ -169,7 +164,7 @@ def _with_rows(
         result: How far apart two runs are.
         rows: How many of the worst quantities have a row.
         details: What follows.
-        is_short: Whether dots stand for a part of the command.
+        is_short: Whether the command leaves the quantity to itself.
     """
     comparison, finding = result.comparison, result.finding
     worst = worst_of(comparison, finding, result.floor, rows)

@@ -9,7 +9,7 @@ from typing import Literal
 from ...measures import QUANTITIES
 from ..compare.instead import Instead
 from ..compare.sides import Request, Side
-from ..compare.typed_command import TypedCommand, typed_command
+from ..compare.typed_command import typed_command
 from ..runs.call_period import CallPeriods
 from ..runs.scenarios import SCENARIOS
 from .compared_names import name_of
@@ -44,7 +44,7 @@ class NextCommand:
     Attributes:
         purpose: What it is for.
         text: The command, in lines; "" for none.
-        short_text: The same, where dots stand for what was typed already.
+        short_text: The same where lines are few: the quantity is left to the command.
     """
 
     purpose: Purpose
@@ -79,12 +79,14 @@ def next_command(
     can_step = not request.is_traces or bool(request.sides)
     moves = QUANTITIES[finding.lead.kind].moves
     if can_step and (finding.rounding.verdict in ("as much", "no bound") or not moves):
-        return _asking(request, "one step", "--one-step")
+        return _as_it_is("one step", request, "--one-step")
     if not moves:
         return NextCommand("nothing")
     if _only_timesteps_differ(request):
-        return _asking(request, "converge", "--converge")
-    return _asking(request, "why", "--why", "--quantity", name_of(finding.lead.name))
+        return _as_it_is("converge", request, "--converge")
+    command = typed_command(request)
+    text = command.lines("--why", "--quantity", name_of(finding.lead.name))
+    return NextCommand("why", text, command.lines("--why"))
 
 
 def _same_on_both(
@@ -97,7 +99,7 @@ def _same_on_both(
         parts: list[str] = []
         for missing in finding.missing:
             parts += [f"--{missing.part}", missing.other_side]
-        return _asking(request, "same parts", *parts)
+        return _as_it_is("same parts", request, *parts)
     if periods is not None and periods.differ:
         return _same_period(request, periods)
     return None
@@ -132,15 +134,13 @@ def _same_base(request: Request, finding: Finding) -> NextCommand:
             sides = list(request.sides)
             sides[k] = replace(side, options={**side.options, "base": base})
             same = replace(request, sides=tuple(sides))
-            text = typed_command(same).lines()
-            return NextCommand("same base", text, text)
+            return _as_it_is("same base", same)
     return NextCommand("nothing")
 
 
 def _same_period(request: Request, periods: CallPeriods) -> NextCommand:
     """Return the comparison with a function that is called as often on both sides."""
-    text = typed_command(replace(request, every=periods.common_word)).lines()
-    return NextCommand("same period", text, text)
+    return _as_it_is("same period", replace(request, every=periods.common_word))
 
 
 def _until_then(request: Request, finding: Finding) -> NextCommand:
@@ -149,8 +149,7 @@ def _until_then(request: Request, finding: Finding) -> NextCommand:
     seconds = math.floor(900 * end) / 1000
     if request.is_traces or seconds <= 0:
         return NextCommand("nothing")
-    text = typed_command(replace(request, seconds=seconds)).lines("--why")
-    return NextCommand("why until then", text, text)
+    return _as_it_is("why until then", replace(request, seconds=seconds), "--why")
 
 
 def _more(request: Request, finding: Finding) -> NextCommand:
@@ -163,15 +162,10 @@ def _more(request: Request, finding: Finding) -> NextCommand:
 
 def _instead(request: Request, purpose: Purpose, experiment: str) -> NextCommand:
     """Return the command of a comparison with another experiment, for its own time."""
-    text = typed_command(replace(request, what=(experiment,), every=1, seconds=None)).lines()
+    return _as_it_is(purpose, replace(request, what=(experiment,), every=1, seconds=None))
+
+
+def _as_it_is(purpose: Purpose, request: Request, *question: str) -> NextCommand:
+    """Return the command of a comparison, with a question behind it."""
+    text = typed_command(request).lines(*question)
     return NextCommand(purpose, text, text)
-
-
-def _asking(request: Request, purpose: Purpose, *question: str) -> NextCommand:
-    """Return the command of a comparison with a question behind it."""
-    command = typed_command(request)
-    text = command.lines(*question)
-    if not request.is_typed:
-        return NextCommand(purpose, text, text)
-    program, name, *_ = command.words
-    return NextCommand(purpose, text, TypedCommand((program, name, "...")).lines(*question))

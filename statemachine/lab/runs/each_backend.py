@@ -75,6 +75,6 @@ def note_missing(missing: Sequence[StateMachineError], others: bool, reporter: R
     """
     noted = missing if others else missing[:-1]
     for error in noted:
-        reporter.note(str(error))
+        reporter.note(f"left out: {error}")
     if not others:
         raise missing[-1]
