@@ -18,6 +18,7 @@ from statemachine.lab.identification.simulation import ArmSimulation
 from statemachine.lab.identification.starts import (
     Fits,
     fits_from_starts,
+    gone_on,
     informations_beside,
     least_certain,
 )
@@ -165,6 +166,40 @@ def test_the_jacobian_is_how_residuals_change(objective, true):
         ends.append(objective.residuals(place, angles))
     slope = (ends[1] - ends[0]) / 0.02
     assert jacobian[:, 1] == pytest.approx(slope, abs=0.02 * np.abs(slope).max())
+
+
+def test_a_rough_jacobian_has_of_each_joint_what_its_own_parameters_change(objective, true):
+    values = true[objective.free]
+    exact, rough = objective.jacobian(values, with_error=True), objective.rough_jacobian(values)
+    joints = len(objective.parameters.joints)
+    frames = len(objective.simulation.state)
+    of_data = [each[: frames * joints].reshape(frames, joints, -1) for each in (exact, rough)]
+    for joint in range(joints):  # the gains come first, in the order of the joints
+        own = of_data[0][:, joint, joint]
+        assert of_data[1][:, joint, joint] == pytest.approx(own, abs=0.2 * np.abs(own).max())
+        others = np.delete(of_data[1][:, :, joint], joint, axis=1)
+        assert not others.any()
+    assert of_data[1][:, :, -1] == pytest.approx(of_data[0][:, :, -1])  # the delay is of all
+    assert rough[frames * joints :] == pytest.approx(exact[frames * joints :])
+
+
+def test_a_rough_fit_ends_at_the_same_place(objective, fits):
+    start = starting_points(objective, 1, 0)[0]
+    end = fit(fits.best.objective, start, derivatives="rough")
+    apart = (end.vector - fits.best.vector)[objective.free] / fits.deviations
+    assert np.abs(apart).max() < 1.0
+
+
+def test_a_start_that_the_best_does_not_help_goes_on_by_itself(objective, fits):
+    # As if nothing changed the angles: no step of the best one leads anywhere.
+    blind = np.zeros_like(fits.best.jacobian)
+    blind[-len(objective.free) :] = fits.best.jacobian[-len(objective.free) :]
+    best = replace(fits.best, near_jacobian=blind)
+    start = fits.best.vector.copy()
+    start[objective.free[:6]] += 0.3
+    end = fit(fits.best.objective, start, runs=1)
+    assert end.cost > fits.best.cost + 100.0
+    assert gone_on(end, best).cost < fits.best.cost + 1.0
 
 
 # What is left.

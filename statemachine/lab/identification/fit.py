@@ -1,34 +1,36 @@
 """Fit of parameters to a recording: least squares with priors, from several starts.
 
 The sum of squares is that of the residuals by their standard deviation, and of the distance from
-the prior by its own (maximum a posteriori, A. Tarantola, Inverse Problem Theory, 2005). It is
-minimised by SciPy's trust region (T. Coleman and Y. Li, 1996); each Jacobian is one run of as
-many worlds as there are parameters.
+the prior by its own (maximum a posteriori, A. Tarantola, Inverse Problem Theory, 2005). Each
+Jacobian is one run of as many worlds as there are parameters; on the way to a fit a rough one does,
+of as many worlds as there are kinds of them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from ...installed import require_extra
 from ...interface import Array, Ints
-from .parameters import ArmParameters
+from .parameters import BY_JOINT, ArmParameters
+from .results import Kind
 from .simulation import ArmSimulation
+from .trust_region import BoundedLeastSquares, Effort, Minimum, minimum
 
-Derivatives = Literal["coarse", "exact"]
-EXTRA = "recordings"
+Derivatives = Literal["rough", "coarse", "exact"]
 _RUNS = 40  # simulations of a fit, at most
 _TOLERANCE = 1e-4  # of the sum of squares, where a fit ends
-_LEAST_STEP = 1e-5  # by the length of the vector
-_NEAR = 0.1  # of the prior's standard deviations: the Jacobian is taken to be the same there
+_LAST_RUNS = 4  # simulations without the error of a step, after those with it
+_STEPS = 3  # of a fit, before its Jacobian is computed anew
 _SPREAD = 0.7  # of draws, by the standard deviations of the prior
 _DRAWS_FOR_EACH = 12  # draws for each start, of which the best are taken
 _STIFFNESS = (-5.5, 0.5)  # logarithm of the factor of all gains, drawn from between
 _AMONG_SERVOS = 0.3  # spread of the gains of one arm, by that of the prior
 _PULLED = 1e4  # residual of an angle that is no number: no such point is kept
+KINDS: tuple[Kind, ...] = (*BY_JOINT, "delay", "payload")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,46 +104,51 @@ class Objective:
         steps = self.parameters.steps[self.free]
         vectors = np.tile(self.vector(values), (len(self.free) + 1, 1))
         vectors[np.arange(1, len(vectors)), self.free] += steps
-        angles = self.simulation.angles_of_each(vectors, with_error)
-        first = self.simulation.first_frame
-        change = (angles[1:, first:] - angles[0, first:]) / self.deviation
-        of_data = (change / steps[:, None, None]).reshape(len(self.free), -1).T
-        of_data = np.where(np.isfinite(of_data), of_data, 0.0)
-        return np.vstack([of_data, np.diag(1.0 / self.prior_deviations)])
+        change = self._changes(vectors, with_error)
+        return self._with_prior(change / steps[:, None, None])
 
+    def rough_jacobian(self, values: Array) -> Array:
+        """Return the Jacobian as if each joint were moved by its own parameters alone.
 
-class _Memory:
-    """Residuals and Jacobians that SciPy asks for, and how often worlds were run for them."""
-
-    def __init__(self, objective: Objective, method: Derivatives | Array) -> None:
-        """Begin with nothing known.
+        One world for each kind of parameter tells it: all joints have theirs changed at once. It
+        has the error of a step.
 
         Args:
-            objective: What is made small.
-            method: As of `fit`.
+            values: Of what is fitted.
         """
-        self.objective, self.method = objective, method
-        self.evaluations = 0
-        self._known: tuple[Array, Array] | None = None  # values, and the Jacobian there
+        parameters = self.parameters
+        is_free = np.isin(np.arange(len(parameters)), self.free)
+        groups: list[Ints] = []
+        for kind in KINDS:
+            members = parameters.of_kind(kind)
+            groups.append(members[is_free[members]])
+        vectors = np.tile(self.vector(values), (len(groups) + 1, 1))
+        for world, members in enumerate(groups):
+            vectors[world + 1, members] += parameters.steps[members]
+        changes = self._changes(vectors, with_error=True)
+        slopes = np.zeros((len(parameters), *changes.shape[1:]))
+        for change, members in zip(changes, groups, strict=True):
+            for number in members.tolist():
+                mine = parameters.joints_of(number)
+                slopes[number, :, mine] = change[:, mine].T / parameters.steps[number]
+        return self._with_prior(slopes[self.free])
 
-    def residuals(self, values: Array) -> Array:
-        """Return the residuals, without the error of a step."""
-        self.evaluations += 1
-        angles = self.objective.simulation.angles(self.objective.vector(values))
-        return self.objective.residuals(values, angles)
+    def _changes(self, vectors: Array, with_error: bool) -> Array:
+        """Return how far residuals (W - 1, rows, n) of vectors (W, P) are from those of the first.
 
-    def jacobian(self, values: Array) -> Array:
-        """Return the Jacobian, that of the last point where it is near."""
-        if isinstance(self.method, np.ndarray):
-            return self.method
-        if self._known is not None:
-            moved = np.abs(values - self._known[0]) / self.objective.prior_deviations
-            if moved.max() < _NEAR:
-                return self._known[1]
-        self.evaluations += 1
-        with_error = self.method == "coarse"
-        self._known = values.copy(), self.objective.jacobian(values, with_error)
-        return self._known[1]
+        Args:
+            vectors: Of the parameters.
+            with_error: As of `ArmSimulation.angles_of_each`.
+        """
+        angles = self.simulation.angles_of_each(vectors, with_error)
+        first = self.simulation.first_frame
+        return (angles[1:, first:] - angles[0, first:]) / self.deviation
+
+    def _with_prior(self, slopes: Array) -> Array:
+        """Return the Jacobian (rows, free) of slopes (free, frames, n), and of the prior."""
+        of_data = slopes.reshape(len(slopes), -1).T
+        of_data = np.where(np.isfinite(of_data), of_data, 0.0)
+        return np.vstack([of_data, np.diag(1.0 / self.prior_deviations)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,17 +159,24 @@ class Fit:
         objective: What was made small.
         vector: (P,) the parameters.
         cost: Half the sum of squares, with the prior.
-        jacobian: (rows, free) of the residuals, the last rows those of the prior.
         errors: (rows, n) how far the fitted angles are from the measured ones [rad].
         evaluations: How often worlds were run.
+        near_jacobian: The Jacobian of a fit that ended near, if this one went on from there.
     """
 
     objective: Objective
     vector: Array
     cost: float
-    jacobian: Array
     errors: Array
     evaluations: int
+    near_jacobian: Array | None = None
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Return the Jacobian (rows, free) of the residuals, the last rows those of the prior."""
+        if self.near_jacobian is not None:
+            return self.near_jacobian
+        return self.objective.jacobian(self.vector[self.objective.free])
 
     @property
     def information(self) -> Array:
@@ -174,14 +188,17 @@ class Fit:
         """Return the same fit as another objective with the same free parameters weighs it."""
         values = self.vector[objective.free]
         residuals = objective.scaled(values, self.errors)
-        of_data = self.jacobian[: -len(objective.free)].reshape(*self.errors.shape, -1)
-        change = (self.objective.deviation / objective.deviation)[None, :, None]
-        rows = (of_data * change).reshape(-1, of_data.shape[-1])
+        jacobian = self.near_jacobian
+        if jacobian is not None:
+            of_data = jacobian[: -len(objective.free)].reshape(*self.errors.shape, -1)
+            change = (self.objective.deviation / objective.deviation)[None, :, None]
+            rows = (of_data * change).reshape(-1, of_data.shape[-1])
+            jacobian = np.vstack([rows, jacobian[-len(objective.free) :]])
         return replace(
             self,
             objective=objective,
             cost=0.5 * float(residuals @ residuals),
-            jacobian=np.vstack([rows, self.jacobian[-len(objective.free) :]]),
+            near_jacobian=jacobian,
         )
 
 
@@ -198,38 +215,69 @@ def fit(
         objective: What is made small.
         start: (P,) vector.
         runs: Simulations at most, without those for derivatives.
-        tolerance: Part by which the sum of squares falls at least, or the fit ends.
-        derivatives: How the Jacobian is computed: with the error of a step, or without; or the
-            Jacobian itself, of a fit that ended near.
+        tolerance: Part by which a last step may make the sum of squares smaller.
+        derivatives: How the Jacobian is computed: as if joints did not act on each other, and on
+            the way angles have the error of a step, too; with that error in the Jacobian alone;
+            without it where the fit ends; or the Jacobian itself, of a fit that ended near.
 
     Raises:
         MissingEngineError: The extra `recordings` is not installed.
     """
-    optimize: Any = require_extra("scipy.optimize", "a fit to a recording", "SciPy", EXTRA)
+    if isinstance(derivatives, np.ndarray):
+        end = _minimum(objective, start, Effort(runs, tolerance, runs), derivatives)
+        return replace(_fit_of(objective, end, end.runs), near_jacobian=derivatives)
+    end = _minimum(objective, start, Effort(runs, tolerance, _STEPS), derivatives)
+    evaluations = end.runs + end.jacobians
+    if derivatives == "exact":
+        jacobian = objective.jacobian(end.values)
+        further = fit(objective, objective.vector(end.values), runs, tolerance, jacobian)
+        return replace(further, evaluations=evaluations + further.evaluations)
+    if derivatives == "rough":
+        effort = Effort(_LAST_RUNS, tolerance, _LAST_RUNS)
+        end = _minimum(objective, objective.vector(end.values), effort, end.jacobian)
+        evaluations += end.runs
+    return _fit_of(objective, end, evaluations)
+
+
+def _minimum(
+    objective: Objective, start: Array, effort: Effort, derivatives: Derivatives | Array
+) -> Minimum:
+    """Return where a fit ends, with the Jacobian on the way as `fit` has it."""
     parameters, free = objective.parameters, objective.free
-    low, high = parameters.low[free], parameters.high[free]
-    margin = 1e-6 * (high - low)
-    memory = _Memory(objective, derivatives)
-    inside = np.clip(start[free], low + margin, high - margin)
-    result = optimize.least_squares(
-        memory.residuals,
-        inside,
-        jac=memory.jacobian,
-        bounds=(low, high),
-        x_scale=objective.prior_deviations,
-        max_nfev=runs,
-        xtol=_LEAST_STEP,
-        ftol=tolerance,
+    is_rough = isinstance(derivatives, str) and derivatives == "rough"
+
+    def residuals(values: Array) -> Array:
+        vectors = objective.vector(values)[None]
+        (angles,) = objective.simulation.angles_of_each(vectors, with_error=is_rough)
+        return objective.residuals(values, angles)
+
+    def jacobian(values: Array) -> Array:
+        if isinstance(derivatives, np.ndarray):
+            return derivatives
+        if is_rough:
+            return objective.rough_jacobian(values)
+        return objective.jacobian(values, with_error=True)
+
+    problem = BoundedLeastSquares(
+        residuals=residuals,
+        jacobian=jacobian,
+        low=parameters.low[free],
+        high=parameters.high[free],
+        scale=objective.prior_deviations,
     )
-    of_data = np.asarray(result.fun)[: -len(free)]
+    return minimum(problem, start[free], effort)
+
+
+def _fit_of(objective: Objective, end: Minimum, evaluations: int) -> Fit:
+    """Return the fit that ended there."""
+    of_data = end.residuals[: -len(objective.free)]
     errors = of_data.reshape(-1, len(objective.deviation)) * objective.deviation
     return Fit(
         objective=objective,
-        vector=objective.vector(np.asarray(result.x)),
-        cost=float(result.cost),
-        jacobian=np.asarray(result.jac),
+        vector=objective.vector(end.values),
+        cost=0.5 * float(end.residuals @ end.residuals),
         errors=errors,
-        evaluations=memory.evaluations,
+        evaluations=evaluations,
     )
 
 

@@ -71,8 +71,9 @@ def tried_reading(name: str, objective: Objective, fits: Fits, cost: float) -> H
         fits: With the reading as it is.
         cost: Half the sum of squares of the reading as it is.
     """
-    ends = [fit(objective, each.vector, runs=_RUNS) for each in fits.each[:2]]
-    end = min(ends, key=lambda each: each.cost)
+    ends = [fit(objective, each.vector, _RUNS, derivatives="rough") for each in fits.each[:2]]
+    nearest = min(ends, key=lambda each: each.cost)
+    end = fit(objective, nearest.vector, runs=_RUNS)
     evidence = cost - end.cost
     residual = root_mean_square(end.errors)
     if not math.isfinite(residual) or evidence < -_EVIDENCE:

@@ -48,7 +48,9 @@ def motion_informations(fit: Fit) -> tuple[MotionInformation, ...]:
             free=objective.free,
             fixed=objective.fixed,
         )
-        jacobian = other.jacobian(fit.vector[objective.free])[: -len(objective.free)]
+        jacobian = other.jacobian(fit.vector[objective.free], with_error=True)[
+            : -len(objective.free)
+        ]
         informations.append(MotionInformation(name, jacobian.T @ jacobian))
     return tuple(informations)
 

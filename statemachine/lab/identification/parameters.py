@@ -179,6 +179,12 @@ class ArmParameters:
         """Return the places of a kind in the vector, in the order of the joints."""
         return np.array([i for i, each in enumerate(self.each) if each.kind == kind])
 
+    def joints_of(self, number: int) -> Ints:
+        """Return the places of the joints that a parameter is of: its own, or all of the arm."""
+        joint = self.each[number].joint
+        count = len(self.joints)
+        return np.arange(count) if joint is None else np.array([self.joints.index(joint)])
+
     def of_causes(self, causes: Collection[Cause]) -> Ints:
         """Return the places of what belongs to these causes."""
         return np.array([i for i, each in enumerate(self.each) if each.cause in causes], int)

@@ -21,7 +21,7 @@ from .results import CAUSES, Cause, CauseShare
 from .simulation import ArmSimulation
 from .starts import Fits
 
-_RUNS = 6
+_RUNS = 12  # simulations of each fit
 _TOLERANCE = 1e-2  # of a fit, which begins at the best one of all parameters
 
 
@@ -66,9 +66,11 @@ def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str])
     chosen: list[Cause] = [cause for cause in CAUSES if cause in causes]
     if not chosen:
         return gap_of(elsewhere, nothing)
+    if len(chosen) == len(CAUSES):
+        return gap_of(elsewhere, best.vector)
     free = best.objective.parameters.of_causes(chosen)
     objective = replace(best.objective, free=free, fixed=nothing)
-    fitted = fit(objective, best.vector, _RUNS, _TOLERANCE)
+    fitted = fit(objective, best.vector, _RUNS, _TOLERANCE, "rough")
     gap = gap_of(elsewhere, fitted.vector)
     return gap if math.isfinite(gap) else None
 

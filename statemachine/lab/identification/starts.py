@@ -12,9 +12,10 @@ from ..runs.drive import Progress, no_progress
 from .fit import Fit, Objective, fit, starting_points
 from .residuals import Residuals, root_mean_square
 
+_RUNS_TO_BEST = 8  # simulations of a start that goes on with the derivatives of the best
+_RUNS_BY_ITSELF = 20  # of one that goes on with its own
 _AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
-_NEAR_THE_END = 1e-3  # of the sum of squares, where a start waits for the best one
-_NEARLY_AS_GOOD = 30.0  # half the sum of squares: such a start may still become as good
+_NEAR_THE_END = 1e-2  # of the sum of squares, where a start waits for the best one
 _FIRST_NOISE = 0.6  # counts: taken for the noise before any residual is known
 _WEAKER = (0.15, 0.3)  # logarithms of the factors by which joints are taken to be weaker
 _POSSIBLE = 2.0 * _AS_GOOD  # half the sum of squares: a joint that is weaker fits hardly worse
@@ -134,17 +135,20 @@ def fits_from_starts(
     fits: list[Fit] = []
     points = starting_points(objective, starts, seed)
     for number, start in enumerate(points):
-        fits.append(fit(objective, start, tolerance=_NEAR_THE_END))
-        progress((number + 1) / (starts + 2))
+        fits.append(fit(objective, start, tolerance=_NEAR_THE_END, derivatives="rough"))
+        progress((number + 1) / (2 * starts + 2))
     best = min(fits, key=_cost)
     fits.remove(best)
+    best = _better(best, fit(objective, best.vector, derivatives="exact"))
+    # The noise of each joint is known now, and what it makes of the derivatives.
     residuals = Residuals.of(best.errors, recording)
-    # The noise of each joint is known now: the best one goes on, with exact derivatives.
     weighted = replace(objective, deviation=np.minimum(residuals.noise, residuals.most))
-    best = fit(weighted, best.vector, derivatives="exact")
-    progress((starts + 1) / (starts + 2))
-    # Those that are near go on with the derivatives of the best; the others are weighed alike.
-    others = [_gone_on(each.weighed(weighted), best) for each in fits]
+    best = best.weighed(weighted)
+    best = _better(best, fit(weighted, best.vector, derivatives=best.jacobian))
+    others: list[Fit] = []
+    for number, end in enumerate(fits):
+        others.append(gone_on(end.weighed(weighted), best))
+        progress((starts + number + 2) / (2 * starts + 2))
     every_one = _in_order([best, *others])
     residuals = Residuals.of(every_one[0].errors, recording)
     beside = informations_beside(every_one[0])
@@ -152,12 +156,22 @@ def fits_from_starts(
     return Fits(every_one, residuals, beside)
 
 
-def _gone_on(end: Fit, best: Fit) -> Fit:
-    """Return where a start ends that goes on where the best one ended, if it is about as good."""
-    if end.cost - best.cost > _NEARLY_AS_GOOD:
-        return end
-    further = fit(best.objective, end.vector, derivatives=best.jacobian)
-    return further if further.cost < end.cost else end
+def gone_on(end: Fit, best: Fit) -> Fit:
+    """Return where a start goes on to: with the derivatives of the best, if these do, or its own.
+
+    They do where it becomes as good.
+    """
+    objective = best.objective
+    further = _better(end, fit(objective, end.vector, _RUNS_TO_BEST, derivatives=best.jacobian))
+    if further.cost - best.cost < _AS_GOOD:
+        return further
+    return _better(further, fit(objective, further.vector, _RUNS_BY_ITSELF))
+
+
+def _better(end: Fit, further: Fit) -> Fit:
+    """Return the one with the smaller sum of squares, with the evaluations of both."""
+    better = further if further.cost < end.cost else end
+    return replace(better, evaluations=end.evaluations + further.evaluations)
 
 
 def _cost(fit: Fit) -> float:
