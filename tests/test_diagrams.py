@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -32,7 +32,7 @@ from statemachine.show.pictures import Diagram
 from statemachine.show.text_blocks import ASCII
 
 from .support.backends import slow_on
-from .support.browser import browser
+from .support.browser import browser, one_browser
 from .support.claims import assert_in
 from .support.colours import contrast
 from .support.files import written
@@ -510,7 +510,7 @@ def test_a_page_of_html_has_each_of_them_once(mixed: sm.Model) -> None:
 
 
 @pytest.fixture(scope="module")
-def page_of_all(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page_of_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A page with the diagrams of every model."""
     folder = tmp_path_factory.mktemp("diagrams")
     diagrams: list[Diagram] = []
@@ -519,7 +519,8 @@ def page_of_all(tmp_path_factory: pytest.TempPathFactory) -> Path:
         diagrams += [draw(model) for draw in THREE]
     file = folder / "page.html"
     file.write_text(report(Page("t", "o", diagrams)), encoding="utf-8")
-    return file
+    with one_browser():
+        yield file
 
 
 @pytest.mark.slow

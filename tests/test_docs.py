@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,8 +18,8 @@ from nbclient import NotebookClient
 
 import statemachine as sm
 from statemachine.course import notebook as md
-from statemachine.course.lessons import LESSONS
-from statemachine.course.lessons.session import page_of_lesson, take
+from statemachine.course.lessons import LESSONS, Lesson
+from statemachine.course.lessons.session import LessonRun, page_of_lesson, take
 from statemachine.course.notebook import build, lesson, opening_text
 from statemachine.errors import BadInputError
 from statemachine.show import terminal
@@ -154,15 +154,25 @@ class PathPage:
         return _DIAGRAM.sub("", _FOLDED.sub("", self.text))
 
 
+@cache
+def taken(name: str) -> LessonRun:
+    """Take a lesson on MuJoCo, with its own options."""
+    entry = LESSONS[name]
+    return take(entry, sm.load(entry.model), "mujoco", {})
+
+
 @pytest.fixture(scope="module", params=LESSONS)
 def path_page(request: pytest.FixtureRequest) -> PathPage:
     """The page of each lesson of the path, on MuJoCo."""
     need_engines_of(request.param)
     entry = LESSONS[request.param]
-    taken = take(entry, sm.load(entry.model), "mujoco", _SMALL.get(request.param, {}))
-    page = page_of_lesson(entry, {"mujoco": taken})
+    if entry.name in _SMALL:
+        run = take(entry, sm.load(entry.model), "mujoco", _SMALL[entry.name])
+    else:
+        run = taken(entry.name)
+    page = page_of_lesson(entry, {"mujoco": run})
     text = md.markdown(page, lambda _: "picture")
-    return PathPage(page, opening_text(page), text, taken.printed)
+    return PathPage(page, opening_text(page), text, run.printed)
 
 
 @pytest.mark.slow
@@ -218,7 +228,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
         code=0,
         HOME=str(folder),
         STATEMACHINE_DOCS_BACKENDS="mujoco",
-        STATEMACHINE_DOCS_COMPARISONS="hold",
+        STATEMACHINE_DOCS_COMPARISONS="fall",
     )
     return folder / "o"
 
@@ -277,8 +287,8 @@ def test_no_table_of_the_documentation_is_left_as_text(built: Path) -> None:
         ("path/09-time", "--realtime"),
         ("reference/conventions", "xyzw"),
         ("reference/calls", "mj_forward"),
-        ("comparisons/hold", "12-bit encoder"),
-        ("comparisons/hold-why", "servo law"),
+        ("comparisons/fall", "12-bit encoder"),
+        ("comparisons/fall-why", "9.81 m/s² on the left and 0 m/s² on the right"),
     ],
 )
 def test_a_page_of_the_documentation_has_what_was_computed(
@@ -302,7 +312,12 @@ def test_a_page_that_is_the_same_is_left_alone(
 
 
 @pytest.mark.slow
-def test_the_notebook_is_what_the_lessons_make() -> None:
+def test_the_notebook_is_what_the_lessons_make(monkeypatch: pytest.MonkeyPatch) -> None:
+    def take_once(entry: Lesson, _model: sm.Model, backend: str, options: Any) -> LessonRun:
+        assert (backend, options) == ("mujoco", {})
+        return taken(entry.name)
+
+    monkeypatch.setattr(md, "take", take_once)
     assert _NOTEBOOK.read_text(encoding="utf-8") == build(), "run: make notebook"
 
 

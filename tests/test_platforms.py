@@ -7,7 +7,9 @@ import json
 import os
 import platform as machine
 import re
+import subprocess
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -120,15 +122,31 @@ def test_what_the_engines_say_to_install_is_what_the_markers_take(
             assert specifier in ("", found[wheel.distribution].specifier)
 
 
-@pytest.mark.slow
-@pytest.mark.network
-@pytest.mark.parametrize(("platform", "python"), PLATFORMS)
-def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None:
-    done = of_python(
+def _resolved(platform: str, python: str) -> subprocess.CompletedProcess[str]:
+    """Ask uv which wheels would be installed on a platform."""
+    return of_python(
         "-m", "uv", "pip", "compile", "-q", "--no-header", "--no-annotate", "--only-binary",
         ":all:", "--python-platform", platform, "--python-version", python, "--extra", "motrix",
         ROOT / "pyproject.toml",
     )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def resolutions() -> dict[tuple[str, str], subprocess.CompletedProcess[str]]:
+    """What uv says of each platform: all at once, for it waits for the package index."""
+    with ThreadPoolExecutor(len(PLATFORMS)) as pool:
+        return dict(zip(PLATFORMS, pool.map(_resolved, *zip(*PLATFORMS, strict=True)), strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.network
+@pytest.mark.parametrize(("platform", "python"), PLATFORMS)
+def test_what_is_installed_needs_no_compiler(
+    platform: str,
+    python: str,
+    resolutions: dict[tuple[str, str], subprocess.CompletedProcess[str]],
+) -> None:
+    done = resolutions[platform, python]
     if done.returncode and re.search(r"[Ff]ailed to fetch|error sending request", done.stderr):
         pytest.skip(f"no package index can be reached: {done.stderr.splitlines()[0]}")
     assert done.returncode == 0, done.stderr

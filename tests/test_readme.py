@@ -13,7 +13,7 @@ import pytest
 
 from statemachine.course.grading.faults import FAULTS
 from statemachine.course.grading.judges import JUDGES
-from statemachine.course.lessons import PATH
+from statemachine.course.lessons import LESSONS, PATH
 from statemachine.course.lessons.page import page as page_of
 from statemachine.course.lessons.questions import ASKED
 from statemachine.course.lessons.request import LessonRequest, answer
@@ -25,6 +25,7 @@ from statemachine.show.blocks import Question
 from .support.claims import assert_in
 from .support.files import written, written_all
 from .support.motions import opened
+from .support.pages import QUICK
 from .support.processes import Cli, of_python
 from .support.requirements import ROOT, need_engine
 
@@ -62,6 +63,11 @@ SHOWN = [
     for part in re.finditer(r"^```text\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     for command in re.findall(r"`(statemachine [^`]*)`", page[: part.start()])[-1:]
 ]
+# Run by the tests of lessons, and by those of what is shown.
+RUN_ELSEWHERE = {
+    *(f"statemachine lesson {name}" for name in LESSONS if name not in QUICK),
+    *(str(param.id).partition(": ")[2] for param in SHOWN),
+}
 # What the words of a command need to be there.
 ENGINE_OF = {
     **dict.fromkeys(("pybullet", "compare", "view", "trace", "sweep"), "pybullet"),
@@ -105,7 +111,7 @@ def test_readme_and_guides_are_short() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in RUN_ELSEWHERE])
 def test_a_command_of_the_guides_ends_as_it_should(
     here: Cli, cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
@@ -295,8 +301,9 @@ def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
 def test_the_output_that_is_shown(cli: Cli, words: list[str], shown: str) -> None:
     if "compare" in words or "all" in words:
         need_engine("pybullet")
+    differs = DIFFERS.match(shlex.join(("statemachine", *words)))
     words = [str(ROOT / word) if word.startswith("models/") else word for word in words]
-    assert shown in cli(*words).stdout
+    assert shown in cli(*words, code=int(differs is not None)).stdout
 
 
 def test_counts_in_the_guides_are_those_of_the_package() -> None:

@@ -62,7 +62,7 @@ from statemachine.show.html import check_target, write_report
 from statemachine.show.html import report as html_of
 from statemachine.show.html.geometry import mesh_as_data, mesh_of
 
-from .support.browser import Tab, browser
+from .support.browser import Tab, browser, one_browser
 from .support.claims import assert_has, assert_in, refused
 from .support.colours import contrast
 from .support.compared import result_of
@@ -117,6 +117,13 @@ def page(hold: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
         tmp_path_factory.mktemp("report") / "hold.html",
         page_of(hold, command="statemachine compare hold --html hold.html"),
     )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_browser() -> Iterator[None]:
+    """One browser for all that is looked at; each test has a profile of its own."""
+    with one_browser():
+        yield
 
 
 @contextmanager

@@ -223,7 +223,7 @@ def test_models_are_found_by_their_files_too(folder: Path) -> None:
 
 ENDS = {
     "crash.xml": "it crashed the process (SIGABRT)",
-    "hang.xml": "it took longer than 40 s",
+    "hang.xml": "it took longer than 20 s",
     "memory.xml": "it asks for more memory",
 }
 
@@ -256,11 +256,11 @@ def surveys(tmp_path_factory: pytest.TempPathFactory) -> TwoSurveys:
     table = place / "table.json"
     with pytest.MonkeyPatch.context() as patch:
         log = sabotaged(place, patch)
-        first = examine_all(find([folder]), quick=True, seconds=40, jobs=3, table=table)
+        first = examine_all(find([folder]), quick=True, seconds=20, jobs=3, table=table)
         log.write_text("")
         patch.setenv("AGAIN", "1")  # what hung ends at once
         (folder / "good.xml").write_text(GOOD.replace("0.05", "0.06"))
-        again = examine_all(find([folder]), quick=True, seconds=41, jobs=3, table=table)
+        again = examine_all(find([folder]), quick=True, seconds=21, jobs=3, table=table)
         return TwoSurveys(first, again, log.read_text().split())
 
 

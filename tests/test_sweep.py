@@ -688,6 +688,12 @@ def test_without_an_alarm_a_function_that_hangs_ends_its_process(tmp_path: Path)
     assert in_its_own_python(NO_ALARM, tmp_path).returncode == 1
 
 
+# The command, which waits for less than five seconds until it writes what is done.
+WRITES_OFTEN = (
+    "-c",
+    "import sys; from statemachine import cli; from statemachine.lab.sweep import rows; "
+    "rows.MIN_PAUSE = 0.5; sys.exit(cli.main())",
+)
 CELLS = 30  # of which a worker does two or three in a second
 
 
@@ -752,7 +758,7 @@ def test_a_sweep_that_is_stopped_or_killed_keeps_what_was_done_and_goes_on(
     if jobs == "dask":
         on = ("--scheduler", request.getfixturevalue("cluster").scheduler_address)
     words, out = slow_sweep(policy, "--json", *on), tmp_path / "out"
-    driver = start(*words)
+    driver = start(*words, program=WRITES_OFTEN)
     assert soon(lambda: files_below(out, begun), 120)
     time.sleep(0.4)  # its workers begin, and must not say that they were interrupted
     for _ in how.split():

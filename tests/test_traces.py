@@ -37,6 +37,7 @@ from statemachine.lab.recordings import (
     shipped_trace_names,
     write,
 )
+from statemachine.lab.recordings.rerun import rerun_of
 from statemachine.lab.runs.scenarios import SCENARIOS
 
 from .support.backends import readable_arrays
@@ -100,6 +101,14 @@ def test_derived_columns_are_of_the_state_of_their_row(
                 assert np.allclose(trace[name][row], getattr(data, name), atol=1e-9), (name, row)
     # Nothing else would show a column that is one row late.
     assert not np.allclose(trace["site_xpos"][7], trace["site_xpos"][8], atol=1e-6)
+
+
+def test_what_is_read_as_a_run_goes_is_that_of_its_repetition(backend: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend)
+    run = rerun_of(SCENARIOS["box"], model, seconds=0.2)
+    repeated, at_once = run.record(), run.record(derive="at once")
+    assert len(repeated["contact_row"])
+    assert same(at_once, repeated)
 
 
 def test_contacts_are_those_of_the_step(box: Trace) -> None:

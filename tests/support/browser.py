@@ -11,7 +11,8 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -114,6 +115,41 @@ def _playwright() -> Iterator[Any]:
 
 
 @contextmanager
+def _chromium() -> Iterator[Any]:
+    with _playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=_executable(), headless=True, args=list(_QUIET)
+        )
+        try:
+            yield chromium
+        finally:
+            chromium.close()
+
+
+class _OneBrowser:
+    """A browser that starts when it is first asked for, and ends with a stack."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._stack = stack
+
+    @cached_property
+    def chromium(self) -> Any:
+        return self._stack.enter_context(_chromium())
+
+
+_ONE: list[_OneBrowser] = []
+
+
+@contextmanager
+def one_browser() -> Iterator[None]:
+    """Let each `browser` be a profile of one browser, which takes two seconds to start."""
+    with ExitStack() as stack:
+        _ONE.append(_OneBrowser(stack))
+        stack.callback(_ONE.pop)
+        yield
+
+
+@contextmanager
 def browser(
     width: int = 1280, height: int = 800, offline: bool = False, **context: Any
 ) -> Iterator[Tab]:
@@ -126,14 +162,11 @@ def browser(
         **context: Options of Playwright's `new_context`, as `color_scheme="dark"`,
             `java_script_enabled=False`, `reduced_motion="reduce"`.
     """
-    with _playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=_executable(), headless=True, args=list(_QUIET)
+    with nullcontext(_ONE[-1].chromium) if _ONE else _chromium() as chromium:
+        one = chromium.new_context(
+            viewport={"width": width, "height": height}, offline=offline, **context
         )
         try:
-            one = chromium.new_context(
-                viewport={"width": width, "height": height}, offline=offline, **context
-            )
             yield Tab(one.new_page())
         finally:
-            chromium.close()
+            one.close()

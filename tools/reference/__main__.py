@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
+from .figures import Figures
 from .groups import GROUPS, KEPT, QUICK, absent, changes, figures, write
 
 
@@ -37,15 +39,25 @@ def main() -> int:
     else:
         done = partial(changes, folder=options.folder, bits=options.bits)
     changed = 0
-    # A process for each group: what one engine keeps for a process reaches no other group.
+    for group, now in _figures_of(asked):
+        lines = done(group, now)
+        changed += len(lines)
+        print("\n".join([f"{group}: {len(lines)} changed", *lines]), flush=True)
+    return bool(changed)
+
+
+def _figures_of(groups: Sequence[str]) -> Iterator[tuple[str, dict[str, Figures]]]:
+    """Yield each group with its figures.
+
+    Several groups have a process each: what one engine keeps for a process reaches no other group.
+    """
+    if len(groups) == 1:
+        yield groups[0], figures(groups[0])
+        return
     with ProcessPoolExecutor(
         os.cpu_count(), mp_context=get_context("spawn"), max_tasks_per_child=1
     ) as pool:
-        for group, now in zip(asked, pool.map(figures, asked), strict=True):
-            lines = done(group, now)
-            changed += len(lines)
-            print("\n".join([f"{group}: {len(lines)} changed", *lines]), flush=True)
-    return bool(changed)
+        yield from zip(groups, pool.map(figures, groups), strict=True)
 
 
 if __name__ == "__main__":

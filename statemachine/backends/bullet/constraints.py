@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...interface import Array
-from ...rotations import INVERSE, matrix_from_quat, times
+from ...rotations import INVERSE, cross, matrix_from_quat, times
 from .. import dense
 from ..compiled.kinds import SITE, EqualityKind
 from ..compiled.stages import compute_tendons
@@ -300,7 +300,7 @@ class Equalities:
         (lift, spin), (velocity, whole) = carried, carried[:, -1]
         rise = np.cross(spin, move) + np.cross(lift, turn)
         faster = np.concatenate([rise.sum(axis=0), np.cross(spin, turn).sum(axis=0)])
-        faster[:3] += np.cross(whole, velocity)
+        faster[:3] += cross(whole, velocity)
         return whole, faster
 
 

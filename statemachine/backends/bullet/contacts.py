@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...interface import Array, Contacts
-from ...rotations import matrix_from_quat
+from ...rotations import cross, matrix_from_quat
 from .. import dense
 from ..compiled.flags import DisableFlag
 from ..compiled.kinds import GeomKind
@@ -333,7 +333,7 @@ def _axes(normal: Array) -> Array:
     other_axis = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
     first = other_axis - normal * dense.dot(normal, other_axis)
     first /= math.hypot(*first)
-    return np.array([normal, first, np.cross(normal, first)])
+    return np.array([normal, first, cross(normal, first)])
 
 
 def _distance(raw: MjModel, geom: int, turn: Array, point: Array) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...interface import DERIVED, POSES, Array, JointType
 from ...interface.records import Arrays
-from ...rotations import matrix_from_quat, wxyz_from_xyzw
+from ...rotations import cross, matrix_from_quat, wxyz_from_xyzw
 from .. import dense
 from ..compiled.model import gravity
 from ..hidden_world import HiddenWorld, Memory, Moment, Read, bounded
@@ -354,12 +354,12 @@ def free_dynamics(raw: MjModel, body: int, turn: Array, qvel: Array) -> tuple[Ar
     axes = matrix_from_quat(raw.body_iquat[body])
     inertia = np.einsum("ij,j,kj->ik", axes, raw.body_inertia[body], axes)
     spin = qvel[3:]
-    cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
-    turning = dense.product(turn, np.asarray(cross.T, dtype=np.float64))
+    lever = np.cross(np.eye(3), centre)  # lever @ w = w × centre … of rows
+    turning = dense.product(turn, np.asarray(lever.T, dtype=np.float64))
     jacobian = np.hstack([np.eye(3), turning])
     total = mass * dense.product(jacobian.T, jacobian)
     total[3:, 3:] += inertia
-    whirl = dense.times(turn, np.asarray(np.cross(spin, np.cross(spin, centre)), dtype=np.float64))
+    whirl = dense.times(turn, cross(spin, cross(spin, centre)))
     bias = dense.times(jacobian.T, mass * (whirl - gravity(raw)))
-    bias[3:] += np.cross(spin, dense.times(inertia, spin))
+    bias[3:] += cross(spin, dense.times(inertia, spin))
     return total, bias

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...installed import silence
 from ...interface import Array
-from ...rotations import INVERSE, matrix_from_quat, wxyz_from_xyzw
+from ...rotations import INVERSE, cross, matrix_from_quat, wxyz_from_xyzw
 from ...rotations import times as quat_times
 from .. import dense
 from ..hidden_world import HiddenWorld
@@ -91,8 +91,8 @@ class TreeDynamics(LoadedBodies):
         pose, inward = times(own, axes), (-axes[0], -axes[1], -axes[2], axes[3])
         back, lift = (-pose[0], -pose[1], -pose[2], pose[3]), rate[:3]
         if any(centre):  # only of a tree as it comes: of others the base is the body's origin
-            spin = np.array(v[3:6])
-            swing = np.cross(rate[3:6], centre) + np.cross(spin, np.cross(spin, centre))
+            spin = v[3:6]
+            swing = cross(rate[3:6], centre) + cross(spin, cross(spin, centre))
             lift = np.add(lift, turned(own, swing.tolist())).tolist()
         place = [*_ORIGIN, *q[7:]]
         velocity = [*turned(inward, v[3:6]), 0.0, 0.0, 0.0, *v[6:]]
@@ -107,7 +107,7 @@ class TreeDynamics(LoadedBodies):
                 pb.setGravity(*self._gravity, self.client)
         moment = turned(axes, force[3:6])
         if any(centre):
-            moment = np.add(moment, np.cross(centre, turned(axes, force[:3]))).tolist()
+            moment = np.add(moment, cross(centre, turned(axes, force[:3]))).tolist()
         return [*turned(pose, force[:3]), *moment, *force[6:]]
 
     def _needed_on_a_base(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ...interface import Array
-from ...rotations import INVERSE, matrix_from_quat, xyzw_from_wxyz
+from ...rotations import INVERSE, cross, matrix_from_quat, xyzw_from_wxyz
 from ...rotations import times as quat_times
 from .. import dense
 from ..compiled.stages import compute_kinematics
@@ -137,7 +137,7 @@ class World(TreeDynamics):
         body, qpos, qvel = tree.body, qpos[tree.qpos][:7], qvel[tree.qvel][:6]
         where, pose, turn, arm = self._base_at(body, qpos)
         spin = dense.times(turn, qvel[3:])
-        speed = qvel[:3] + np.cross(spin, arm)
+        speed = qvel[:3] + cross(spin, arm)
         self._last[body] = pose
         pb.resetBasePositionAndOrientation(body, where, pose, self.client)
         pb.resetBaseVelocity(body, speed.tolist(), spin.tolist(), self.client)

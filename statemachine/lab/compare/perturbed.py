@@ -124,7 +124,7 @@ def perturbed_run(
             controller=controller,
             qpos=qpos,
             qvel=qvel,
-            derive=derive,
+            derive="at once" if derive and not rerun.writes_state else derive,
             progress=progress,
         )
 

@@ -3,14 +3,15 @@
 The run itself is watched as little as possible: each step keeps the bytes of its inputs, and
 nothing else. What the engine derives from them is read while the run is *repeated* from its
 beginning with the recorded commands. The repetition must end in the same bits, row by row,
-which is checked: a trace is a proof that the run can be replayed.
+which is checked: a trace is a proof that the run can be replayed. Runs that nobody keeps, of which
+many are made, are not repeated: there it is read as they go.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypedDict
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,8 +35,10 @@ from ..runs.provenance import provenance
 from ..runs.robot import is_servo, warn_of_start
 from .energies import energies
 from .header import Header
-from .repetition import compute_derived
+from .repetition import DerivedRows, compute_derived, is_stale
 from .trace import Trace
+
+Derive = bool | Literal["at once"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,7 @@ def record(
     *,
     start: RunStart = RunStart(),
     metadata: RunMetadata = RunMetadata(),
-    derive: bool = True,
+    derive: Derive = True,
     writes_state: bool = True,
     progress: Progress = no_progress,
 ) -> Trace:
@@ -114,7 +117,8 @@ def record(
         seconds: Simulated time.
         start: Where to start; the default state where nothing is said.
         metadata: What the header of the trace says of the run.
-        derive: Whether to repeat the run and record what the engine derives, too.
+        derive: Whether to record what the engine derives, too: True in a repetition, "at once" as
+            the run goes, where derived arrays are of the state that a step began in.
         writes_state: Whether the controller may write more than ctrl.
         progress: Told the fraction that is done.
 
@@ -131,18 +135,23 @@ def record(
         check_controller(controller)
     total = number_of_steps(model, seconds)
     share = 0.3 if derive else 1.0
+    derived = DerivedRows() if derive == "at once" and is_stale(model) else None
     with make_data(model) as data:
         start.put(model, data)
         warn_of_start(model, data)
-        inputs, ended = _run(
-            model, data, controller, total, progress_of_stage(progress, 0.0, share)
-        )
+        moments = drive(model, data, controller, total, once_more=True)
+        if derived is not None:
+            moments = derived.read_along(model, data, moments)
+        inputs, ended = _run(model, data, moments, total, progress_of_stage(progress, 0.0, share))
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""
     if derive:
-        more, rewritten = compute_derived(
-            model, start.put, inputs, progress_of_stage(progress, share, 1.0 - share)
-        )
+        if derived is not None and not ended:
+            more = derived.columns()
+        else:
+            more, rewritten = compute_derived(
+                model, start.put, inputs, progress_of_stage(progress, share, 1.0 - share)
+            )
         if rewritten and (controller is None or not writes_state):
             raise EngineError(
                 f"the run could not be repeated: {rewritten} rows began in another state; the "
@@ -253,7 +262,7 @@ def layout_of(model: Model) -> ModelLayout:
 
 
 def _run(
-    model: Model, data: Data, controller: Controller | None, total: int, progress: Progress
+    model: Model, data: Data, moments: Iterator[float], total: int, progress: Progress
 ) -> tuple[Arrays, str]:
     """Run, and return the inputs of each row as the step begins, and why the run ended early."""
     times: list[float] = []
@@ -264,7 +273,7 @@ def _run(
     qpos, qvel, ctrl = data.qpos.tobytes, data.qvel.tobytes, data.ctrl.tobytes
     ended = ""
     try:
-        for now in drive(model, data, controller, total, once_more=True):
+        for now in moments:
             keep_time(now)
             keep_qpos(qpos())
             keep_qvel(qvel())

@@ -1,8 +1,8 @@
-"""A recorded run repeated from its beginning, to read what the engine derives from its states."""
+"""What the engine derives from the states of a run, read in a repetition or as the run goes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,44 @@ _RECORDED_ARRAYS = tuple(name for name in DERIVED if name in COLUMNS)
 Start = Callable[[Model, Data], None]
 
 
+class DerivedRows:
+    """What an engine derives from the rows of a run, from the first row on."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._arrays: dict[str, list[Array]] = {name: [] for name in _RECORDED_ARRAYS}
+        self._contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
+
+    def append(self, data: Data) -> None:
+        """Read the next row from a Data, whose derived arrays are of that row's state."""
+        for name, values in self._arrays.items():
+            values.append(array_or_nan(data, name))
+        touching = data.contacts
+        if len(touching):
+            self._contacts["contact_row"].append(np.full(len(touching), self._count))
+            for name in ("geom", "dist", "pos", "frame", "force"):
+                self._contacts[f"contact_{name}"].append(np.array(getattr(touching, name)))
+        self._count += 1
+
+    def read_along(self, model: Model, data: Data, moments: Iterator[float]) -> Iterator[float]:
+        """Yield the moments of a run [s], and read the rows after the steps that begin in them."""
+        for k, now in enumerate(moments):
+            if k:
+                self.append(data)
+            yield now
+        _take_final_step(model, data)
+        self.append(data)
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns by name, those of contacts too."""
+        columns: dict[str, Any] = {name: np.array(rows) for name, rows in self._arrays.items()}
+        for name, width in CONTACTS.items():
+            kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
+            parts = [np.reshape(part, (-1, *width)) for part in self._contacts[name]]
+            columns[name] = np.concatenate([np.empty((0, *width), kind), *parts], dtype=kind)
+        return columns
+
+
 def compute_derived(
     model: Model, begin: Start, inputs: Arrays, progress: Progress
 ) -> tuple[dict[str, Any], int]:
@@ -45,8 +83,7 @@ def compute_derived(
         than the step before them left.
     """
     rows = len(inputs["time"])
-    arrays: dict[str, list[Array]] = {name: [] for name in _RECORDED_ARRAYS}
-    contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
+    derived = DerivedRows()
     after = is_stale(model)
     rewritten = 0
     with make_data(model) as data:
@@ -57,22 +94,17 @@ def compute_derived(
                 data.time = float(inputs["time"][k])
             if not after:
                 forward(model, data)
-                _append_derived(data, k, arrays, contacts)
+                derived.append(data)
             if k < rows - 1:
                 step(model, data)
             elif after:
                 _take_final_step(model, data)
             if after:
-                _append_derived(data, k, arrays, contacts)
+                derived.append(data)
             if k % 32 == 0:
                 progress(k / rows)
     progress(1.0)
-    columns: dict[str, Any] = {name: np.array(values) for name, values in arrays.items()}
-    for name, width in CONTACTS.items():
-        kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
-        rows_of = [np.reshape(part, (-1, *width)) for part in contacts[name]]
-        columns[name] = np.concatenate([np.empty((0, *width), kind), *rows_of], dtype=kind)
-    return columns, rewritten
+    return derived.columns(), rewritten
 
 
 def is_stale(model: Model) -> bool:
@@ -116,15 +148,3 @@ def array_or_nan(data: Data, name: str) -> Array:
         return np.array(getattr(data, name))  # it may be the engine's memory
     except UnsupportedError:
         return np.full(np.shape(data.qvel), np.nan)
-
-
-def _append_derived(
-    data: Data, row: int, arrays: dict[str, list[Array]], contacts: dict[str, list[Any]]
-) -> None:
-    for name, values in arrays.items():
-        values.append(array_or_nan(data, name))
-    touching = data.contacts
-    if len(touching):
-        contacts["contact_row"].append(np.full(len(touching), row))
-        for name in ("geom", "dist", "pos", "frame", "force"):
-            contacts[f"contact_{name}"].append(np.array(getattr(touching, name)))
