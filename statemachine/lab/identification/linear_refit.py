@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...interface import Array
+from .blas_threads import one_blas_thread
 from .fit import Fit
 from .residuals import root_mean_square
 
@@ -50,7 +51,9 @@ class LinearRefit:
     def of(cls, fit: Fit) -> LinearRefit:
         """Return the linear problem of a fit."""
         values = fit.vector[fit.objective.free]
-        basis, triangle = np.linalg.qr(fit.jacobian)
+        jacobian = fit.jacobian
+        with one_blas_thread():
+            basis, triangle = np.linalg.qr(jacobian)
         return cls(fit, fit.objective.scaled(values, fit.errors), basis, triangle)
 
     @property

@@ -1,10 +1,8 @@
 """Least squares within bounds that asks for few Jacobians, each of which costs as many simulations
 as there are parameters.
 
-Each step minimises the quadratic model of the sum of squares within a trust region and the bounds
-(J. Nocedal and S. Wright, Numerical Optimization, 2006, chapters 4 and 10). Between two Jacobians
-one is carried on by the change of the residuals along the last step (C. Broyden, 1965). A step
-decomposes a matrix of the size of the parameters, and never the Jacobian with all its rows.
+SciPy's trust region makes the steps (T. Coleman and Y. Li, 1996). Between two Jacobians one is
+carried on by the change of the residuals along the last step (C. Broyden, 1965).
 """
 
 from __future__ import annotations
@@ -17,12 +15,9 @@ import numpy as np
 
 from ...installed import require_extra
 from ...interface import Array
+from .blas_threads import EXTRA, one_blas_thread
 
-EXTRA = "recordings"
-_LEAST_STEP = 1e-4  # of the scale: a shorter one is none
-_POOR, _GOOD = 0.25, 0.75  # of what was predicted: the region shrinks, and grows
-_TOO_LONG = 1.05  # of the radius: a step of this length is short enough
-_NEWTON_STEPS = 20  # for the damping of a step
+_LEAST_STEP = 1e-5  # by the length of the vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +44,7 @@ class Effort:
 
     Attributes:
         runs: Evaluations of the residuals at most.
-        tolerance: Part of the sum of squares that a last step promises at most.
+        tolerance: Part of the sum of squares that a last step takes away at most.
         steps: After how many steps the Jacobian is computed anew.
     """
 
@@ -88,85 +83,78 @@ def minimum(problem: BoundedLeastSquares, start: Array, effort: Effort) -> Minim
     Raises:
         MissingEngineError: The extra `recordings` is not installed.
     """
-    scale = problem.scale
-    low, high = problem.low / scale, problem.high / scale
-    place = np.clip(start / scale, low, high)
-    residuals, jacobian = problem.residuals(place * scale), problem.jacobian(place * scale) * scale
-    runs, jacobians, age = 1, 1, 0
-    radius = max(1.0, float(np.linalg.norm(place)))
-    while runs < effort.runs:
-        model = _QuadraticModel(jacobian.T @ jacobian, jacobian.T @ residuals)
-        step = model.step(low - place, high - place)
-        is_last = model.decrease(step) < effort.tolerance * _cost(residuals)
-        if np.linalg.norm(step) > radius:
-            step = model.step(low - place, high - place, model.damping(radius))
-        length = float(np.linalg.norm(step))
-        if length < _LEAST_STEP:
-            break
-        promised = model.decrease(step)
-        next_place = np.clip(place + step, low, high)
-        next_residuals = problem.residuals(next_place * scale)
-        runs += 1
-        decrease = _cost(residuals) - _cost(next_residuals)
-        if decrease < _POOR * promised:
-            radius = _POOR * length
-        elif decrease > _GOOD * promised and length > 0.9 * radius:
-            radius *= 2.0
-        if decrease > 0.0:
-            surprise = next_residuals - residuals - jacobian @ step
-            jacobian = jacobian + np.outer(surprise, step / length**2)
-            place, residuals, age = next_place, next_residuals, age + 1
-        if is_last and (decrease > 0.0 or age == 0):
-            break
-        if age >= effort.steps or (age > 0 and decrease <= 0.0):
-            jacobian = problem.jacobian(place * scale) * scale
-            jacobians, age = jacobians + 1, 0
-    return Minimum(place * scale, residuals, jacobian / scale, runs, jacobians)
-
-
-def _cost(residuals: Array) -> float:
-    """Return half the sum of squares."""
-    return 0.5 * float(residuals @ residuals)
+    optimize: Any = require_extra("scipy.optimize", "a fit to a recording", "SciPy", EXTRA)
+    evaluated = _Evaluated(problem, effort.steps)
+    with one_blas_thread():
+        found = optimize.least_squares(
+            evaluated.residuals,
+            np.clip(start, problem.low, problem.high),
+            jac=evaluated.jacobian,
+            bounds=(problem.low, problem.high),
+            x_scale=problem.scale,
+            max_nfev=effort.runs,
+            xtol=_LEAST_STEP,
+            ftol=effort.tolerance,
+        )
+    values, residuals = np.asarray(found.x), np.asarray(found.fun)
+    return Minimum(values, residuals, np.asarray(found.jac), evaluated.runs, evaluated.jacobians)
 
 
 @dataclass(frozen=True, eq=False)
-class _QuadraticModel:
-    """What half the sum of squares is taken to be near a place.
+class _Place:
+    """Parameters, and what was evaluated there.
 
     Attributes:
-        curvature: (P, P).
-        gradient: (P,).
+        values: (P,) the parameters.
+        residuals: (rows,) there.
     """
 
-    curvature: Array
-    gradient: Array
+    values: Array
+    residuals: Array
 
-    def decrease(self, step: Array) -> float:
-        """Return by how much a step (P,) makes it smaller."""
-        return -float(self.gradient @ step + 0.5 * step @ self.curvature @ step)
 
-    def step(self, low: Array, high: Array, damping: float = 0.0) -> Array:
-        """Return the step (P,) that makes it smallest within bounds."""
-        optimize: Any = require_extra("scipy.optimize", "a fit to a recording", "SciPy", EXTRA)
-        damped = self.curvature + damping * np.eye(len(self.gradient))
-        lower = np.linalg.cholesky(damped)
-        target = -np.linalg.solve(lower, self.gradient)
-        found = optimize.lsq_linear(lower.T, target, bounds=(low, high), method="bvls")
-        return np.asarray(found.x)
+class _Evaluated:
+    """Residuals and Jacobians that SciPy asks for, and how often they were computed.
 
-    def damping(self, radius: float) -> float:
-        """Return what is added to the curvature, so that a step without bounds has this length.
+    Args:
+        problem: What is made small.
+        steps: After how many steps the Jacobian is computed anew.
+    """
 
-        By Newton's method from no damping (J. Moré and D. Sorensen, 1983), which gives steps that
-        are too long until it ends.
-        """
-        damping = 0.0
-        for _ in range(_NEWTON_STEPS):
-            lower = np.linalg.cholesky(self.curvature + damping * np.eye(len(self.gradient)))
-            step = np.linalg.solve(lower.T, np.linalg.solve(lower, self.gradient))
-            length = float(np.linalg.norm(step))
-            if length <= _TOO_LONG * radius:
-                break
-            slope = float(np.linalg.norm(np.linalg.solve(lower, step)))
-            damping += (length / slope) ** 2 * (length / radius - 1.0)
-        return damping
+    def __init__(self, problem: BoundedLeastSquares, steps: int) -> None:
+        self.runs = self.jacobians = 0
+        self._problem, self._steps = problem, steps
+        self._age = 0  # steps since the Jacobian was computed
+        self._last: _Place | None = None
+        self._known: tuple[_Place, Array] | None = None  # where a Jacobian is known
+
+    def residuals(self, values: Array) -> Array:
+        """Return the residuals (rows,)."""
+        return self._evaluate(values).residuals
+
+    def jacobian(self, values: Array) -> Array:
+        """Return the Jacobian (rows, P), which SciPy asks for where a step ended."""
+        place = self._last
+        if place is None or not np.array_equal(place.values, values):
+            place = self._evaluate(values)
+        if self._known is None or self._age >= self._steps:
+            jacobian = self._problem.jacobian(values)
+            self.jacobians, self._age = self.jacobians + 1, 0
+        else:
+            jacobian = self._carried_on(*self._known, place)
+        self._age += 1
+        self._known = place, jacobian
+        return jacobian
+
+    def _evaluate(self, values: Array) -> _Place:
+        """Return a place after its residuals were computed."""
+        self.runs += 1
+        self._last = _Place(values.copy(), self._problem.residuals(values))
+        return self._last
+
+    def _carried_on(self, before: _Place, jacobian: Array, place: _Place) -> Array:
+        """Return a Jacobian after a step along which the residuals changed as they did."""
+        step = place.values - before.values
+        by_scale = step / np.square(self._problem.scale)
+        surprise = place.residuals - before.residuals - jacobian @ step
+        return jacobian + np.outer(surprise, by_scale / (step @ by_scale))

@@ -96,6 +96,7 @@ _PACKAGES = (
     ("pyarrow", "parquet traces, sweeps, recordings of an arm", ("parquet", "sweep", "recordings")),
     ("joblib", "sweeps", ("sweep",)),
     ("scipy", "sweeps, fits of an arm", ("sweep", "recordings")),
+    ("threadpoolctl", "fits of an arm", ("recordings",)),
     ("distributed", "sweeps through Dask", ("cluster",)),
     ("gymnasium", "reinforcement learning", ("gym",)),
     ("onnxruntime", "walking policies", ("policy",)),
