@@ -22,7 +22,7 @@ import numpy as np
 import statemachine as sm
 from statemachine import __version__, releases
 from statemachine.lab.recordings import recorder
-from statemachine.lab.runs.drive import no_progress
+from statemachine.lab.runs.drive import drive, no_progress
 from statemachine.lab.runs.interleaved_timing import time_interleaved
 from statemachine.lab.runs.scenarios import scenario
 from statemachine.lab.why import WhyRequest, explain
@@ -171,15 +171,11 @@ def recording(name: str, rounds: int) -> list[Ratio]:
             bare.ctrl[:] = controller(model, bare)
             sm.step(model, bare)
 
-    return interleaved(
-        loop,
-        {
-            f"recorded, {name}": lambda: recorder._run(
-                model, watched, controller, _LONG, no_progress
-            )
-        },
-        rounds,
-    )
+    def recorded() -> None:
+        moments = drive(model, watched, controller, _LONG, once_more=True)
+        recorder._run(model, watched, moments, _LONG, no_progress)
+
+    return interleaved(loop, {f"recorded, {name}": recorded}, rounds)
 
 
 _AIR = [0.0, -0.3, 0.6, 0.3, 0.0, 0.6]
