@@ -85,12 +85,14 @@ def minimum(problem: BoundedLeastSquares, start: Array, effort: Effort) -> Minim
     """
     optimize: Any = require_extra("scipy.optimize", "a fit to a recording", "SciPy", EXTRA)
     evaluated = _Evaluated(problem, effort.steps)
+    bounds = (problem.low, problem.high)
+    inside = np.clip(start, *bounds)
     with one_blas_thread():
         found = optimize.least_squares(
             evaluated.residuals,
-            np.clip(start, problem.low, problem.high),
+            inside,
             jac=evaluated.jacobian,
-            bounds=(problem.low, problem.high),
+            bounds=bounds,
             x_scale=problem.scale,
             max_nfev=effort.runs,
             xtol=_LEAST_STEP,
