@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ...measures.text import degrees, grouped
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits, with_answer
-from ...show.templates import render, render_blocks
+from ...show.templates import PageContent, render, render_blocks
 from .identification_details import IdentificationDetails
 from .page_of_recording import PageOfRecording
 from .parameter_table import UNKNOWN, joint_table, ranked_shares
@@ -33,7 +33,7 @@ _MOST_ROWS = 6
 
 
 @dataclass(frozen=True)
-class IdentificationPage(PageOfRecording):
+class IdentificationPage(PageOfRecording, PageContent):
     """What the page of an identification shows.
 
     Attributes:

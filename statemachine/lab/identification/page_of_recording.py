@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...show.templates import PageContent
 from ..recordings.robot_types import is_so_arm
 from ..runs.provenance import Provenance
 from .results import IdentificationResult, RecordingGap, RecordingResult
@@ -12,7 +11,7 @@ from .typed_question import recording_name
 
 
 @dataclass(frozen=True)
-class PageOfRecording(PageContent):
+class PageOfRecording:
     """What every page of a recording shows.
 
     Attributes:

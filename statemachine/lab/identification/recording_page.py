@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import degrees
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import with_answer
-from ...show.templates import render
+from ...show.templates import PageContent, render
 from .page_of_recording import PageOfRecording
 from .results import RecordingGap, RecordingResult
 from .typed_question import typed_question
@@ -18,7 +18,7 @@ ALL_JOINTS = "all joints"
 
 
 @dataclass(frozen=True)
-class RecordingPage(PageOfRecording):
+class RecordingPage(PageOfRecording, PageContent):
     """What the page of a recording shows.
 
     Attributes:
