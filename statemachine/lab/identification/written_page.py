@@ -30,9 +30,11 @@ class WrittenPart(PageContent):
 
     @property
     def is_farther(self) -> bool:
-        """Tell whether the file is farther from the arm than what was fitted."""
+        """Tell whether the file is farther from the arm than what was fitted, and lacks figures."""
         gap, fitted = self.rewritten.gap, self.result.gap.fitted
-        return gap is not None and fitted is not None and gap > _FARTHER * fitted
+        if gap is None or fitted is None or not self.unchanged:
+            return False
+        return gap > _FARTHER * fitted
 
     @property
     def unchanged(self) -> int:
