@@ -15,10 +15,10 @@ from .refinements import Refinement
 from .results import UNITS, FittedParameter, Reason
 from .starts import Fits, least_certain
 
-_TELLS = 0.3  # standard deviation after the fit, by that before it
+TELLS = 0.3  # standard deviation after the fit, by that before it
 _QUANTILE = 1.96  # of the normal distribution, for 95 %
 _MOVED = 0.5  # standard deviations: an interval of 95 % that is off by that covers 92 %
-_FEWEST_AS_GOOD = 3  # starts that end in the same fit, before it is taken for the best there is
+AS_GOOD = 0.5  # of the starts, of which more end in the same fit if it is taken for the best one
 
 
 def fitted_parameters(
@@ -56,8 +56,8 @@ def fitted_parameters(
     fitted: list[FittedParameter] = []
     for place, number in enumerate(objective.free.tolist()):
         interval = _Interval(float(values[place]), float(low[place]), float(high[place]))
-        agrees = agree[place] and len(ends) >= _FEWEST_AS_GOOD
-        motion = "" if told[place] < _TELLS else _motion_for(place, fits, motions)
+        agrees = agree[place] and len(ends) > AS_GOOD * len(fits.each)
+        motion = "" if told[place] < TELLS else _motion_for(place, fits, motions)
         reasons = _reasons(told[place], fits, agrees, holds)
         others: list[Reason] = [reason for reason, mine in changed.items() if mine[place]]
         parameter = objective.parameters.each[number]
@@ -117,7 +117,7 @@ def _reasons(told: float, fits: Fits, agrees: bool, holds: bool) -> tuple[Reason
         holds: Whether the best fit holds on what was not fitted.
     """
     reasons: list[Reason] = []
-    if told >= _TELLS:
+    if told >= TELLS:
         reasons.append("too little information")
     if not fits.residuals.at_floor:
         reasons.append("residual above the floor")
@@ -134,6 +134,6 @@ def _motion_for(place: int, fits: Fits, motions: Sequence[MotionInformation]) ->
     for motion in motions:
         together = [each + motion.information for each in fits.informations]
         after = least_certain(together, prior)
-        if after[place] < _TELLS * prior[place]:
+        if after[place] < TELLS * prior[place]:
             return motion.name
     return ""
