@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 _LONGEST = 2000  # characters of a message
-_MISSPELT = 0.65  # likeness of two names, from 0 to 1, from which on one may be the other misspelt
 
 
 def cut(message: str) -> str:
@@ -177,19 +176,6 @@ def did_you_mean(
     """Return the end of a message about a mistyped name: the nearest known one, or nothing."""
     close = difflib.get_close_matches(name if isinstance(name, str) else "", known, 1, cutoff)
     return f". Did you mean {show(close[0])}?" if close else ""
-
-
-def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Return the one name of which another is a misspelling; "" where none or several are near."""
-    close = difflib.get_close_matches(name, known, 2, _MISSPELT)
-    if len(close) == 2 and _likeness(name, close[0]) == _likeness(name, close[1]):
-        return ""
-    return close[0] if close else ""
-
-
-def _likeness(name: str, known: str) -> float:
-    """Return how alike two names are, from 0 to 1."""
-    return difflib.SequenceMatcher(None, known, name).ratio()
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:

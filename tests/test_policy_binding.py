@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from statemachine import load
-from statemachine.errors import BadInputError, UnknownNameError, nearest_name
+from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.lab.policy.binding import Binding, bind
+from statemachine.lab.policy.misspellings import nearest_name
 
 from .support.policies import contract, robot, servos, with_terms
 from .support.requirements import need_engine

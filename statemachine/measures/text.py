@@ -12,7 +12,6 @@ from ..installed import ENGINES
 K = TypeVar("K")
 V = TypeVar("V")
 NO_NUMBER = "–"  # where there is no number
-_COMMAND_WIDTH = 74  # of a line of a command, which is set in
 SHOWN_AS_TINY = 1e-6  # what is less, in the unit that is read, is only called so
 _DISPLAY_UNITS = {"rad": (180.0 / math.pi, "°"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 
@@ -220,20 +219,3 @@ def command(words: Iterable[str], *options: tuple[str, object, object]) -> str:
             if value is not True:
                 typed.append(str(value))
     return " ".join(map(shlex.quote, typed))
-
-
-def folded_command(words: Iterable[str]) -> str:
-    """Return a command as one types it, continued on further lines where it is long.
-
-    A word that is longer than a line, such as the path of a file, is not cut: what is printed can
-    be copied.
-    """
-    lines: list[str] = []
-    line = ""
-    for word in map(shlex.quote, words):
-        if line and len(line) + 1 + len(word) > _COMMAND_WIDTH:
-            lines.append(f"{line} \\")
-            line = f"  {word}"
-        else:
-            line = f"{line} {word}" if line else word
-    return "\n".join([*lines, line])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...installed import DEFAULT, PAIR
-from ...measures.text import folded_command
+from ...measures.command_lines import folded_command
 from ..policy.command import typed_speeds
 from .labels import typed_option
 from .python_call import python_call

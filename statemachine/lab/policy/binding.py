@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import BadInputError, nearest_name
+from ...errors import BadInputError
 from ...interface import Array, Data, Ints, JointType, Model
 from ...measures.text import few
 from ...rotations import matrix_from_quat
 from ..runs.floating import free_joint_of_base
 from .contract import Contract
+from .misspellings import nearest_name
 from .observation import Mount, RobotState
 
 _FREE_QPOS, _FREE_QVEL = 7, 6

@@ -9,8 +9,9 @@ from typing import TypeGuard, cast
 
 import numpy as np
 
-from ...errors import BadInputError, did_you_mean, nearest_name, shown
+from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array
+from .misspellings import nearest_name
 
 
 @dataclass(frozen=True)

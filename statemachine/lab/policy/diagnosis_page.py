@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import folded_command, significant
+from ...measures.command_lines import folded_command
+from ...measures.text import significant
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
 from .contract_fields import UnreadField

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ...measures.text import folded_command, percent, significant
+from ...measures.command_lines import folded_command
+from ...measures.text import percent, significant
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
 from .adapted import ContractChange
