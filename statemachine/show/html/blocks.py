@@ -22,7 +22,7 @@ from ..blocks import (
 from ..pictures import Bars, Diagram, Traces
 from ..text_blocks import non_breaking
 from .diagram import figure
-from .markup import Html, joined, lines_of_code, prose, tag
+from .markup import Html, joined, prose, tag
 
 # Draws an interactive block: what it shows is known where its kind is defined.
 DrawInteractive = Callable[[Interactive], Html]
@@ -78,7 +78,7 @@ def _words(block: Block) -> Html:
             items = [tag("li", prose(text)) for text in texts]
             return tag("ol" if ordered else "ul", *items)
         case Code(lines):
-            return tag("pre", tag("code", lines_of_code(lines)))
+            return tag("pre", tag("code", "\n".join(lines)))
         case Verdict(text, holds):
             return tag("p", "✓ " if holds else "✗ ", prose(text), class_="verdict")
         case _:

@@ -47,8 +47,9 @@ def prose(text: str) -> str:
 
 
 def literal(text: object) -> Html:
-    """Return a text as it is, for what may be typed or copied."""
-    return Html(html.escape(_printable(str(text))))
+    """Return a text as it is, with its lines, for what may be typed or copied."""
+    lines = [_printable(line) for line in str(text).split("\n")]
+    return Html(html.escape("\n".join(lines)))
 
 
 def tag(name: str, *content: object, **attributes: object) -> Html:
@@ -74,11 +75,6 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
         content = tuple(p if isinstance(p, Html) or p is None else literal(p) for p in content)
     inner = "".join(escaped(part) for part in content if part is not None)
     return Html(f"<{name}{said}>{inner}</{name}>")
-
-
-def lines_of_code(lines: Iterable[str]) -> Html:
-    """Return lines as they are, each on a line of its own."""
-    return Html("\n".join(literal(line) for line in lines))
 
 
 def joined(parts: Iterable[object]) -> Html:
