@@ -78,7 +78,7 @@ def test_angles_jump_with_implicitfast_and_not_with_euler(recording: ArmRecordin
 def test_what_the_verdict_demands_is_what_the_page_says() -> None:
     assert f"less than {verdicts.TELLS} of what was uncertain" in PAGE
     assert FEWEST_STARTS == 8
-    assert verdicts.AS_GOOD == 0.5
+    assert verdicts.AGREEING == 0.5
 
 
 def test_the_speed_of_the_script_is_that_of_the_page() -> None:

@@ -78,9 +78,14 @@ def compared_arms(
     comparison = compare(measured, simulated)
     if not isinstance(result, IdentificationResult):
         return comparison
-    larger = max(1.0, _PEAK * result.floor / ENCODER_COUNT)
+    larger = _tolerance(result) / ENCODER_COUNT
     tolerances = {each.kind: larger * each.tolerance for each in comparison.agreements}
     return compare(measured, simulated, tolerances=tolerances)
+
+
+def _tolerance(result: IdentificationResult) -> float:
+    """Return how far apart a joint that was fitted may be [rad]: a count of an encoder at least."""
+    return max(ENCODER_COUNT, _PEAK * result.floor)
 
 
 def report_page(
@@ -109,6 +114,6 @@ def report_page(
     page = result.page(details=True)
     words = ("--why",) if isinstance(result, IdentificationResult) else ()
     command = typed_question(result.request, *words, "--html", file.name, folders=False)
-    tolerance = _PEAK * result.floor if isinstance(result, IdentificationResult) else None
+    tolerance = _tolerance(result) if isinstance(result, IdentificationResult) else None
     blocks = render_blocks(ArmReport(runs, page.blocks, charts, tolerance, command))
     return Page(page.title, page.origin, blocks, page.headline)

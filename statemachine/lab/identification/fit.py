@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 
 from ...interface import Array, Ints
-from .parameters import BY_JOINT, ArmParameters
-from .results import Kind
+from .parameters import ArmParameters
+from .results import UNITS
 from .simulation import ArmSimulation
 from .trust_region import BoundedLeastSquares, Effort, Minimum, minimum
 
@@ -30,7 +30,6 @@ _DRAWS_FOR_EACH = 12  # draws for each start, of which the best are taken
 _STIFFNESS = (-5.5, 0.5)  # logarithm of the factor of all gains, drawn from between
 _AMONG_SERVOS = 0.3  # spread of the gains of one arm, by that of the prior
 _PULLED = 1e4  # residual of an angle that is no number: no such point is kept
-KINDS: tuple[Kind, ...] = (*BY_JOINT, "delay", "payload")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +118,7 @@ class Objective:
         parameters = self.parameters
         is_free = np.isin(np.arange(len(parameters)), self.free)
         groups: list[Ints] = []
-        for kind in KINDS:
+        for kind in UNITS:
             members = parameters.of_kind(kind)
             groups.append(members[is_free[members]])
         vectors = np.tile(self.vector(values), (len(groups) + 1, 1))

@@ -9,11 +9,11 @@ import numpy as np
 from ...interface import Array
 from ..recordings.unit_inference import COUNT
 from .linear_refit import LinearRefit, RefitEnd
+from .starts import AS_GOOD
 
 # Tried widths: less than a count of the servo is not seen, and servos have 0.3°, 3.4 counts.
 _COUNTS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 15.0)
 _WIDTHS = COUNT * np.array(_COUNTS)  # rad
-_AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class PlayProfile:
     @property
     def as_good(self) -> Array:
         """Return by how much parameters move, (S, free), with each such width that fits as well."""
-        most = min(end.cost for end in self.ends) + _AS_GOOD
+        most = min(end.cost for end in self.ends) + AS_GOOD
         shifts = [self.ends[place].shift for place in self._seen if self.ends[place].cost < most]
         return np.reshape(shifts, (-1, len(self.ends[0].shift)))
 

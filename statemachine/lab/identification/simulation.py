@@ -131,9 +131,7 @@ class ArmSimulation:
             vector: (P,) of the parameters.
             widths: (M,) [rad].
         """
-        readings = replace(self, play=widths[:, None])
-        once = readings._played(vector[None], self._steps)
-        return 2.0 * readings._played(vector[None], 2 * self._steps) - once
+        return replace(self, play=widths[:, None]).angles_of_each(vector[None])
 
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""

@@ -14,11 +14,11 @@ from .residuals import Residuals, root_mean_square
 
 _RUNS_TO_BEST = 8  # simulations of a start that goes on with the derivatives of the best
 _RUNS_BY_ITSELF = 20  # of one that goes on with its own
-_AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
+AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
 _NEAR_THE_END = 1e-2  # of the sum of squares, where a start waits for the best one
 _FIRST_NOISE = 0.6  # counts: taken for the noise before any residual is known
 _WEAKER = (0.15, 0.3)  # logarithms of the factors by which joints are taken to be weaker
-_POSSIBLE = 2.0 * _AS_GOOD  # half the sum of squares: a joint that is weaker fits hardly worse
+_POSSIBLE = 2.0 * AS_GOOD  # half the sum of squares: a joint that is weaker fits hardly worse
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Fits:
     @property
     def as_good(self) -> tuple[Fit, ...]:
         """Return those that fit as well as the best one, which is among them."""
-        return tuple(each for each in self.each if each.cost - self.best.cost < _AS_GOOD)
+        return tuple(each for each in self.each if each.cost - self.best.cost < AS_GOOD)
 
     @property
     def informations(self) -> tuple[Array, ...]:
@@ -163,7 +163,7 @@ def gone_on(end: Fit, best: Fit) -> Fit:
     """
     objective = best.objective
     further = _better(end, fit(objective, end.vector, _RUNS_TO_BEST, derivatives=best.jacobian))
-    if further.cost - best.cost < _AS_GOOD:
+    if further.cost - best.cost < AS_GOOD:
         return further
     return _better(further, fit(objective, further.vector, _RUNS_BY_ITSELF))
 

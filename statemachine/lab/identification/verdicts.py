@@ -18,7 +18,7 @@ from .starts import Fits, least_certain
 TELLS = 0.3  # standard deviation after the fit, by that before it
 _QUANTILE = 1.96  # of the normal distribution, for 95 %
 _MOVED = 0.5  # standard deviations: an interval of 95 % that is off by that covers 92 %
-AS_GOOD = 0.5  # of the starts, of which more end in the same fit if it is taken for the best one
+AGREEING = 0.5  # of the starts, of which more end in the same fit if it is taken for the best one
 
 
 def fitted_parameters(
@@ -56,7 +56,7 @@ def fitted_parameters(
     fitted: list[FittedParameter] = []
     for place, number in enumerate(objective.free.tolist()):
         interval = _Interval(float(values[place]), float(low[place]), float(high[place]))
-        agrees = agree[place] and len(ends) > AS_GOOD * len(fits.each)
+        agrees = agree[place] and len(ends) > AGREEING * len(fits.each)
         motion = "" if told[place] < TELLS else _motion_for(place, fits, motions)
         reasons = _reasons(told[place], fits, agrees, holds)
         others: list[Reason] = [reason for reason, mine in changed.items() if mine[place]]
