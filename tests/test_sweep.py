@@ -691,8 +691,8 @@ def test_without_an_alarm_a_function_that_hangs_ends_its_process(tmp_path: Path)
 # The command, which waits for less than five seconds until it writes what is done.
 WRITES_OFTEN = (
     "-c",
-    "import sys; from statemachine import cli; from statemachine.lab.sweep import rows; "
-    "rows.MIN_PAUSE = 0.5; sys.exit(cli.main())",
+    "import sys; from statemachine_sim import main; from statemachine.lab.sweep import rows; "
+    "rows.MIN_PAUSE = 0.5; sys.exit(main())",
 )
 CELLS = 30  # of which a worker does two or three in a second
 
