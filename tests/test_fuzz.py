@@ -25,8 +25,8 @@ from .support.requirements import ROOT
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are POSIX's")
 
 
-TIMES = 0.04  # of the tries of a target
-FEW_TIMES = {"random_models": 0.01}  # of what takes more than a second each
+TIMES = 0.03  # of the tries of a target
+FEW_TIMES = {"random_models": 0.005}  # of what takes more than a second each
 
 
 @pytest.mark.slow
