@@ -9,7 +9,6 @@ from ...measures.command_lines import folded_command
 from ...measures.text import significant
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
-from .contract_fields import UnreadField
 from .diagnosis import LEAST_GAIN, PART_OF_COST, DiagnosisResult, EngineDiagnosis, TriedHypothesis
 from .request import words_of_request
 from .term_gaps import TermGap
@@ -84,11 +83,6 @@ class DiagnosisPage(PageContent):
     def contract_file(self) -> str:
         """Return the name of the contract's file."""
         return self.result.contract.file
-
-    @property
-    def misspelt(self) -> Sequence[UnreadField]:
-        """Return the fields of the contract that nothing reads, and that are near to one."""
-        return self.result.contract.misspelt
 
     @property
     def seconds(self) -> float:

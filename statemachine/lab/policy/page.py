@@ -15,7 +15,6 @@ from .adapted import ContractChange
 from .checks import ContractNote
 from .command import LEAST_TOLERANCE, LEAST_TURN_TOLERANCE, RELATIVE_TOLERANCE
 from .contract import AXES
-from .contract_fields import UnreadField
 from .request import EngineWalks, PolicyResult, words_of_request
 from .walk import Walk
 
@@ -192,11 +191,6 @@ class PolicyPage(PageContent):
     def least_turn_tolerance(self) -> float:
         """Return how far it may be off at least, turning [rad/s]."""
         return LEAST_TURN_TOLERANCE
-
-    @property
-    def misspelt(self) -> Sequence[UnreadField]:
-        """Return the fields of the contract that nothing reads, and that are near to one."""
-        return self.result.contract.misspelt
 
     @property
     def notes(self) -> Sequence[ContractNote]:
