@@ -15,7 +15,7 @@ from ...interface.records import Defaults
 from ..runs.drive import Controller, Progress, check_length, no_progress
 from ..runs.scenarios import Scenario
 from .header import Header
-from .recorder import Derive, RunMetadata, RunStart, record
+from .recorder import DerivedFrom, RunMetadata, RunStart, record
 from .trace import Trace
 
 
@@ -75,7 +75,7 @@ class Rerun:
         qpos: Array | None = None,
         qvel: Array | None = None,
         command: str = "",
-        derive: Derive = True,
+        derived: DerivedFrom = "repetition",
         progress: Progress = no_progress,
     ) -> Trace:
         """Record the run.
@@ -85,7 +85,7 @@ class Rerun:
             qpos: (nq,) where it starts, instead of its own [rad or m].
             qvel: (nv,) its velocities there, instead of its own [rad/s or m/s].
             command: What makes the trace again.
-            derive: Whether to record what the engine derives, too, as `recorder.record` takes it.
+            derived: From what the columns are that the engine derives, as of `recorder.record`.
             progress: Told the fraction that is done.
         """
         start = RunStart(
@@ -107,7 +107,7 @@ class Rerun:
             self.seconds,
             start=start,
             metadata=metadata,
-            derive=derive,
+            derived=derived,
             writes_state=self.writes_state,
             progress=progress,
         )
