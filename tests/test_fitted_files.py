@@ -38,7 +38,7 @@ def written(result: IdentificationResult, target: Path, model: str | Path = "so1
     """Write the file of a result, and load it."""
     asked = replace(result.request, model=model, write=target)
     check_written(asked)
-    rewritten = with_written(replace(result, request=asked)).rewritten
+    rewritten = with_written(replace(result, request=asked, arm=load(model))).rewritten
     assert rewritten is not None
     return rewritten, load(target)
 

@@ -54,7 +54,7 @@ class RecordingRequest:
     """Question how a recording of a real arm differs from its model.
 
     Attributes:
-        recording: "lerobot:DIR#EPISODE", or "lerobot:DIR" for episode 0.
+        recording: "lerobot:DIR#EPISODE", or "lerobot:DIR" for the first episode.
         model: A name or a file of the arm.
         calibration: LeRobot's calibration file; None to take unit and scale from the numbers.
         names: Joints of the recording that have other names in the model.
