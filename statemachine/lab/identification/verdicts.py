@@ -12,11 +12,11 @@ from ...interface import Array
 from .motions import MotionInformation
 from .parameters import Parameter
 from .refinements import Refinement
+from .residuals import QUANTILE
 from .results import UNITS, FittedParameter, Reason
 from .starts import Fits, least_certain
 
 TELLS = 0.3  # standard deviation after the fit, by that before it
-_QUANTILE = 1.96  # of the normal distribution, for 95 %
 _MOVED = 0.5  # standard deviations: an interval of 95 % that is off by that covers 92 %
 AGREEING = 0.5  # of the starts, of which more end in the same fit if it is taken for the best one
 
@@ -39,7 +39,7 @@ def fitted_parameters(
     deviations = fits.deviations
     prior = objective.prior_deviations
     values = fits.best.vector[objective.free]
-    low, high = values - _QUANTILE * deviations, values + _QUANTILE * deviations
+    low, high = values - QUANTILE * deviations, values + QUANTILE * deviations
     ends = np.array([fit.vector[objective.free] for fit in fits.as_good])
     agree = np.all((ends >= low) & (ends <= high), axis=0).tolist()
     low = np.minimum(low, ends.min(axis=0))
@@ -70,7 +70,7 @@ def _changed_by(refinement: Refinement, deviations: Array) -> NDArray[np.bool_]:
 
     Where that fits better, a parameter may hardly move; where it fits as well, within its interval.
     """
-    allowed = _MOVED if refinement.fits_better else _QUANTILE
+    allowed = _MOVED if refinement.fits_better else QUANTILE
     return np.maximum(-refinement.least, refinement.most) > allowed * deviations
 
 
