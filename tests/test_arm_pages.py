@@ -284,7 +284,7 @@ def test_a_written_file_that_lacks_figures_is_told_to_be_farther(
 def test_reasons_are_counted_where_there_are_several(fitted: IdentificationResult) -> None:
     assert content(fitted).reasons == ["too little information"]
     told, *others = fitted.parameters
-    lacking = replace(others[-1], verdict="cannot tell", reasons=("starts disagree",))
+    lacking = replace(others[-1], reasons=("starts disagree",))
     both = replace(fitted, parameters=(told, *others[:-1], lacking))
     assert content(both).reasons == ["too little information 24", "starts disagree 1"]
 

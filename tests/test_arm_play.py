@@ -13,7 +13,7 @@ from statemachine.lab.identification.linear_refit import LinearRefit
 from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.play import behind_play
 from statemachine.lab.identification.play_profiles import play_profiles
-from statemachine.lab.identification.recorded_gap import asked_of
+from statemachine.lab.identification.recorded_gap import recorded_arm_of
 from statemachine.lab.identification.refinements import Refinement, tried_refinements
 from statemachine.lab.identification.residuals import Residuals
 from statemachine.lab.identification.results import FittedParameter, Hypothesis, RecordingRequest
@@ -227,7 +227,7 @@ def test_play_of_a_recording_is_found_and_nothing_false_is_determined(tmp_path):
     play = tuple((joint, PLAY) for joint in ("elbow_flex", "wrist_flex"))
     plan = Plan("play", seed=600, fault=Fault(play=play), seconds=5.0)
     write(make(plan), tmp_path / plan.name)
-    asked = asked_of(RecordingRequest(f"lerobot:{tmp_path / plan.name}", "so101"))
+    asked = recorded_arm_of(RecordingRequest(f"lerobot:{tmp_path / plan.name}", "so101"))
     fits = fitted_arm(asked, starts=2, seed=0).fits
     refinements = tried_refinements(fits)
     better = {each.hypothesis.name for each in refinements if each.fits_better}

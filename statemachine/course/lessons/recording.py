@@ -71,24 +71,27 @@ class ToldFigure:
     Attributes:
         kind: Which figure.
         joint: Of which joint; None where it is of the arm.
-        unit: Of all that follows but `information`.
-        model: The figure of the model.
+        model: The figure of the model, in `unit`; so are the other figures.
         fitted: That of the fit.
         low, high: Between what it is with 95 %.
-        information: Standard deviation after the fit by that before it: 1 where the recording
-            tells nothing.
+        posterior_by_prior: Standard deviation after the fit by that before it: 1 where the
+            recording tells nothing.
         truth: The figure that the recording was simulated with.
     """
 
     kind: Kind
     joint: str | None
-    unit: str
     model: float
     fitted: float
     low: float
     high: float
-    information: float
+    posterior_by_prior: float
     truth: float
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the figures."""
+        return UNITS[self.kind]
 
     @property
     def is_within(self) -> bool:
@@ -315,12 +318,11 @@ def _figures(end: Fit, residuals: Residuals) -> tuple[ToldFigure, ...]:
         figure = ToldFigure(
             kind=parameter.kind,
             joint=parameter.joint,
-            unit=UNITS[parameter.kind],
             model=parameter.model,
             fitted=parameter.figure(value),
             low=parameter.figure(value - width),
             high=parameter.figure(value + width),
-            information=deviation / parameter.prior.deviation,
+            posterior_by_prior=deviation / parameter.prior.deviation,
             truth=true_figure,
         )
         figures.append(figure)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...errors import DivergedError
 from ...interface import INPUTS, Array, Model, forward, make_data
 from ..recordings import Header, Trace
 from ..recordings.arm_recording import ArmRecording
@@ -63,10 +62,7 @@ def simulated_angles(
         figure = figures.get((parameter.kind, parameter.joint))
         if figure is not None:
             vector[place] = parameter.value(figure)
-    angles = ArmSimulation.of(parameters, recording).angles(vector)
-    if not np.isfinite(angles).all():
-        raise DivergedError("the simulation of the recorded commands diverges")
-    return angles
+    return ArmSimulation.of(parameters, recording).finite_angles(vector)
 
 
 def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: str) -> Trace:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import DivergedWarning
+from ...errors import DivergedError, DivergedWarning
 from ...interface import Array
 from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
@@ -112,6 +112,17 @@ class ArmSimulation:
         NaN where the simulation diverges.
         """
         return self.angles_of_each(vector[None])[0]
+
+    def finite_angles(self, vector: Array) -> Array:
+        """Return the same angles (K, n) [rad] where the simulation does not diverge.
+
+        Raises:
+            DivergedError: It does.
+        """
+        angles = self.angles(vector)
+        if not np.isfinite(angles).all():
+            raise DivergedError("the simulation of the recorded commands diverges")
+        return angles
 
     def angles_of_each(self, vectors: Array, with_error: bool = False) -> Array:
         """Return the angles (W, K, n) for each of several vectors (W, P).

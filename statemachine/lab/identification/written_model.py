@@ -30,7 +30,7 @@ from ...interface import Model
 from ...models import resolve
 from ..why.rewriting import RewrittenFile, changes_of, check_target, text_at
 from .parameter_texts import name_of_parameter
-from .recorded_gap import gap_elsewhere
+from .recorded_gap import gap_held_out
 from .results import FittedParameter, IdentificationResult, RecordingRequest
 
 _SUFFIXES = (".xml", ".mjcf")
@@ -109,7 +109,7 @@ class _FittedFile:
             good = [each for each in planned if _has(model.compiled, each.edits)]
             if len(good) < len(planned):
                 model = self._loaded(Path(part), good)
-        gap = gap_elsewhere(model, self._result.recordings)
+        gap = gap_held_out(model, self._result.recordings)
         for each in planned:
             if each not in good:
                 self._not_written.append(UnwrittenChange(each.name, _OTHERWISE))
