@@ -56,7 +56,7 @@ def fits_of(arm: ArmSimulation, true: np.ndarray) -> Fits:
     random = np.random.default_rng(0)
     angles = arm.angles(true)
     state = angles + random.normal(0.0, NOISE, angles.shape)
-    recording = replace(arm.recording, state=state, resolution=np.full(6, COUNT))
+    recording = replace(arm.recording, state=state)
     objective = objective_of(arm.parameters, recording, KINDS, NOISE)
     objective = replace(objective, fixed=true)
     best = fit(objective, true, derivatives="exact")

@@ -59,7 +59,6 @@ def recording(seconds: float = 1.0, episode: int = 3) -> ArmRecording:
         joints=SO101_JOINTS,
         action=action,
         state=np.concatenate([action[:1], action[:1], action[:-2]]),
-        resolution=np.full(6, COUNT),
         units=units(),
     )
 

@@ -18,7 +18,6 @@ from ...errors import DivergedError, DivergedWarning
 from ...interface import Array
 from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
-from ..recordings.unit_inference import COUNT
 from .parameters import ArmParameters
 from .play import behind_play
 
@@ -58,7 +57,6 @@ class ArmSimulation:
     def of_motion(cls, parameters: ArmParameters, action: Array, fps: float) -> ArmSimulation:
         """Return the simulation of commands (K, n) [rad] that start at rest."""
         at_rest = np.tile(action[:1], (len(action), 1))
-        resolution = np.full(action.shape[1], COUNT)
         recording = ArmRecording(
             source="",
             episode=0,
@@ -66,8 +64,6 @@ class ArmSimulation:
             joints=parameters.joints,
             action=action,
             state=at_rest,
-            resolution=resolution,
-            units=(),
         )
         return cls.of(parameters, recording)
 
