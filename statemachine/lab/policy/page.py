@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...measures.command_lines import folded_command
-from ...measures.text import percent, significant
+from ...measures.text import NO_NUMBER, percent, significant
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
 from .adapted import ContractChange
@@ -18,7 +18,6 @@ from .contract import AXES
 from .request import EngineWalks, PolicyResult, words_of_request
 from .walk import Walk
 
-_NO_NUMBER = "–"
 # What came of a run, and which way its worst speed is off.
 _WalkOutcome = Literal["falls", "diverges", "too slow", "too fast", "not asked"]
 
@@ -255,13 +254,13 @@ def _speeds(walk: Walk) -> list[str]:
 def speed_cells(walk: Walk) -> list[str]:
     """Return the speeds that a run reached, a cell each; dashes where it ended before."""
     if walk.reached is None:
-        return [_NO_NUMBER] * len(AXES)
+        return [NO_NUMBER] * len(AXES)
     return [f"{speed:z.2f}" for speed in walk.reached]
 
 
 def _details(walk: Walk) -> list[str]:
     """Return what a row of the details shows of a run."""
-    height = _NO_NUMBER if walk.height is None else f"{walk.height:.3f} m"
+    height = NO_NUMBER if walk.height is None else f"{walk.height:.3f} m"
     return [
         _outcome(walk),
         f"{walk.lateral:z.2f} m",
