@@ -37,7 +37,7 @@ def fitted_parameters(
     deviations = fits.deviations
     ratios = (deviations / objective.prior_deviations).tolist()
     values = fits.best.vector[objective.free]
-    low, high = _intervals(fits, deviations, refinements)
+    lows, highs = _intervals(fits, deviations, refinements)
     agree = _agree(fits, deviations)
     changed = _changed_by_reason(refinements, deviations)
     fitted: list[FittedParameter] = []
@@ -48,19 +48,20 @@ def fitted_parameters(
                 reasons.append(reason)
         motion = "" if ratios[place] < TELLS else _motion_for(place, fits, motions)
         parameter = objective.parameters.each[number]
-        fitted.append(
-            FittedParameter(
-                kind=parameter.kind,
-                joint=parameter.joint,
-                model=parameter.model,
-                fitted=parameter.figure(float(values[place])),
-                low=parameter.figure(float(low[place])),
-                high=parameter.figure(float(high[place])),
-                posterior_by_prior=ratios[place],
-                reasons=tuple(reasons),
-                motion=motion,
-            )
+        entries = (values[place], lows[place], highs[place])
+        figure, low, high = (parameter.figure(float(entry)) for entry in entries)
+        told = FittedParameter(
+            kind=parameter.kind,
+            joint=parameter.joint,
+            model=parameter.model,
+            fitted=figure,
+            low=low,
+            high=high,
+            posterior_by_prior=ratios[place],
+            reasons=tuple(reasons),
+            motion=motion,
         )
+        fitted.append(told)
     return tuple(fitted)
 
 

@@ -173,12 +173,14 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
         BadInputError: A command is one that no servo reaches.
     """
     _check_reach(arm, episode)
+    joints = tuple(unit.joint for unit in arm.units)
+    action = _angles(arm.sent(episode.action), arm.units)
     return ArmRecording(
         source=source,
         episode=episode.number,
         fps=arm.data_set.fps,
-        joints=tuple(unit.joint for unit in arm.units),
-        action=_angles(arm.sent(episode.action), arm.units),
+        joints=joints,
+        action=action,
         state=_angles(episode.state, arm.units),
         units=arm.units,
         robot=arm.data_set.robot,
