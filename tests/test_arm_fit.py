@@ -25,7 +25,8 @@ from statemachine.lab.identification.starts import (
     least_certain,
 )
 from statemachine.lab.identification.verdicts import fitted_parameters
-from tests.support.arm_fits import (
+
+from .support.arm_fits import (
     COUNT,
     SOFT,
     arm_parameters,

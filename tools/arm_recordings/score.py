@@ -95,7 +95,9 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
         if _is_changed(parameter, truth):
             continue
         of_vector = arm.parameters.each[place]
-        low, high = (of_vector.value(max(x, 1e-12)) for x in (parameter.low, parameter.high))
+        low, high = parameter.low, parameter.high
+        if of_vector.is_factor:
+            low, high = (of_vector.value(max(end, 1e-12)) for end in (low, high))
         each.append(
             ScoredParameter(
                 kind=parameter.kind,
@@ -105,9 +107,7 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
                 low=parameter.low,
                 high=parameter.high,
                 determined=parameter.verdict == "determined",
-                width=(high - low) / (_BAND * float(bound[place]))
-                if of_vector.is_factor
-                else (parameter.high - parameter.low) / (_BAND * float(bound[place])),
+                width=(high - low) / (_BAND * float(bound[place])),
             )
         )
     return ScoredRecording(

@@ -153,9 +153,9 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
 
 def _outcomes(fits: Fits) -> tuple[StartOutcome, ...]:
     """Return where each start ended, the best first."""
-    as_good = set(map(id, fits.as_good))
+    as_good = fits.as_good
     return tuple(
-        StartOutcome(cost=each.cost, as_good=id(each) in as_good, evaluations=each.evaluations)
+        StartOutcome(cost=each.cost, as_good=each in as_good, evaluations=each.evaluations)
         for each in fits.each
     )
 

@@ -158,11 +158,11 @@ def fits_from_starts(
     for number, end in enumerate(fits):
         others.append(gone_on(end.weighed(weighted), best))
         progress((starts + number + 2) / (2 * starts + 2))
-    every_one = _in_order([best, *others])
-    residuals = Residuals.of(every_one[0].errors, recording)
-    beside = informations_beside(every_one[0])
+    in_order = sorted([best, *others], key=_cost)
+    residuals = Residuals.of(in_order[0].errors, recording)
+    beside = informations_beside(in_order[0])
     progress(1.0)
-    return Fits(every_one, residuals, beside)
+    return Fits(tuple(in_order), residuals, beside)
 
 
 def gone_on(end: Fit, best: Fit) -> Fit:
@@ -185,7 +185,3 @@ def _better(end: Fit, further: Fit) -> Fit:
 
 def _cost(fit: Fit) -> float:
     return fit.cost
-
-
-def _in_order(fits: Sequence[Fit]) -> tuple[Fit, ...]:
-    return tuple(sorted(fits, key=_cost))

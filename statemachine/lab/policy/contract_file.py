@@ -191,20 +191,13 @@ def _term(
         raise parameters.error("lag", "the last action alone (1) can be observed")
     if parameters.has("index"):
         raise parameters.error("index", "terms are taken whole")
-    frame: Frame = "body"
-    site = ""
-    if term_id == "base_ang_vel":
-        frame, site = imu.frame, imu.site
-    if term_id in ("base_lin_vel", "base_ang_vel"):
-        frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
-        site = parameters.text("site", (), "") if parameters.has("site") else site
+    frame, site = _frame_and_site(term_id, parameters, imu)
     told = _told_joints(parameters, joints) if term_id in _OF_ENCODERS else ()
     reference: Array | None = None
     if term_id == "joint_pos_rel":
         reference = parameters.per_joint("default", told or joints)
         if reference is None:
-            order = [joints.index(joint) for joint in told or joints]
-            reference = default[order]
+            reference = default[[joints.index(joint) for joint in told or joints]]
     values: tuple[float, ...] = ()
     if term_id == "constant":
         values = tuple(parameters.numbers("value", dim).tolist())
@@ -220,6 +213,18 @@ def _term(
         clock=_clock(parameters) if term_id in _OF_CLOCK else None,
         values=values,
     )
+
+
+def _frame_and_site(term_id: TermId, parameters: ContractSection, imu: _Imu) -> tuple[Frame, str]:
+    """Return in which axes a velocity is told, and the site of its sensor; "" for the base."""
+    frame: Frame = "body"
+    site = ""
+    if term_id == "base_ang_vel":
+        frame, site = imu.frame, imu.site
+    if term_id in ("base_lin_vel", "base_ang_vel"):
+        frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
+        site = parameters.text("site", (), "") if parameters.has("site") else site
+    return frame, site
 
 
 def _told_joints(parameters: ContractSection, joints: Sequence[str]) -> tuple[str, ...]:
