@@ -17,12 +17,12 @@ from statemachine.lab.recordings import Trace, record
 from statemachine.lab.recordings.repetition import is_stale, put_row
 from statemachine.lab.runs.call_period import CallPeriods, call_periods, steps_of
 from statemachine.lab.runs.drive import check_length, drive, number_of_steps, progress_of_stage
+from statemachine.lab.runs.floor import has_floor
 from statemachine.lab.runs.interleaved_timing import Ratio, time_interleaved
 from statemachine.lab.runs.robot import (
     actuated_bodies,
     actuated_trees,
     carried_by,
-    has_floor,
     holding_force_size,
     target_towards_farther_end,
     warn_of_start,

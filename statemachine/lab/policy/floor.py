@@ -9,7 +9,7 @@ from ...errors import BadInputError
 from ...interface import Model
 from ...models import kind_of_path, models_dir
 from ..runs.floating import free_joint_of_base
-from ..runs.robot import has_floor
+from ..runs.floor import has_floor
 
 _GROUNDS: Final = ('"plane"', '"hfield"')
 

@@ -26,7 +26,6 @@ from ...interface.checks import check_entries
 from ...interface.options import OptionValue
 from ...measures import ContactNames
 from ...measures.text import few
-from .floating import free_joint_of_base
 
 # What `Model.replace` is given where no actuator acts, and where nothing touches anything, either.
 UNACTUATED: Mapping[str, OptionValue] = {"actuation": False}
@@ -40,35 +39,12 @@ SO101_JOINTS = (
     "wrist_roll",
     "gripper",
 )
-_PLANE, _HFIELD = 0, 1  # mjtGeom
 
 
 def is_so101(model: Model) -> bool:
     """Return whether the robot is an SO-101: its driven joints have those names, in order."""
     driven = model.actuator_jntid.tolist()
     return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == SO101_JOINTS
-
-
-def has_floor(model: Model) -> bool | None:
-    """Tell whether a robot can touch something that is no part of it and does not fall.
-
-    Beside a robot with a fixed base that is a plane or a height field: shapes of the world may be
-    its own base.
-
-    Returns:
-        None where the shapes of the model are not known.
-    """
-    compiled = model.compiled
-    if compiled is None:
-        return None
-    can_touch = (compiled.geom_contype != 0) | (compiled.geom_conaffinity != 0)
-    can_touch[compiled.pair_geom1] = True
-    can_touch[compiled.pair_geom2] = True
-    falling = carried_by(model, model.jnt_bodyid[model.jnt_type == JointType.FREE].tolist())
-    grounds = can_touch & ~np.isin(model.geom_bodyid, list(falling))
-    if free_joint_of_base(model) is None:
-        grounds &= np.isin(compiled.geom_type, (_PLANE, _HFIELD))
-    return bool(grounds.any())
 
 
 def scalar_joint(model: Model, name: str) -> tuple[int, int]:
