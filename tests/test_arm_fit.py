@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from statemachine.interface import Array
 from statemachine.lab.identification.fit import fit, starting_points
 from statemachine.lab.identification.hypotheses import tried_hypotheses, tried_reading
 from statemachine.lab.identification.identify import FittedArm, fitted_model
 from statemachine.lab.identification.motions import MOTIONS, middle_and_width, motion_informations
 from statemachine.lab.identification.parameters import ArmParameters
+from statemachine.lab.identification.recorded_gap import FitSplit
 from statemachine.lab.identification.residuals import Residuals
 from statemachine.lab.identification.shares import cause_shares, gap_of
 from statemachine.lab.identification.simulation import ArmSimulation
@@ -23,7 +25,8 @@ from statemachine.lab.identification.starts import (
     least_certain,
 )
 from statemachine.lab.identification.verdicts import fitted_parameters
-from tests.support.arm_fits import (
+
+from .support.arm_fits import (
     COUNT,
     SOFT,
     arm_parameters,
@@ -243,19 +246,24 @@ def test_what_a_recording_hardly_tells_makes_other_angles_uncertain(parameters, 
     for rate in (0.2, 2.0):
         motion = ArmSimulation.of_motion(parameters, swings(parameters, 2.0, rate), 30.0)
         angles = motion.angles(fits.best.vector)
-        arm = FittedArm(fits, motion, 0, angles, angles)
-        predicted.append(float(arm.predicted.max()))
+        predicted.append(float(of_held_out(fits, motion, angles).predicted().max()))
     assert predicted[0] < predicted[1]
 
 
 def test_of_the_last_frames_alone_only_these_count(parameters, fits):
     motion = ArmSimulation.of_motion(parameters, swings(parameters, 2.0), 30.0)
     angles = motion.angles(fits.best.vector)
-    whole = FittedArm(fits, motion, 0, angles, angles).predicted
-    last = FittedArm(fits, motion, 40, angles, angles).predicted
-    first = FittedArm(fits, replace_frames(motion, 40), 0, angles[:40], angles[:40]).predicted
+    whole = of_held_out(fits, motion, angles).predicted()
+    last = of_held_out(fits, motion, angles, first=40).predicted()
+    first = of_held_out(fits, replace_frames(motion, 40), angles[:40]).predicted()
     together = np.sqrt((40 * first**2 + 20 * last**2) / 60)
     assert together == pytest.approx(whole, rel=1e-6)
+
+
+def of_held_out(fits: Fits, motion: ArmSimulation, angles: Array, first: int = 0) -> FittedArm:
+    """Return a fitted arm whose held-out recording is a motion, from a frame on."""
+    split = FitSplit(motion.recording, motion.recording, first, "all")
+    return FittedArm(fits, motion, split, angles, angles)
 
 
 def replace_frames(motion: ArmSimulation, frames: int) -> ArmSimulation:
@@ -323,7 +331,7 @@ def test_of_a_vertical_axis_the_offset_is_not_told(parameters, recording):
     residuals = Residuals.of(best.errors, recording)
     said = fitted_parameters(Fits((best, best, best), residuals), True, ())
     of_pan = next(each for each in said if each.kind == "offset" and each.joint == "shoulder_pan")
-    assert of_pan.information == pytest.approx(1.0, abs=0.01)
+    assert of_pan.posterior_by_prior == pytest.approx(1.0, abs=0.01)
     assert of_pan.reasons == ("too little information",)
 
 

@@ -8,7 +8,8 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnknownNameError, UnsupportedError
 from statemachine.lab.identification.parameters import ArmParameters
-from tests.support.arm_fits import arm_parameters, vector
+
+from .support.arm_fits import arm_parameters, vector
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from statemachine.lab.identification.linear_refit import LinearRefit
 from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.play import behind_play
 from statemachine.lab.identification.play_profiles import play_profiles
-from statemachine.lab.identification.recorded_gap import asked_of
+from statemachine.lab.identification.recorded_gap import recorded_arm_of
 from statemachine.lab.identification.refinements import Refinement, tried_refinements
 from statemachine.lab.identification.residuals import Residuals
 from statemachine.lab.identification.results import FittedParameter, Hypothesis, RecordingRequest
@@ -21,7 +21,10 @@ from statemachine.lab.identification.simulation import ArmSimulation
 from statemachine.lab.identification.starts import Fits
 from statemachine.lab.identification.tilt import likeliest_tilt, tilted_gravity
 from statemachine.lab.identification.verdicts import fitted_parameters
-from tests.support.arm_fits import (
+from tools.arm_recordings.arm_truth import Fault
+from tools.arm_recordings.recordings import Plan, make, write
+
+from .support.arm_fits import (
     COUNT,
     FPS,
     SOFT,
@@ -30,8 +33,6 @@ from tests.support.arm_fits import (
     swings,
     vector,
 )
-from tools.arm_recordings.arm_truth import Fault
-from tools.arm_recordings.recordings import Plan, make, write
 
 pytest.importorskip("scipy")
 NOISE = 0.6 * COUNT
@@ -56,7 +57,7 @@ def fits_of(arm: ArmSimulation, true: np.ndarray) -> Fits:
     random = np.random.default_rng(0)
     angles = arm.angles(true)
     state = angles + random.normal(0.0, NOISE, angles.shape)
-    recording = replace(arm.recording, state=state, resolution=np.full(6, COUNT))
+    recording = replace(arm.recording, state=state)
     objective = objective_of(arm.parameters, recording, KINDS, NOISE)
     objective = replace(objective, fixed=true)
     best = fit(objective, true, derivatives="exact")
@@ -171,13 +172,21 @@ def friction_of(said: tuple[FittedParameter, ...], joint: str) -> FittedParamete
     return next(each for each in said if (each.kind, each.joint) == ("friction", joint))
 
 
-def test_friction_that_stands_in_for_play_is_not_determined(with_play, of_play, parameters):
+def test_without_trying_play_a_fit_is_sure_of_too_much_friction(with_play, parameters):
     as_it_is = friction_of(fitted_parameters(with_play, True, ()), "elbow_flex")
     figure = parameters.each[parameters.of_kind("friction")[ELBOW]].model
     assert as_it_is.verdict == "determined"
-    assert as_it_is.low > 1.5 * figure  # the fault: sure of what is false
+    assert as_it_is.low > 1.5 * figure
+
+
+def test_friction_that_stands_in_for_play_is_not_determined(with_play, of_play):
     tried = friction_of(fitted_parameters(with_play, True, (), of_play), "elbow_flex")
     assert tried.reasons == ("play fits as well",)
+
+
+def test_its_interval_reaches_to_the_friction_of_an_arm_with_play(with_play, of_play, parameters):
+    tried = friction_of(fitted_parameters(with_play, True, (), of_play), "elbow_flex")
+    figure = parameters.each[parameters.of_kind("friction")[ELBOW]].model
     assert tried.low < 1.2 * figure
 
 
@@ -221,43 +230,81 @@ def test_the_interval_reaches_to_what_play_makes_of_a_figure(clean):
     )
 
 
-@pytest.mark.slow
-def test_play_of_a_recording_is_found_and_nothing_false_is_determined(tmp_path):
+WITH_PLAY = ("elbow_flex", "wrist_flex")
+
+
+@pytest.fixture(scope="module")
+def fits_of_recording(tmp_path_factory) -> Fits:
+    """Return the fits of a recording of an arm with play at two joints."""
     pytest.importorskip("pyarrow")
-    play = tuple((joint, PLAY) for joint in ("elbow_flex", "wrist_flex"))
-    plan = Plan("play", seed=600, fault=Fault(play=play), seconds=5.0)
-    write(make(plan), tmp_path / plan.name)
-    asked = asked_of(RecordingRequest(f"lerobot:{tmp_path / plan.name}", "so101"))
-    fits = fitted_arm(asked, starts=2, seed=0).fits
-    refinements = tried_refinements(fits)
-    better = {each.hypothesis.name for each in refinements if each.fits_better}
-    assert better == {"play of elbow_flex", "play of wrist_flex"}
-    said = fitted_parameters(fits, True, (), refinements)
-    for joint, _ in play:
-        assert "play fits as well" in friction_of(said, joint).reasons
+    plan = Plan(
+        "play", seed=600, fault=Fault(play=tuple((joint, PLAY) for joint in WITH_PLAY)), seconds=5.0
+    )
+    folder = tmp_path_factory.mktemp("recorded") / plan.name
+    write(make(plan), folder)
+    arm = recorded_arm_of(RecordingRequest(f"lerobot:{folder}", "so101"))
+    return fitted_arm(arm, starts=2, seed=0).fits
+
+
+@pytest.mark.slow
+def test_play_of_a_recording_is_found(fits_of_recording):
+    tried = tried_refinements(fits_of_recording)
+    better = {each.hypothesis.name for each in tried if each.fits_better}
+    assert better == {f"play of {joint}" for joint in WITH_PLAY}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("joint", WITH_PLAY)
+def test_friction_is_not_determined_of_a_recording_with_play(fits_of_recording, joint):
+    refinements = tried_refinements(fits_of_recording)
+    said = fitted_parameters(fits_of_recording, True, (), refinements)
+    assert "play fits as well" in friction_of(said, joint).reasons
 
 
 # A tilted base.
 
 
-def test_gravity_of_a_tilted_base_is_as_strong_and_from_the_side_that_is_low():
+@pytest.mark.parametrize(
+    ("tilt", "expected"),
+    [
+        # Turned about y, the front (x) goes down, and gravity pulls to it.
+        ((0.0, 0.1), (10 * np.sin(0.1), 0.0, -10 * np.cos(0.1))),
+        ((0.1, 0.0), (0.0, -10 * np.sin(0.1), -10 * np.cos(0.1))),
+        ((0.0, 0.0), (0.0, 0.0, -10.0)),
+    ],
+)
+def test_gravity_of_a_tilted_base_is_as_strong_and_from_the_side_that_is_low(tilt, expected):
     level = np.array([0.0, 0.0, -10.0])
-    # Turned about y, the front (x) goes down, and gravity pulls to it.
-    expected = [10 * np.sin(0.1), 0.0, -10 * np.cos(0.1)]
-    assert tilted_gravity(level, np.array([0.0, 0.1])) == pytest.approx(expected)
-    expected = [0.0, -10 * np.sin(0.1), -10 * np.cos(0.1)]
-    assert tilted_gravity(level, np.array([0.1, 0.0])) == pytest.approx(expected)
-    assert np.array_equal(tilted_gravity(level, np.zeros(2)), level)
+    assert tilted_gravity(level, np.array(tilt)) == pytest.approx(expected)
 
 
-def test_a_tilted_base_is_found(motion, true, parameters):
-    tilt = np.radians([3.0, -4.0])
-    gravity = tilted_gravity(np.array(parameters.model.gravity), tilt)
-    fits = fits_of(replace(motion, gravity=gravity), true)
-    tried = tried_refinements(fits)
-    assert [each.hypothesis.name for each in tried if each.fits_better] == ["a tilted base"]
-    assert tried[-1].hypothesis.size == pytest.approx(np.radians(5.0), abs=np.radians(1.5))
-    found = likeliest_tilt(LinearRefit.of(fits.best)).angles
-    assert found[0] == pytest.approx(tilt[0], abs=np.radians(0.5))
-    said = fitted_parameters(fits, True, (), tried)
+TILT = np.radians([3.0, -4.0])
+
+
+@pytest.fixture(scope="module")
+def tilted(motion, true, parameters) -> Fits:
+    gravity = tilted_gravity(np.array(parameters.model.gravity), TILT)
+    return fits_of(replace(motion, gravity=gravity), true)
+
+
+@pytest.fixture(scope="module")
+def of_tilt(tilted) -> tuple[Refinement, ...]:
+    return tried_refinements(tilted)
+
+
+def test_a_tilted_base_alone_fits_better(of_tilt):
+    assert [each.hypothesis.name for each in of_tilt if each.fits_better] == ["a tilted base"]
+
+
+def test_how_far_a_base_is_tilted_is_found(of_tilt):
+    assert of_tilt[-1].hypothesis.size == pytest.approx(np.radians(5.0), abs=np.radians(1.5))
+
+
+def test_about_which_axis_a_base_is_tilted_is_found(tilted):
+    found = likeliest_tilt(LinearRefit.of(tilted.best)).angles
+    assert found[0] == pytest.approx(TILT[0], abs=np.radians(0.5))
+
+
+def test_what_a_tilted_base_changes_is_not_determined(tilted, of_tilt):
+    said = fitted_parameters(tilted, True, (), of_tilt)
     assert any("a tilted base fits as well" in each.reasons for each in said)

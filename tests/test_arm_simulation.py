@@ -10,7 +10,8 @@ import pytest
 import statemachine as sm
 from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.simulation import ArmSimulation
-from tests.support.arm_fits import COUNT, FPS, SOFT, arm_parameters, recording_of, swings, vector
+
+from .support.arm_fits import COUNT, FPS, SOFT, arm_parameters, recording_of, swings, vector
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import pytest
 from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.interface import Model
-from statemachine.lab.identification.recorded_gap import gap_elsewhere
+from statemachine.lab.identification.recorded_gap import gap_held_out
 from statemachine.lab.identification.results import IdentificationResult
 from statemachine.lab.identification.written_model import check_written, with_written
 from statemachine.lab.runs.robot import SO101_JOINTS
@@ -38,7 +38,7 @@ def written(result: IdentificationResult, target: Path, model: str | Path = "so1
     """Write the file of a result, and load it."""
     asked = replace(result.request, model=model, write=target)
     check_written(asked)
-    rewritten = with_written(replace(result, request=asked)).rewritten
+    rewritten = with_written(replace(result, request=asked, arm=load(model))).rewritten
     assert rewritten is not None
     return rewritten, load(target)
 
@@ -146,7 +146,7 @@ def test_the_file_is_played_on_what_was_not_fitted(
 ) -> None:
     nothing = with_verdicts(fitted.parameters, lambda _: False)
     as_it_is, _ = written(replace(fitted, parameters=nothing), tmp_path / "same.xml")
-    assert as_it_is.gap == gap_elsewhere(fitted.arm, fitted.recordings)
+    assert as_it_is.gap == gap_held_out(fitted.arm, fitted.recordings)
     changed, _ = written(fitted, tmp_path / "changed.xml")
     assert changed.gap != pytest.approx(as_it_is.gap, rel=0.01)
     assert changed.before == fitted.gap.model
@@ -158,7 +158,7 @@ def test_of_an_arm_without_servos_no_gap_is_told(
     text = ARM.read_text("utf-8").replace('meshdir="look"', f'meshdir="{ARM.parent}/look"')
     arm = tmp_path / "arm.xml"
     arm.write_text(text.replace("<position name=", "<velocity name="))
-    assert gap_elsewhere(load(arm), fitted.recordings) is None
+    assert gap_held_out(load(arm), fitted.recordings) is None
 
 
 def test_nothing_is_written_where_that_is_not_asked(fitted: IdentificationResult) -> None:

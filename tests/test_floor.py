@@ -244,7 +244,7 @@ def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
 
 def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 2.0, qpos=np.array([2.5, 1.0]))
-    trace = run.record(derive=False)
+    trace = run.record(derived="nothing")
     ruler = Ruler(match_models(run.model, run.model), trace, trace)
     curves: Any = ruler.curves(trace)
     again = [*map(ruler.curves, perturbed_runs(run, derive=False))]

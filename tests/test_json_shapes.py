@@ -24,6 +24,12 @@ from .support.requirements import ROOT, need_engine
 TABLE = Path(__file__).with_suffix(".json")
 MAY_BE_NULL = {"data_bytes", "world_bytes"}  # memory grows by pages, and freed ones are used again
 ITSELF = "--backend mujoco --backend mujoco --seconds 0.2"
+QUADRUPED = ROOT / "models" / "quadruped"
+OTHER_CONTRACT = "world_gyro.yaml"  # written beside the command that names it
+POLICY = (
+    "policy {ROOT}/models/quadruped/policy.onnx quadruped/scene --contract "
+    "{ROOT}/models/quadruped/contract.yaml --backend mujoco --seconds 0.4"
+)
 COMMANDS = [
     *(shlex.join(("lesson", name, *QUICK.get(name, ()))) for name in LESSONS),
     "doctor",
@@ -46,11 +52,18 @@ COMMANDS = [
     "check --faults {ROOT}/exercises/test_arm.py --only xyzw",
     "robots {ROOT}/models/so101/so101.xml --quick",
     "sweep droop --vary damping=0.5,0.6 --seconds 0.1 --backend mujoco --out swept",
+    f"{POLICY} --command 3,0,0",
+    f"{POLICY} --faults",
+    f"{POLICY} --against {OTHER_CONTRACT}",
 ]
 
 
 def _said(command: str, folder: str | Path) -> Any:
     words = shlex.split(command.format(ROOT=ROOT))
+    if OTHER_CONTRACT in words:
+        contract = (QUADRUPED / "contract.yaml").read_text("utf-8")
+        other = contract.replace("frame: body", "frame: world")
+        (Path(folder) / OTHER_CONTRACT).write_text(other, "utf-8")
     done = of_python("-m", "statemachine", *words, "--json", folder=Path(folder))
     assert done.returncode in (0, 1), done.stderr
     return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
@@ -122,6 +135,8 @@ def test_objects_with_the_same_keys_are_one_shape() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_json_of_a_command_has_its_keys_and_types(command: str, tmp_path: Path) -> None:
     need_engine("pinocchio")  # without, what a witness says is null
+    if command.startswith(POLICY):
+        pytest.importorskip("onnxruntime")
     assert shape(_said(command, tmp_path)) == json.loads(TABLE.read_text("utf-8"))[command]
 
 

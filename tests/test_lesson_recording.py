@@ -114,9 +114,9 @@ def test_figures_are_near_the_truth_with_everything_fitted(result: RecordingLess
 
 def test_gravity_does_not_see_the_vertical_axis(result: RecordingLessonResult) -> None:
     pan = result.figure("offset", "shoulder_pan")
-    assert pan.information == pytest.approx(1.0, abs=1e-6)
+    assert pan.posterior_by_prior == pytest.approx(1.0, abs=1e-6)
     assert pan.fitted == pytest.approx(0.0, abs=1e-6)
-    assert result.figure("offset", "shoulder_lift").information < 0.3
+    assert result.figure("offset", "shoulder_lift").posterior_by_prior < 0.3
 
 
 def test_the_truth_is_that_of_each_figure(result: RecordingLessonResult) -> None:
@@ -158,7 +158,7 @@ def _with_information(result: RecordingLessonResult, place: int) -> Any:
         if (figure.kind, figure.joint) not in choices:
             return figure
         is_untold = choices.index((figure.kind, figure.joint)) == place
-        return replace(figure, information=0.9 if is_untold else 0.01)
+        return replace(figure, posterior_by_prior=0.9 if is_untold else 0.01)
 
     return replace(result, figures=tuple(map(changed, result.figures)))
 

@@ -168,7 +168,7 @@ def test_smaller_pictures_are_means() -> None:
 @pytest.mark.usefixtures("matplotlib")
 def test_a_film_of_too_many_pictures_is_refused(ball: Path) -> None:
     model = sm.load(ball)
-    sides = [record(model, seconds=167.0, derive=False)], [model]
+    sides = [record(model, seconds=167.0, derived="nothing")], [model]
     film = partial(write_film, ball.with_name("a.webp"), *sides, probe.Renderer("mujoco"))
     refused((BadInputError, "5010 pictures; at most 5000: lower --seconds", film))
 

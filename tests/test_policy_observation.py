@@ -313,13 +313,6 @@ def test_before_the_reset_stands_the_first_moment_or_zeros(
     assert Stack(History(3, init=init)).add(moment(1)).tolist() == expected
 
 
-def test_a_reset_forgets_all_moments() -> None:
-    stack = Stack(History(3))
-    stack.add(moment(1))
-    stack.reset()
-    assert stack.add(moment(2)).tolist() == [2, 2.5, 2, 2.5, 2, 2.5, -2, -2, -2]
-
-
 def test_a_history_of_one_is_the_present() -> None:
     stack = Stack(History(1, init="zeros"))
     stack.add(moment(1))

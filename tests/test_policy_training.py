@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from statemachine.lab.policy import contract_file
+from statemachine.lab.policy.observation import Observer, RobotState
 from tools.policy_training.__main__ import CONTRACT, POLICY
 from tools.policy_training.contract import read_contract
 from tools.policy_training.evolution import Evolution
 from tools.policy_training.faults import STRAIGHT, TURNING, outcome
 from tools.policy_training.gait import GAINS, network_of
 from tools.policy_training.network import Network, write_onnx
-from tools.policy_training.observation import FAULTS, Fault
+from tools.policy_training.observation import FAULTS, Fault, Seen, observe
 from tools.policy_training.stored import read_gains, write_gains
 from tools.policy_training.training import search
 from tools.policy_training.walking import Walked, change
@@ -37,6 +39,31 @@ def test_the_file_computes_what_the_gains_say(network: Network) -> None:
     for row in observations.astype(np.float32):
         (actions,) = session.run(None, {"obs": row[None]})
         assert actions[0] == pytest.approx(network.actions(row), abs=1e-4)
+
+
+def test_training_observes_what_the_product_observes() -> None:
+    draw = np.random.default_rng(0)
+    n, calls = 12, 7
+    qpos, qvel = draw.normal(size=(n, 19)), draw.normal(size=(n, 18))
+    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1)[:, None]
+    command, last = draw.normal(size=(n, 3)), draw.normal(size=(n, 12))
+    joints = draw.permutation(12)
+    phase = 2 * np.pi * calls * THE_CONTRACT.policy_dt / THE_CONTRACT.period
+    seen = observe(THE_CONTRACT, Seen(qpos, qvel, command, last, phase, joints))
+    observer = Observer.of(contract_file.read_contract(CONTRACT), {})
+    for row in range(n):
+        state = RobotState(
+            quat=qpos[row, 3:7],
+            lin_vel=qvel[row, :3],
+            ang_vel=qvel[row, 3:6],
+            joint_pos=qpos[row, 7 + joints],
+            joint_vel=qvel[row, 6 + joints],
+            command=command[row],
+            last_action=last[row],
+            calls=calls,
+        )
+        expected = np.concatenate([*observer.values(state).values()])
+        assert seen[row] == pytest.approx(expected, abs=1e-12)
 
 
 def test_the_file_is_written_again_byte_by_byte(network: Network, tmp_path: Path) -> None:

@@ -242,6 +242,13 @@ def test_a_floor_is_whatever_else_can_be_touched(tmp_path: Path, floor: str) -> 
     check_floor(load(on_floor(tmp_path, floor)))
 
 
+def test_what_falls_with_a_robot_is_no_floor(tmp_path: Path) -> None:
+    need_engine("mujoco")
+    box = '<body pos="9 0 1"><freejoint/><geom type="box" size="1 1 1"/></body>'
+    with pytest.raises(BadInputError, match="no floor"):
+        check_floor(load(on_floor(tmp_path, box)))
+
+
 def test_a_floor_is_what_a_pair_of_contacts_names(tmp_path: Path) -> None:
     need_engine("mujoco")
     file = on_floor(tmp_path, PLANE.replace("/>", ' contype="0" conaffinity="0"/>'))

@@ -214,7 +214,7 @@ def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Mo
     from statemachine.lab.compare.matching import match_models
     from statemachine.lab.why.gap import Ruler
 
-    short = record(mujoco_arm, seconds=0.1, derive=False)
+    short = record(mujoco_arm, seconds=0.1, derived="nothing")
     time = np.arange(60_000) * 0.005
     columns = {n: np.repeat(short[n][:1], len(time), axis=0) for n in ("qpos", "qvel", "ctrl")}
     long = Trace(short.header, {**columns, "time": time})

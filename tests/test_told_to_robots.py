@@ -17,12 +17,12 @@ from statemachine.lab.recordings import Trace, record
 from statemachine.lab.recordings.repetition import is_stale, put_row
 from statemachine.lab.runs.call_period import CallPeriods, call_periods, steps_of
 from statemachine.lab.runs.drive import check_length, drive, number_of_steps, progress_of_stage
+from statemachine.lab.runs.floor import has_floor
 from statemachine.lab.runs.interleaved_timing import Ratio, time_interleaved
 from statemachine.lab.runs.robot import (
     actuated_bodies,
     actuated_trees,
     carried_by,
-    has_floor,
     holding_force_size,
     target_towards_farther_end,
     warn_of_start,
@@ -212,11 +212,23 @@ def test_what_an_actuator_carries_is_below_its_joint(tmp_path: Path) -> None:
         ('type="plane" size="1 1 1" contype="0"', True),
         ('type="plane" size="1 1 1" conaffinity="0"', True),
         ('type="plane" size="1 1 1" contype="0" conaffinity="0"', False),
-        ('type="box" size="1 1 1"', False),
+        ('type="box" size="1 1 1"', True),
     ],
 )
-def test_a_floor_is_a_plane_that_can_be_touched(tmp_path: Path, geom: str, is_floor: bool) -> None:
+def test_a_floor_is_what_stands_still_and_can_be_touched(
+    tmp_path: Path, geom: str, is_floor: bool
+) -> None:
     body = '<body pos="0 0 3"><freejoint/><geom size="0.1"/></body>'
+    assert has_floor(loaded(tmp_path, f"<geom {geom}/>{body}")) is is_floor
+
+
+@pytest.mark.parametrize(
+    ("geom", "is_floor"), [('type="plane" size="1 1 1"', True), ('type="box" size="1 1 1"', False)]
+)
+def test_a_box_beside_a_fixed_robot_may_be_its_base(
+    tmp_path: Path, geom: str, is_floor: bool
+) -> None:
+    body = '<body pos="0 0 3"><joint/><geom size="0.1"/></body>'
     assert has_floor(loaded(tmp_path, f"<geom {geom}/>{body}")) is is_floor
 
 

@@ -106,9 +106,9 @@ def test_derived_columns_are_of_the_state_of_their_row(
 def test_what_is_read_as_a_run_goes_is_that_of_its_repetition(backend: str) -> None:
     model = sm.load("so101/scene_box", backend=backend)
     run = rerun_of(SCENARIOS["box"], model, seconds=0.2)
-    repeated, at_once = run.record(), run.record(derive="at once")
+    repeated, read_along = run.record(), run.record(derived="run")
     assert len(repeated["contact_row"])
-    assert same(at_once, repeated)
+    assert same(read_along, repeated)
 
 
 def test_contacts_are_those_of_the_step(box: Trace) -> None:

@@ -198,8 +198,9 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
 
 def test_a_session_refuses_what_does_not_fit(mujoco_scene: sm.Model, odd: sm.Model) -> None:
     one, other, bare = (
-        record(model, seconds=0.05, derive=derive)
-        for model, derive in ((mujoco_scene, True), (odd, True), (mujoco_scene, False))
+        record(mujoco_scene, seconds=0.05),
+        record(odd, seconds=0.05),
+        record(mujoco_scene, seconds=0.05, derived="nothing"),
     )
     refused(
         (TraceError, "another model", lambda: TraceSession([one, other])),

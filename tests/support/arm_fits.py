@@ -49,8 +49,7 @@ def recording_of(
     blank = ArmSimulation.of_motion(parameters, action, FPS)
     angles = blank.angles(true)
     angles = angles + np.random.default_rng(seed).normal(0.0, noise, angles.shape)
-    resolution = np.full(len(parameters.joints), COUNT)
-    return replace(blank.recording, state=angles, resolution=resolution)
+    return replace(blank.recording, state=angles)
 
 
 def objective_of(

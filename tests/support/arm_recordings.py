@@ -11,9 +11,7 @@ import numpy as np
 from statemachine import load
 from statemachine.interface import Array, Model
 from statemachine.lab.identification.results import (
-    CAUSE_OF,
     CAUSES,
-    UNITS,
     CauseShare,
     FittedParameter,
     Hypothesis,
@@ -61,7 +59,6 @@ def recording(seconds: float = 1.0, episode: int = 3) -> ArmRecording:
         joints=SO101_JOINTS,
         action=action,
         state=np.concatenate([action[:1], action[:1], action[:-2]]),
-        resolution=np.full(6, COUNT),
         units=units(),
     )
 
@@ -101,8 +98,6 @@ def recording_result() -> RecordingResult:
     return RecordingResult(
         request=request(),
         provenance=provenance(arm),
-        units=units(),
-        fps=FPS,
         gap=gap(fitted=False),
         recordings=ArmRecordings(recording(), None),
         arm=arm,
@@ -117,14 +112,11 @@ def parameter(
     return FittedParameter(
         kind=kind,
         joint=joint,
-        cause=CAUSE_OF[kind],
-        unit=UNITS[kind],
         model=model,
         fitted=fitted,
         low=fitted - half,
         high=fitted + half,
-        information=0.05 if determined else 0.9,
-        verdict="determined" if determined else "cannot tell",
+        posterior_by_prior=0.05 if determined else 0.9,
         reasons=() if determined else ("too little information",),
         motion="" if determined else "a slow chirp of shoulder_lift",
     )
@@ -155,7 +147,6 @@ def with_verdicts(
         found.append(
             replace(
                 each,
-                verdict="determined" if determined else "cannot tell",
                 reasons=() if determined else ("residual above the floor",),
                 motion="" if determined else each.motion,
             )
@@ -182,8 +173,6 @@ def identification_result(**others: object) -> IdentificationResult:
     result = IdentificationResult(
         request=request(),
         provenance=provenance(arm),
-        units=units(),
-        fps=FPS,
         fitted_gap=gap(fitted=True),
         gap=gap(fitted=True, episode=4),
         residual=math.radians(0.057),

@@ -22,7 +22,7 @@ import numpy as np
 from statemachine.lab.identification.fit import Objective
 from statemachine.lab.identification.identify import fitted_arm
 from statemachine.lab.identification.parameters import ArmParameters, Parameter
-from statemachine.lab.identification.recorded_gap import asked_of
+from statemachine.lab.identification.recorded_gap import recorded_arm_of
 from statemachine.lab.identification.refinements import tried_refinements
 from statemachine.lab.identification.results import FEWEST_STARTS, FittedParameter, RecordingRequest
 from statemachine.lab.identification.verdicts import fitted_parameters
@@ -82,20 +82,22 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
     """Fit a recording, and hold what is said against its truth."""
     truth = json.loads((folder / "truth.json").read_text())
     began = time.process_time()
-    asked = asked_of(RecordingRequest(f"lerobot:{folder}", "so101"))
-    fitted = fitted_arm(asked, starts, seed=0)
-    holds = fitted.holds
+    arm = recorded_arm_of(RecordingRequest(f"lerobot:{folder}", "so101"))
+    fitted = fitted_arm(arm, starts, seed=0)
+    holds = fitted.holds()
     parameters = fitted_parameters(fitted.fits, holds, (), tried_refinements(fitted.fits))
     seconds = time.process_time() - began
     best = fitted.fits.best.objective
-    true = _true_vector(asked.parameters, truth)
+    true = _true_vector(arm.parameters, truth)
     bound = _bound(best, true)
     each: list[ScoredParameter] = []
     for place, parameter in enumerate(parameters):
         if _is_changed(parameter, truth):
             continue
-        of_vector = asked.parameters.each[place]
-        low, high = (of_vector.value(max(x, 1e-12)) for x in (parameter.low, parameter.high))
+        of_vector = arm.parameters.each[place]
+        low, high = parameter.low, parameter.high
+        if of_vector.is_factor:
+            low, high = (of_vector.value(max(end, 1e-12)) for end in (low, high))
         each.append(
             ScoredParameter(
                 kind=parameter.kind,
@@ -105,9 +107,7 @@ def scored(folder: Path, starts: int = FEWEST_STARTS) -> ScoredRecording:
                 low=parameter.low,
                 high=parameter.high,
                 determined=parameter.verdict == "determined",
-                width=(high - low) / (_BAND * float(bound[place]))
-                if of_vector.is_factor
-                else (parameter.high - parameter.low) / (_BAND * float(bound[place])),
+                width=(high - low) / (_BAND * float(bound[place])),
             )
         )
     return ScoredRecording(

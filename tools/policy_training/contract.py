@@ -1,4 +1,4 @@
-"""The part of the contract that training needs, read from contract.yaml."""
+"""The part of a contract that training needs, as arrays over all terms of the observation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
+
+from statemachine.lab.policy import contract_file
 
 from .network import Floats
 
@@ -15,7 +16,15 @@ from .network import Floats
 class Contract:
     """What the policy sees and does: names and figures in the order of the policy.
 
-    `default` and `action_scale` (n_act,) [rad]; `term_scale` (n_obs,); `terms` with their sizes.
+    Attributes:
+        joint_names: Of the n_act joints that it drives.
+        default: (n_act,) angles where it starts [rad].
+        action_scale: (n_act,) [rad].
+        terms: Of the observation: each with its size.
+        term_scale: (n_obs,) by which each number of the observation is multiplied.
+        policy_dt: From one call to the next [s].
+        decimation: Steps of the engine between two calls.
+        period: Of the clock [s].
     """
 
     joint_names: tuple[str, ...]
@@ -43,20 +52,17 @@ class Contract:
 
 
 def read_contract(path: Path) -> Contract:
-    """Return the contract of a file."""
-    page = yaml.safe_load(path.read_text())
-    names = page["policy_io"]["joints"]["names"]
-    terms = page["policy_io"]["observation_groups"]["policy"]["terms"]
-    scales = [value for term in terms for value in term["scale"]]
-    control = page["control"]
-    [clock] = [term for term in terms if term["id"] == "gait_phase"]
+    """Return the contract of a file, which has one clock."""
+    contract = contract_file.read_contract(path)
+    [clock] = [term.clock for term in contract.terms if term.clock is not None]
+    assert contract.timing.decimation is not None
     return Contract(
-        joint_names=tuple(names),
-        default=np.array([control["default_joint_pos"][name] for name in names]),
-        action_scale=np.array([control["actions"]["joint_pos"]["scale"][name] for name in names]),
-        terms=tuple((term["id"], term["dim"]) for term in terms),
-        term_scale=np.array(scales),
-        policy_dt=page["timing"]["policy_dt"],
-        decimation=page["timing"]["decimation"],
-        period=clock["params"]["period"],
+        joint_names=contract.joints,
+        default=contract.default_joint_pos,
+        action_scale=contract.action.scale,
+        terms=tuple((term.id, term.dim) for term in contract.terms),
+        term_scale=np.concatenate([term.scale for term in contract.terms]),
+        policy_dt=contract.timing.policy_dt,
+        decimation=contract.timing.decimation,
+        period=clock.period,
     )

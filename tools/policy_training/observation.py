@@ -1,4 +1,8 @@
-"""What the policy sees, and the ways in which somebody else can get that wrong."""
+"""What many robots see at once, and the ways in which somebody else can get that wrong.
+
+The product computes the same of one robot (`statemachine.lab.policy.observation`), in a Python loop
+that takes half as long as the simulation. A test holds the two together.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +20,13 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Fault:
     """One way to run a policy against its contract.
 
-    `wrong` names what is wrong with the observation; `delay` counts policy steps; `decimation`,
-    `clock` and `action` are factors.
+    Attributes:
+        name: What is printed.
+        wrong: What is wrong with the observation; "" for nothing.
+        delay: Calls of the policy by which an action acts late.
+        decimation: Factor of the steps between two calls.
+        clock: Factor of the speed of the clock.
+        action: Factor of the action.
     """
 
     name: str
@@ -45,7 +54,7 @@ FAULTS = (
     Fault("action × 4", action=4.0),
     Fault("delay of 1 step", delay=1),
     Fault("delay of 2 steps", delay=2),
-    Fault("decimation halved", decimation=0.4),  # 2 steps for 5
+    Fault("decimation halved", decimation=0.4),  # 2 steps instead of 5
     Fault("decimation doubled", decimation=2.0),
 )
 
@@ -54,9 +63,13 @@ FAULTS = (
 class Seen:
     """What the observations of n robots are made of.
 
-    `qpos` (n, 19), `qvel` (n, 18) in the model's order; `command` (n, 3) [m/s, m/s, rad/s];
-    `last` (n, 12), the raw actions; `phase` [rad] of the clock; `joints` (12,), the model's number
-    of each joint of the policy.
+    Attributes:
+        qpos: (n, 19) in the model's order [m, rad].
+        qvel: (n, 18) in the model's order [m/s, rad/s].
+        command: (n, 3) speeds that are asked for [m/s, m/s, rad/s].
+        last: (n, 12) actions of the call before, as the network gave them.
+        phase: Of the clock [rad].
+        joints: (12,) the model's number of each joint of the policy.
     """
 
     qpos: Floats
@@ -68,7 +81,11 @@ class Seen:
 
 
 def rotation(quaternions: Floats) -> Floats:
-    """Return the rotation matrices (n, 3, 3), body to world, of quaternions (n, 4) wxyz."""
+    """Return the rotation matrices (n, 3, 3), body to world, of quaternions (n, 4) wxyz.
+
+    `statemachine.rotations` has other last bits, and a robot that a fault makes stumble falls
+    elsewhere by them: the gains that are stored were searched with these.
+    """
     w, x, y, z = quaternions.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

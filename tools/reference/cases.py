@@ -69,6 +69,11 @@ class Case:
     arguments: tuple[str, ...]
     writes: str = ""
 
+    @property
+    def is_lesson(self) -> bool:
+        """Tell whether it takes a lesson."""
+        return self.kind.startswith("lesson ")
+
 
 def of_model(model: str) -> Iterator[Case]:
     """Yield every question about a model, on both engines."""
@@ -79,8 +84,6 @@ def of_model(model: str) -> Iterator[Case]:
         case = f"lesson {name}"
         command = ("lesson", name, "--model", path, *both, *_LENGTHS.get(name, ()))
         yield Case(case, case, (*command, "--json"))
-        if name not in {"summary", "time"}:
-            yield Case(f"{case}, marks", "", (*command, "--no-questions"))
     for name in () if model in _NOT_RECORDED else _RECORDED:
         files: list[str] = []
         for engine in ("mujoco", "pybullet"):

@@ -12,15 +12,18 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
 from statemachine.cli import main as statemachine
-from statemachine.course.lessons import request as lesson_requests
-from statemachine.course.lessons.session import LessonRun
+from statemachine.cli import options_of_words
+from statemachine.cli.common import BAD_INPUT, SAYS_NO
+from statemachine.cli.lesson import request_of
+from statemachine.cli.lesson_taken import take_lesson
+from statemachine.errors import StateMachineError
 from statemachine.installed import ENGINES, WITNESS, engine_version
+from statemachine.show.as_json import dumps
+from statemachine.show.page_text import text_of
 
 from . import questions
 from .cases import HERE, MODELS, PAIRS, ROOT, Case, of_model, of_pair
@@ -30,6 +33,7 @@ KEPT = HERE / "figures"
 # In `make test`.
 QUICK = ("pair damping", "worlds")
 _BACKENDS = ("mujoco", "pybullet")
+_WITHOUT_MARKS = {"lesson summary", "lesson time"}
 
 
 def machine() -> dict[str, str]:
@@ -59,21 +63,29 @@ def _of(case: Case) -> Figures:
     return figures
 
 
+def _of_lesson(case: Case) -> dict[str, Figures]:
+    """Return the figures of a lesson's JSON, and the marks on the page of the same run."""
+    try:
+        with contextlib.redirect_stderr(io.StringIO()):
+            page, results = take_lesson(request_of(options_of_words(list(case.arguments))))
+    except StateMachineError:
+        of_json: Figures = {"exit code": BAD_INPUT}
+        marks: Figures = {"exit code": BAD_INPUT}
+    else:
+        code = 0 if page.holds else SAYS_NO
+        of_json = {"exit code": code, **of_output(dumps(results), case.kind)}
+        marks = {"exit code": code, **of_output(text_of(page), "")}
+    figures = {case.name: of_json}
+    if case.name not in _WITHOUT_MARKS:
+        figures[f"{case.name}, marks"] = marks
+    return figures
+
+
 def _commands(cases: Callable[..., Iterable[Case]], *of: str) -> dict[str, Figures]:
-    return {case.name: _of(case) for case in cases(*of)}
-
-
-def _of_robot(model: str) -> dict[str, Figures]:
-    """Return the figures of a model; the marks of a lesson are those of the run of its JSON."""
-    answer, taken = lesson_requests.answer, dict[str, dict[str, LessonRun]]()
-
-    def answered(request: lesson_requests.LessonRequest, *others: Any) -> dict[str, LessonRun]:
-        if request.name not in taken:
-            taken[request.name] = answer(request, *others)
-        return taken[request.name]
-
-    with patch.object(lesson_requests, "answer", answered):
-        return _commands(of_model, model)
+    figures: dict[str, Figures] = {}
+    for case in cases(*of):
+        figures |= _of_lesson(case) if case.is_lesson else {case.name: _of(case)}
+    return figures
 
 
 def _engines() -> dict[str, Figures]:
@@ -115,7 +127,7 @@ GROUPS: dict[str, Callable[[], dict[str, Figures]]] = {
     "sweep": _sweep,
     "students": _students,
     **{f"pair {name}": partial(_commands, of_pair, name) for name in PAIRS},
-    **{name: partial(_of_robot, name) for name in MODELS},
+    **{name: partial(_commands, of_model, name) for name in MODELS},
 }
 
 

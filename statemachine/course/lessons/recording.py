@@ -15,7 +15,7 @@ from ...lab.identification.fit import Fit, Objective
 from ...lab.identification.fit import fit as fit_objective
 from ...lab.identification.parameters import ArmParameters
 from ...lab.identification.recorded_gap import gap_between
-from ...lab.identification.residuals import Residuals, root_mean_square
+from ...lab.identification.residuals import QUANTILE, Residuals, root_mean_square
 from ...lab.identification.results import CAUSES, UNITS, Cause, Kind
 from ...lab.identification.simulation import ArmSimulation
 from ...lab.identification.starts import Fits, first_objective, informations_beside
@@ -35,7 +35,6 @@ READINGS: tuple[tuple[Cause, ...], ...] = (("delay",), ("gains",), ("delay", "ga
 _DELAYS = tuple(np.arange(0.0, 0.21, 0.02).tolist())  # [s] from which fits start
 _STIFFNESS = (0.0, -1.0, -2.0, -3.0, -4.0)  # logarithms of the factor of all gains, likewise
 _NOT_IN_JSON = {"json": False}
-_QUANTILE = 1.96  # of the normal distribution, for 95 %
 _RUNS = 12  # simulations of a fit, without those for derivatives
 _TOLERANCE = 1e-2  # part by which the sum of squares falls at least, or a fit ends
 _SHARE_OF_CODE = 0.05  # of the time that the lesson takes
@@ -72,24 +71,27 @@ class ToldFigure:
     Attributes:
         kind: Which figure.
         joint: Of which joint; None where it is of the arm.
-        unit: Of all that follows but `information`.
-        model: The figure of the model.
+        model: The figure of the model, in `unit`; so are the other figures.
         fitted: That of the fit.
         low, high: Between what it is with 95 %.
-        information: Standard deviation after the fit by that before it: 1 where the recording
-            tells nothing.
+        posterior_by_prior: Standard deviation after the fit by that before it: 1 where the
+            recording tells nothing.
         truth: The figure that the recording was simulated with.
     """
 
     kind: Kind
     joint: str | None
-    unit: str
     model: float
     fitted: float
     low: float
     high: float
-    information: float
+    posterior_by_prior: float
     truth: float
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the figures."""
+        return UNITS[self.kind]
 
     @property
     def is_within(self) -> bool:
@@ -311,17 +313,16 @@ def _figures(end: Fit, residuals: Residuals) -> tuple[ToldFigure, ...]:
     figures: list[ToldFigure] = []
     for number, deviation in zip(objective.free.tolist(), deviations.tolist(), strict=True):
         parameter = objective.parameters.each[number]
-        value, width = float(end.vector[number]), _QUANTILE * deviation
+        value, width = float(end.vector[number]), QUANTILE * deviation
         true_figure = _true_figure(truth, parameter.kind, parameter.joint)
         figure = ToldFigure(
             kind=parameter.kind,
             joint=parameter.joint,
-            unit=UNITS[parameter.kind],
             model=parameter.model,
             fitted=parameter.figure(value),
             low=parameter.figure(value - width),
             high=parameter.figure(value + width),
-            information=deviation / parameter.prior.deviation,
+            posterior_by_prior=deviation / parameter.prior.deviation,
             truth=true_figure,
         )
         figures.append(figure)

@@ -133,12 +133,12 @@ class RecordingLessonPage(PageContent):
     @property
     def least(self) -> int:
         """Return the number of the choice that the recording tells least of."""
-        return int(np.argmax([figure.information for figure in self._of_choices()]))
+        return int(np.argmax([figure.posterior_by_prior for figure in self._of_choices()]))
 
     @property
     def right_undetermined(self) -> int | None:
         """Return the number of the right choice: what the recording cannot tell."""
-        return self.least if self.blind.information > _TOLD else None
+        return self.least if self.blind.posterior_by_prior > _TOLD else None
 
     def _of_choices(self) -> list[ToldFigure]:
         return [self.result.figure(kind, joint) for kind, joint in ASKED]
@@ -161,12 +161,12 @@ class RecordingLessonPage(PageContent):
     @property
     def pan_is_undetermined(self) -> bool:
         """Tell whether the recording tells nothing of the offset of the vertical axis."""
-        return self.result.figure("offset", "shoulder_pan").information > 0.99
+        return self.result.figure("offset", "shoulder_pan").posterior_by_prior > 0.99
 
     @property
     def lift_is_told(self) -> bool:
         """Tell whether it tells the offset of a joint that carries weight."""
-        return self.lift.information < _TOLD
+        return self.lift.posterior_by_prior < _TOLD
 
     @property
     def lift(self) -> ToldFigure:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from ...errors import BadInputError
 from ...models import AnyPath
@@ -32,8 +33,8 @@ def recording(
         lab.recording("lerobot:pushes#3", "so101").gap.model
 
     Args:
-        source: "lerobot:DIR#EPISODE", a data set of LeRobot; without "#EPISODE" episode 0. Or a
-            RecordingRequest, which says all that is asked.
+        source: "lerobot:DIR#EPISODE", a data set of LeRobot; without "#EPISODE" its first
+            episode. Or a RecordingRequest, which says all that is asked.
         model: A name or a file of the arm.
         calibration: LeRobot's calibration file; None to take unit and scale from the numbers.
         names: Joints of the recording by the names that they have in the model.
@@ -46,19 +47,7 @@ def recording(
         MissingEngineError: The extra `recordings` is not installed.
         StateMachineError: The model cannot be loaded.
     """
-    arguments = locals()
-    if isinstance(source, RecordingRequest):
-        check_alone(recording, arguments)
-        return recorded_gap.answer(source, reporter)
-    request = RecordingRequest(
-        source,
-        _model(model),
-        calibration=calibration,
-        names=names or {},
-        seconds=seconds,
-        menagerie=menagerie,
-    )
-    return recorded_gap.answer(request, reporter)
+    return recorded_gap.answer(_request_of(recording, locals()), reporter)
 
 
 def identify(
@@ -98,30 +87,26 @@ def identify(
         MissingEngineError: The extra `recordings` is not installed.
         StateMachineError: The model cannot be loaded.
     """
-    arguments = locals()
-    if isinstance(source, RecordingRequest):
-        check_alone(identify, arguments)
-        return question.answer(source, reporter)
-    request = RecordingRequest(
-        source,
-        _model(model),
-        calibration=calibration,
-        names=names or {},
-        seconds=seconds,
-        starts=starts,
-        seed=seed,
-        menagerie=menagerie,
-        write=write,
-    )
-    return question.answer(request, reporter)
+    return question.answer(_request_of(identify, locals()), reporter)
 
 
-def _model(model: AnyPath | None) -> AnyPath:
-    """Return the model that was named.
+def _request_of(function: Callable[..., object], arguments: Mapping[str, Any]) -> RecordingRequest:
+    """Return what a function was asked: the Request that it was given, or that of its arguments.
+
+    Args:
+        function: `recording` or `identify`.
+        arguments: What it was called with, by name, as `locals()` has them.
 
     Raises:
-        BadInputError: None was.
+        BadInputError: A Request and more are given, or no model is named.
     """
-    if model is None:
+    source = arguments["source"]
+    if isinstance(source, RecordingRequest):
+        check_alone(function, arguments)
+        return source
+    asked = {name: arguments[name] for name in arguments if name not in ("source", "reporter")}
+    if asked["model"] is None:
         raise BadInputError("a recording is compared with its arm: name a model, such as so101")
-    return model
+    if asked["names"] is None:
+        asked["names"] = {}
+    return RecordingRequest(source, **asked)

@@ -51,7 +51,7 @@ def _moves(model: Model, name: str, seed: int) -> bool:
         # What there is to warn of is told of the run that was asked for.
         with warnings.catch_warnings(action="ignore", category=EngineWarning):
             rerun = rerun_of(SCENARIOS[name], model, seed=seed)
-            trace = rerun.record(derive=False)
+            trace = rerun.record(derived="nothing")
     except StateMachineError:
         return False
     sides = [(trace, trace.header.joint_labels)]

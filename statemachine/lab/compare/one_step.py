@@ -74,7 +74,7 @@ def one_step(
     if not matched.joints:
         raise BadInputError("the two sides have no joint in common: no state can be given on")
     reader = StageReader(matched)
-    trace = rerun.record(derive=False)
+    trace = rerun.record(derived="nothing")
     rows = len(trace) - 1
     every = max(1, -(-rows // moments))
     inputs = {name: trace[name] for name in ("time", *INPUTS, *MOCAP) if name in trace}

@@ -14,6 +14,7 @@ from ...interface import Array, Data, JointType, Model
 from ...measures import parse_amount
 from ...rotations import times
 from ..recordings import Rerun, Trace, with_first_ctrl
+from ..recordings.recorder import DerivedFrom
 from ..runs.drive import Progress, no_progress, progress_of_stage
 from ..runs.scenarios import Controller
 
@@ -124,9 +125,19 @@ def perturbed_run(
             controller=controller,
             qpos=qpos,
             qvel=qvel,
-            derive="at once" if derive and not rerun.writes_state else derive,
+            derived=_derived_from(rerun, derive),
             progress=progress,
         )
+
+
+def _derived_from(rerun: Rerun, derive: bool) -> DerivedFrom:
+    """Return how a trace that nobody keeps comes to what the engine derives, if it tells that.
+
+    After a controller that writes the state, derived arrays are no more of that state.
+    """
+    if not derive:
+        return "nothing"
+    return "repetition" if rerun.writes_state else "run"
 
 
 def displaced(

@@ -8,6 +8,7 @@ of as many worlds as there are kinds of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -29,7 +30,7 @@ _SPREAD = 0.7  # of draws, by the standard deviations of the prior
 _DRAWS_FOR_EACH = 12  # draws for each start, of which the best are taken
 _STIFFNESS = (-5.5, 0.5)  # logarithm of the factor of all gains, drawn from between
 _AMONG_SERVOS = 0.3  # spread of the gains of one arm, by that of the prior
-_PULLED = 1e4  # residual of an angle that is no number: no such point is kept
+_RESIDUAL_OF_NAN = 1e4  # of an angle of a simulation that diverged: no such point is kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +71,18 @@ class Objective:
         return (angles - self.simulation.state)[first:]
 
     def residuals(self, values: Array, angles: Array) -> Array:
-        """Return the residuals of angles (K, n), and of the prior."""
-        return self.scaled(values, self.errors(angles))
+        """Return the residuals (rows * n + free,) of angles (K, n) [rad], and of the prior."""
+        return self.residuals_of_errors(values, self.errors(angles))
 
-    def scaled(self, values: Array, errors: Array) -> Array:
-        """Return the residuals of errors (rows, n) [rad], and of the prior."""
-        scaled = errors / self.deviation
-        scaled = np.where(np.isfinite(scaled), scaled, _PULLED)
-        return np.concatenate([scaled.ravel(), values / self.prior_deviations])
+    def residuals_of_errors(self, values: Array, errors: Array) -> Array:
+        """Return the residuals (rows * n + free,) of errors (rows, n) [rad], and of the prior."""
+        of_data = errors / self.deviation
+        of_data = np.where(np.isfinite(of_data), of_data, _RESIDUAL_OF_NAN)
+        return np.concatenate([of_data.ravel(), values / self.prior_deviations])
+
+    def without_prior(self, rows: Array) -> Array:
+        """Return the rows of residuals, or of their Jacobian, that are of the data."""
+        return rows[: -len(self.free)]
 
     def costs(self, vectors: Array, with_error: bool = False) -> list[float]:
         """Return half the sum of squares of each of some vectors (W, P).
@@ -94,7 +99,7 @@ class Objective:
         return costs
 
     def jacobian(self, values: Array, with_error: bool = False) -> Array:
-        """Return the Jacobian of the residuals, by one run of worlds.
+        """Return the Jacobian (rows * n + free, free) of the residuals, by one run of worlds.
 
         Args:
             values: Of what is fitted.
@@ -105,6 +110,16 @@ class Objective:
         vectors[np.arange(1, len(vectors)), self.free] += steps
         change = self._changes(vectors, with_error)
         return self._with_prior(change / steps[:, None, None])
+
+    def information(self, values: Array, with_error: bool = False) -> Array:
+        """Return what the data tell (free, free): the Fisher information, without the prior.
+
+        Args:
+            values: Of what is fitted.
+            with_error: As of `ArmSimulation.angles_of_each`.
+        """
+        of_data = self.without_prior(self.jacobian(values, with_error))
+        return of_data.T @ of_data
 
     def rough_jacobian(self, values: Array) -> Array:
         """Return the Jacobian as if each joint were moved by its own parameters alone.
@@ -180,19 +195,19 @@ class Fit:
     @property
     def information(self) -> Array:
         """Return what the data tell (free, free): the Fisher information, without the prior."""
-        of_data = self.jacobian[: -len(self.objective.free)]
+        of_data = self.objective.without_prior(self.jacobian)
         return of_data.T @ of_data
 
     def weighed(self, objective: Objective) -> Fit:
         """Return the same fit as another objective with the same free parameters weighs it."""
         values = self.vector[objective.free]
-        residuals = objective.scaled(values, self.errors)
+        residuals = objective.residuals_of_errors(values, self.errors)
         jacobian = self.near_jacobian
         if jacobian is not None:
-            of_data = jacobian[: -len(objective.free)].reshape(*self.errors.shape, -1)
+            of_data = objective.without_prior(jacobian)
             change = (self.objective.deviation / objective.deviation)[None, :, None]
-            rows = (of_data * change).reshape(-1, of_data.shape[-1])
-            jacobian = np.vstack([rows, jacobian[-len(objective.free) :]])
+            rows = of_data.reshape(*self.errors.shape, -1) * change
+            jacobian = np.vstack([rows.reshape(of_data.shape), jacobian[len(of_data) :]])
         return replace(
             self,
             objective=objective,
@@ -206,7 +221,7 @@ def fit(
     start: Array,
     runs: int = _RUNS,
     tolerance: float = _TOLERANCE,
-    derivatives: Derivatives | Array = "coarse",
+    derivatives: Derivatives = "coarse",
 ) -> Fit:
     """Fit the free parameters from a start.
 
@@ -215,47 +230,80 @@ def fit(
         start: (P,) vector.
         runs: Simulations at most, without those for derivatives.
         tolerance: Part by which a last step may make the sum of squares smaller.
-        derivatives: How the Jacobian is computed: as if joints did not act on each other, and on
-            the way angles have the error of a step, too; with that error in the Jacobian alone;
-            without it where the fit ends; or the Jacobian itself, of a fit that ended near.
+        derivatives: How the Jacobian is computed: "rough", as if joints did not act on each other,
+            and on the way angles have the error of a step, too; "coarse", with that error in the
+            Jacobian alone; "exact", without it where the fit ends.
 
     Raises:
         MissingEngineError: The extra `recordings` is not installed.
     """
-    if isinstance(derivatives, np.ndarray):
-        end = _minimum(objective, start, Effort(runs, tolerance, runs), derivatives)
-        return replace(_fit_of(objective, end, end.runs), near_jacobian=derivatives)
-    end = _minimum(objective, start, Effort(runs, tolerance, _STEPS), derivatives)
-    evaluations = end.runs + end.jacobians
-    if derivatives == "exact":
-        jacobian = objective.jacobian(end.values)
-        further = fit(objective, objective.vector(end.values), runs, tolerance, jacobian)
-        return replace(further, evaluations=evaluations + further.evaluations)
+
+    def coarse_jacobian(values: Array) -> Array:
+        return objective.jacobian(values, with_error=True)
+
+    effort = Effort(runs, tolerance, _STEPS)
     if derivatives == "rough":
-        effort = Effort(_LAST_RUNS, tolerance, _LAST_RUNS)
-        end = _minimum(objective, objective.vector(end.values), effort, end.jacobian)
-        evaluations += end.runs
-    return _fit_of(objective, end, evaluations)
+        way = _minimum(objective, start, effort, objective.rough_jacobian, with_error=True)
+        last_effort = Effort(_LAST_RUNS, tolerance, _LAST_RUNS)
+        end = _minimum(
+            objective, objective.vector(way.values), last_effort, lambda _values: way.jacobian
+        )
+        return _fit_of(objective, end, way.runs + way.jacobians + end.runs)
+    end = _minimum(objective, start, effort, coarse_jacobian)
+    evaluations = end.runs + end.jacobians
+    if derivatives == "coarse":
+        return _fit_of(objective, end, evaluations)
+    jacobian = objective.jacobian(end.values)
+    further = fit_near(objective, objective.vector(end.values), jacobian, runs, tolerance)
+    return replace(further, evaluations=evaluations + further.evaluations)
+
+
+def fit_near(
+    objective: Objective,
+    start: Array,
+    jacobian: Array,
+    runs: int = _RUNS,
+    tolerance: float = _TOLERANCE,
+) -> Fit:
+    """Fit the free parameters from a start, with the Jacobian of a fit that ended near.
+
+    Args:
+        objective: What is made small.
+        start: (P,) vector.
+        jacobian: (rows * n + free, free) of the fit that ended near.
+        runs: As of `fit`.
+        tolerance: As of `fit`.
+
+    Raises:
+        MissingEngineError: The extra `recordings` is not installed.
+    """
+    effort = Effort(runs, tolerance, runs)
+    end = _minimum(objective, start, effort, lambda _values: jacobian)
+    return replace(_fit_of(objective, end, end.runs), near_jacobian=jacobian)
 
 
 def _minimum(
-    objective: Objective, start: Array, effort: Effort, derivatives: Derivatives | Array
+    objective: Objective,
+    start: Array,
+    effort: Effort,
+    jacobian: Callable[[Array], Array],
+    with_error: bool = False,
 ) -> Minimum:
-    """Return where a fit ends, with the Jacobian on the way as `fit` has it."""
+    """Return where a fit ends.
+
+    Args:
+        objective: What is made small.
+        start: (P,) vector.
+        effort: When it ends.
+        jacobian: Of the values (free,) of what is fitted.
+        with_error: Of the residuals, as of `ArmSimulation.angles_of_each`.
+    """
     parameters, free = objective.parameters, objective.free
-    is_rough = isinstance(derivatives, str) and derivatives == "rough"
 
     def residuals(values: Array) -> Array:
         vectors = objective.vector(values)[None]
-        (angles,) = objective.simulation.angles_of_each(vectors, with_error=is_rough)
+        (angles,) = objective.simulation.angles_of_each(vectors, with_error)
         return objective.residuals(values, angles)
-
-    def jacobian(values: Array) -> Array:
-        if isinstance(derivatives, np.ndarray):
-            return derivatives
-        if is_rough:
-            return objective.rough_jacobian(values)
-        return objective.jacobian(values, with_error=True)
 
     problem = BoundedLeastSquares(
         residuals=residuals,
@@ -269,7 +317,7 @@ def _minimum(
 
 def _fit_of(objective: Objective, end: Minimum, evaluations: int) -> Fit:
     """Return the fit that ended there."""
-    of_data = end.residuals[: -len(objective.free)]
+    of_data = objective.without_prior(end.residuals)
     errors = of_data.reshape(-1, len(objective.deviation)) * objective.deviation
     return Fit(
         objective=objective,

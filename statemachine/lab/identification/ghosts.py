@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...errors import DivergedError
-from ...interface import Array, Model, forward, make_data
+from ...interface import INPUTS, Array, Model, forward, make_data
 from ..recordings import Header, Trace
 from ..recordings.arm_recording import ArmRecording
 from ..recordings.recorder import layout_of
@@ -18,7 +17,6 @@ from .results import IdentificationResult, Kind, RecordingResult
 from .simulation import ArmSimulation
 
 MEASURED, AS_IT_IS, FITTED = "the arm", "the model as it is", "the fitted model"
-_INPUTS = ("qpos", "qvel", "ctrl")
 _POSES = ("xpos", "xquat", "site_xpos")
 
 
@@ -64,10 +62,7 @@ def simulated_angles(
         figure = figures.get((parameter.kind, parameter.joint))
         if figure is not None:
             vector[place] = parameter.value(figure)
-    angles = ArmSimulation.of(parameters, recording).angles(vector)
-    if not np.isfinite(angles).all():
-        raise DivergedError("the simulation of the recorded commands diverges")
-    return angles
+    return ArmSimulation.of(parameters, recording).finite_angles(vector)
 
 
 def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: str) -> Trace:
@@ -83,7 +78,7 @@ def trace_of_angles(model: Model, recording: ArmRecording, angles: Array, name: 
     qpos = [scalar_joint(model, joint)[0] for joint in recording.joints]
     dofs = [scalar_joint(model, joint)[1] for joint in recording.joints]
     columns: dict[str, Array] = {"time": np.arange(len(angles)) / recording.fps}
-    for column in (*_INPUTS, *_POSES, "site_xmat"):
+    for column in (*INPUTS, *_POSES, "site_xmat"):
         columns[column] = np.zeros((len(angles), *header.shape(column)))
     servos = ArmParameters.of(model, recording.joints).servo
     columns["ctrl"][:, servos] = recording.action

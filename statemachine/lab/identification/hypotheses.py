@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from ..runs.drive import Progress, no_progress
 from .fit import Objective, fit
 from .residuals import root_mean_square
@@ -32,18 +30,12 @@ def tried_hypotheses(
         saturated: Part of the frames in which a servo is at its force limit.
         progress: Told the fraction that is done.
     """
-    best = fits.best
-    # What is left is weighed, not the noise: all readings may be wrong.
-    objective = replace(best.objective, deviation=np.maximum(fits.residuals.rms, 1e-9))
+    objective = fits.objective_by_residuals
     simulation = objective.simulation
     readings: list[tuple[str, ArmSimulation]] = []
     if saturated > _SATURATED:
-        readings.append(
-            (
-                "viscous friction outside of the force limit",
-                replace(simulation, viscous_outside=True),
-            )
-        )
+        name = "viscous friction outside of the force limit"
+        readings.append((name, replace(simulation, viscous_outside=True)))
     if not fits.residuals.at_floor:
         for place, joint in enumerate(objective.parameters.joints):
             signs = simulation.signs.copy()
@@ -51,7 +43,7 @@ def tried_hypotheses(
             readings.append((f"the other sign of {joint}", replace(simulation, signs=signs)))
     if not readings:
         return ()
-    as_it_is = fit(objective, best.vector, runs=_RUNS)
+    as_it_is = fit(objective, fits.best.vector, runs=_RUNS)
     tried: list[Hypothesis] = []
     for number, (name, other) in enumerate(readings):
         tried.append(tried_reading(name, replace(objective, simulation=other), fits, as_it_is.cost))

@@ -28,7 +28,7 @@ from .unknown import TellingMotion, motions_of
 from .written_page import written_blocks
 
 _OVERLAP = 0.01  # of the gap: less does not count
-_FIXED = "fitted.xml"
+_WRITTEN_FILE = "fitted.xml"
 _MOST_ROWS = 6
 
 
@@ -181,7 +181,7 @@ class IdentificationPage(PageOfRecording, PageContent):
             return typed_question(self.result.request, "--why", "--details")
         if self.none_determined or self.result.rewritten is not None:
             return ""
-        return typed_question(self.result.request, "--why", "--write", _FIXED)
+        return typed_question(self.result.request, "--why", "--write", _WRITTEN_FILE)
 
 
 def page(result: IdentificationResult, details: bool = False) -> Page:

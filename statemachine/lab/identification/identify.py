@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import DivergedError
 from ...interface import Array, Model
 from ..runs.drive import Progress, no_progress
 from ..runs.provenance import provenance
@@ -15,10 +14,10 @@ from .fit import Objective
 from .hypotheses import tried_hypotheses
 from .motions import motion_informations
 from .parameters import ArmParameters
-from .recorded_gap import Asked, asked_of, gap_between, parts_of
+from .recorded_gap import FitSplit, RecordedArm, gap_between, recorded_arm_of, split_of
 from .refinements import tried_refinements
 from .residuals import Residuals
-from .results import IdentificationResult, RecordingRequest, StartOutcome
+from .results import IdentificationResult, RecordingGap, RecordingRequest, StartOutcome
 from .shares import cause_shares
 from .simulation import ArmSimulation
 from .starts import Fits, fits_from_starts
@@ -31,49 +30,60 @@ class FittedArm:
 
     Attributes:
         fits: From all starts.
-        elsewhere: Plays what was not fitted.
-        first: The first frame of it that counts.
-        before: (K, n) its angles with the model as it is [rad].
-        after: (K, n) its angles with the best fit [rad].
+        held_out: Plays what was not fitted.
+        split: What was fitted, and what was not.
+        before: (K, n) angles of what was not fitted, with the model as it is [rad].
+        after: (K, n) the same with the best fit [rad].
     """
 
     fits: Fits
-    elsewhere: ArmSimulation
-    first: int
+    held_out: ArmSimulation
+    split: FitSplit
     before: Array
     after: Array
 
-    @property
     def holds(self) -> bool:
         """Tell whether of what was not fitted no more is left than is to be expected."""
-        errors = (self.after - self.elsewhere.state)[self._first_row :]
-        return Residuals.of(errors, self.elsewhere.recording).holds(self.predicted)
+        errors = (self.after - self.held_out.state)[self._first_frame :]
+        return Residuals.of(errors, self.split.held_out).holds(self.predicted())
 
-    @property
+    def gap(self) -> RecordingGap:
+        """Return how far the arm is from what was not fitted."""
+        split = self.split
+        return gap_between(self.held_out, self.before, self.after, split.part, split.first_held_out)
+
+    def fitted_gap(self) -> RecordingGap:
+        """Return how far the arm is from what was fitted."""
+        simulation, best = self.fits.best.objective.simulation, self.fits.best.vector
+        as_it_is = simulation.angles(np.zeros(len(best)))
+        return gap_between(simulation, as_it_is, simulation.angles(best))
+
     def predicted(self) -> Array:
         """Return the standard deviation (n,) of the angles of what was not fitted [rad].
 
         By the covariance of the fit: what was not fitted may depend on what it hardly tells.
         """
-        objective = replace(self.fits.best.objective, simulation=self.elsewhere)
+        objective = replace(self.fits.best.objective, simulation=self.held_out)
         free = objective.free
-        jacobian = objective.jacobian(self.fits.best.vector[free])[: -len(free)]
+        jacobian = objective.without_prior(objective.jacobian(self.fits.best.vector[free]))
         by_joint = jacobian.reshape(-1, len(objective.deviation), len(free))
-        rows = by_joint[self._first_row - self.elsewhere.first_frame :]
+        rows = by_joint[self._first_frame - self.held_out.first_frame :]
         variance = np.einsum("kni,ij,knj->n", rows, self.fits.covariance, rows) / len(rows)
         return objective.deviation * np.sqrt(variance)
 
     @property
-    def _first_row(self) -> int:
+    def _first_frame(self) -> int:
         """Return the first frame of what was not fitted that counts."""
-        return max(self.first, self.elsewhere.first_frame)
+        return max(self.split.first_held_out, self.held_out.first_frame)
 
 
-def fitted_arm(asked: Asked, starts: int, seed: int, progress: Progress = no_progress) -> FittedArm:
+def fitted_arm(
+    arm: RecordedArm, starts: int, seed: int, progress: Progress = no_progress
+) -> FittedArm:
     """Fit all parameters from several starts.
 
     Args:
-        asked: The recording and the arm.
+        arm: The arm and its recordings.
         starts: How many.
         seed: Of their draws.
         progress: Told the fraction that is done.
@@ -83,22 +93,20 @@ def fitted_arm(asked: Asked, starts: int, seed: int, progress: Progress = no_pro
         UnsupportedError: The model has a figure of zero, which no factor changes.
         DivergedError: The simulation diverges with the figures of the model.
     """
-    parameters = asked.parameters
+    parameters = arm.parameters
     parameters.check_factors()
-    fitted_part, elsewhere, first = parts_of(asked.recordings)
+    split = split_of(arm.recordings)
     objective = Objective(
-        simulation=ArmSimulation.of(parameters, fitted_part),
-        deviation=fitted_part.resolution,
+        simulation=ArmSimulation.of(parameters, split.fitted),
+        deviation=split.fitted.resolution,
         free=np.arange(len(parameters)),
         fixed=np.zeros(len(parameters)),
     )
     fits = fits_from_starts(objective, starts, seed, progress)
-    held_out = ArmSimulation.of(parameters, elsewhere)
-    before = held_out.angles(np.zeros(len(parameters)))
-    after = held_out.angles(fits.best.vector)
-    if not (np.isfinite(before).all() and np.isfinite(after).all()):
-        raise DivergedError("the simulation of the recorded commands diverges")
-    return FittedArm(fits, held_out, first, before, after)
+    held_out = ArmSimulation.of(parameters, split.held_out)
+    before = held_out.finite_angles(np.zeros(len(parameters)))
+    after = held_out.finite_angles(fits.best.vector)
+    return FittedArm(fits, held_out, split, before, after)
 
 
 def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> IdentificationResult:
@@ -109,13 +117,12 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         MissingEngineError: The extra `recordings` is not installed.
         DivergedError: The simulation diverges with the figures of the model.
     """
-    asked = asked_of(request)
+    arm = recorded_arm_of(request)
     with reporter.stage(f"fitting {request.recording}") as progress:
-        fitted = fitted_arm(asked, request.starts, request.seed, progress)
-    fits, held_out = fitted.fits, fitted.elsewhere
-    simulation, best = fits.best.objective.simulation, fits.best.vector
-    holds = fitted.holds
-    saturated = float(simulation.saturated(best).max())
+        fitted = fitted_arm(arm, request.starts, request.seed, progress)
+    fits, model = fitted.fits, arm.parameters.model
+    holds = fitted.holds()
+    saturated = float(fits.best.objective.simulation.saturated(fits.best.vector).max())
     with reporter.stage("trying other motions"):
         motions = motion_informations(fits.best)
     with reporter.stage("trying other readings") as progress:
@@ -123,44 +130,32 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         hypotheses = tried_hypotheses(fits, saturated, progress)
         hypotheses += tuple(each.hypothesis for each in refinements)
     with reporter.stage("dividing the gap among its causes") as progress:
-        shares = cause_shares(fits, held_out, progress)
-    as_it_is = simulation.angles(np.zeros(len(best)))
-    part = "last third" if asked.recordings.held_out is None else "all"
-    fitted_gap = gap_between(simulation, as_it_is, simulation.angles(best))
-    gap = gap_between(held_out, fitted.before, fitted.after, part, fitted.first)
-    source = provenance(asked.parameters.model, request.seed)
-    parameters = fitted_parameters(fits, holds, motions, refinements)
-    starts = _outcomes(fits)
-    recording, residuals = simulation.recording, fits.residuals
-    arm, recordings = asked.parameters.model, asked.recordings
-    arm_after = fitted_model(asked.parameters, best)
+        shares = cause_shares(fits, fitted.held_out, progress)
     return IdentificationResult(
         request=request,
-        provenance=source,
-        units=recording.units,
-        fps=recording.fps,
-        fitted_gap=fitted_gap,
-        gap=gap,
-        residual=residuals.overall,
-        floor=residuals.floor,
+        provenance=provenance(model, request.seed),
+        gap=fitted.gap(),
+        recordings=arm.recordings,
+        arm=model,
+        fitted_gap=fitted.fitted_gap(),
+        residual=fits.residuals.overall,
+        floor=fits.residuals.floor,
         holds=holds,
-        at_floor=residuals.at_floor,
-        parameters=parameters,
+        at_floor=fits.residuals.at_floor,
+        parameters=fitted_parameters(fits, holds, motions, refinements),
         shares=shares,
         hypotheses=hypotheses,
-        starts=starts,
+        starts=_outcomes(fits),
         saturated=saturated,
-        recordings=recordings,
-        arm=arm,
-        fitted_arm=arm_after,
+        fitted_arm=fitted_model(arm.parameters, fits.best.vector),
     )
 
 
 def _outcomes(fits: Fits) -> tuple[StartOutcome, ...]:
     """Return where each start ended, the best first."""
-    as_good = set(map(id, fits.as_good))
+    as_good = fits.as_good
     return tuple(
-        StartOutcome(cost=each.cost, as_good=id(each) in as_good, evaluations=each.evaluations)
+        StartOutcome(cost=each.cost, as_good=each in as_good, evaluations=each.evaluations)
         for each in fits.each
     )
 

@@ -54,7 +54,7 @@ class LinearRefit:
         jacobian = fit.jacobian
         with one_blas_thread():
             basis, triangle = np.linalg.qr(jacobian)
-        return cls(fit, fit.objective.scaled(values, fit.errors), basis, triangle)
+        return cls(fit, fit.objective.residuals_of_errors(values, fit.errors), basis, triangle)
 
     @property
     def cost(self) -> float:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...interface import Array
-from .fit import Fit, Objective
+from .fit import Fit
 from .parameters import ArmParameters
 from .simulation import ArmSimulation
 
@@ -42,16 +42,9 @@ def motion_informations(fit: Fit) -> tuple[MotionInformation, ...]:
     for name, motion in MOTIONS.items():
         shape = motion(np.arange(frames) / _FPS, len(parameters.joints))
         simulation = ArmSimulation.of_motion(parameters, middle + width * shape, _FPS)
-        other = Objective(
-            simulation=simulation,
-            deviation=objective.deviation,
-            free=objective.free,
-            fixed=objective.fixed,
-        )
-        jacobian = other.jacobian(fit.vector[objective.free], with_error=True)[
-            : -len(objective.free)
-        ]
-        informations.append(MotionInformation(name, jacobian.T @ jacobian))
+        other = replace(objective, simulation=simulation)
+        information = other.information(fit.vector[objective.free], with_error=True)
+        informations.append(MotionInformation(name, information))
     return tuple(informations)
 
 

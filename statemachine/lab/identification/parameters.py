@@ -191,7 +191,7 @@ class ArmParameters:
         return np.array([i for i, each in enumerate(self.each) if each.cause in causes], int)
 
     def options(self, vectors: Array, viscous_outside: bool = False) -> dict[str, Any]:
-        """Return options of `make_worlds`, one world for each vector.
+        """Return options of `make_worlds`, each an array (W, …), one world for each vector.
 
         Args:
             vectors: (W, P) vectors.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...interface import Array
-from ..recordings.unit_inference import COUNT
+from ..recordings.calibration import COUNT
 from .linear_refit import LinearRefit, RefitEnd
 from .starts import AS_GOOD
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from .parameters import ArmParameters
 from .residuals import root_mean_square
-from .results import JointGap, RecordingGap, RecordingRequest, RecordingResult
+from .results import EpisodePart, JointGap, RecordingGap, RecordingRequest, RecordingResult
 from .simulation import ArmSimulation
 
 _SECONDS = 20.0  # of an episode, where nobody says how much
@@ -25,8 +24,8 @@ _FITTED = 2.0 / 3.0  # of the only episode; the rest shows whether it holds
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """What a question is about, read and loaded.
+class RecordedArm:
+    """The arm of a question, loaded, and its recordings.
 
     Attributes:
         parameters: Of the arm.
@@ -37,8 +36,8 @@ class Asked:
     recordings: ArmRecordings
 
 
-def asked_of(request: RecordingRequest) -> Asked:
-    """Read the recording and load the model.
+def recorded_arm_of(request: RecordingRequest) -> RecordedArm:
+    """Read the recording and load the model of a question.
 
     Raises:
         StateMachineError: One of them cannot be read, or the joints do not fit.
@@ -51,22 +50,42 @@ def asked_of(request: RecordingRequest) -> Asked:
         fitted=shortened(recordings.fitted, seconds),
         held_out=None if held_out is None else shortened(held_out, seconds),
     )
-    return Asked(ArmParameters.of(model, recordings.fitted.joints), cut)
+    return RecordedArm(ArmParameters.of(model, recordings.fitted.joints), cut)
 
 
 def shortened(recording: ArmRecording, seconds: float) -> ArmRecording:
     """Return the first seconds of a recording."""
-    frames = round(seconds * recording.fps)
+    return _first_frames(recording, round(seconds * recording.fps))
+
+
+def _first_frames(recording: ArmRecording, frames: int) -> ArmRecording:
     return replace(recording, action=recording.action[:frames], state=recording.state[:frames])
 
 
-def parts_of(recordings: ArmRecordings) -> tuple[ArmRecording, ArmRecording, int]:
-    """Return what is fitted, what is not, and from which frame on that was not fitted."""
+@dataclass(frozen=True, eq=False)
+class FitSplit:
+    """What of two episodes, or of the only one, is fitted, and what shows whether that holds.
+
+    Attributes:
+        fitted: What is fitted.
+        held_out: The recording with what is not fitted.
+        first_held_out: The first frame of it that is not fitted.
+        part: Which part of that episode is not fitted.
+    """
+
+    fitted: ArmRecording
+    held_out: ArmRecording
+    first_held_out: int
+    part: EpisodePart
+
+
+def split_of(recordings: ArmRecordings) -> FitSplit:
+    """Return what is fitted: an episode, or two thirds of the only one."""
     whole = recordings.fitted
     if recordings.held_out is not None:
-        return whole, recordings.held_out, 0
+        return FitSplit(whole, recordings.held_out, 0, "all")
     frames = round(_FITTED * len(whole.state))
-    return replace(whole, action=whole.action[:frames], state=whole.state[:frames]), whole, frames
+    return FitSplit(_first_frames(whole, frames), whole, frames, "last third")
 
 
 def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> RecordingResult:
@@ -76,46 +95,39 @@ def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> RecordingRe
         StateMachineError: The recording or the model cannot be read, or they do not fit.
         DivergedError: The simulation diverges.
     """
-    asked = asked_of(request)
-    recording = asked.recordings.fitted
-    simulation = ArmSimulation.of(asked.parameters, recording)
+    arm = recorded_arm_of(request)
+    simulation = ArmSimulation.of(arm.parameters, arm.recordings.fitted)
     with reporter.stage(f"playing {request.recording}"):
-        angles = simulation.angles(np.zeros(len(asked.parameters)))
-    if not np.isfinite(angles).all():
-        raise DivergedError("the simulation of the recorded commands diverges")
+        angles = simulation.finite_angles(np.zeros(len(arm.parameters)))
     return RecordingResult(
         request=request,
-        provenance=provenance(asked.parameters.model, request.seed),
-        units=recording.units,
-        fps=recording.fps,
+        provenance=provenance(arm.parameters.model, request.seed),
         gap=gap_between(simulation, angles),
-        recordings=asked.recordings,
-        arm=asked.parameters.model,
+        recordings=arm.recordings,
+        arm=arm.parameters.model,
     )
 
 
-def gap_elsewhere(model: Model, recordings: ArmRecordings) -> float | None:
+def gap_held_out(model: Model, recordings: ArmRecordings) -> float | None:
     """Return how far a model is, as it is, from what was not fitted [rad].
 
     None where its joints have no servos, or its simulation diverges.
     """
-    _, elsewhere, first = parts_of(recordings)
+    split = split_of(recordings)
     try:
-        parameters = ArmParameters.of(model, elsewhere.joints)
-    except UnsupportedError:
+        parameters = ArmParameters.of(model, split.held_out.joints)
+        simulation = ArmSimulation.of(parameters, split.held_out)
+        angles = simulation.finite_angles(np.zeros(len(parameters)))
+    except (UnsupportedError, DivergedError):
         return None
-    simulation = ArmSimulation.of(parameters, elsewhere)
-    angles = simulation.angles(np.zeros(len(parameters)))
-    if not np.isfinite(angles).all():
-        return None
-    return gap_between(simulation, angles, first=first).model
+    return gap_between(simulation, angles, first=split.first_held_out).model
 
 
 def gap_between(
     simulation: ArmSimulation,
     angles: Array,
     fitted: Array | None = None,
-    part: Literal["all", "last third"] = "all",
+    part: EpisodePart = "all",
     first: int = 0,
 ) -> RecordingGap:
     """Return how far simulated angles are from the measured ones.

@@ -63,9 +63,7 @@ def tried_refinements(fits: Fits) -> tuple[Refinement, ...]:
     Args:
         fits: Of the model as it is.
     """
-    # What is left is weighed, not the noise: all readings may be wrong.
-    deviation = np.maximum(fits.residuals.rms, 1e-9)
-    best = fits.best.weighed(replace(fits.best.objective, deviation=deviation))
+    best = fits.best.weighed(fits.objective_by_residuals)
     if not math.isfinite(best.cost):
         return ()
     refit = LinearRefit.of(best)

@@ -15,10 +15,10 @@ import numpy as np
 from ...interface import Array
 from ..recordings.arm_recording import ArmRecording
 
+QUANTILE = 1.96  # standard deviations of the normal distribution to each side, for 95 %
 UNCERTAIN_TIME = 0.003  # standard deviation of when a frame was read [s]
 _ABOVE_NOISE = 1.15  # residual of a joint, by its noise
-_ABOVE_ELSEWHERE = 1.3  # the same of what was not fitted
-_QUANTILE = 1.96  # of the normal distribution, for 95 %
+_ABOVE_NOISE_HELD_OUT = 1.3  # the same of what was not fitted
 _STILL = 0.7  # counts: a joint that hardly moves has an error of this size, and no noise
 
 
@@ -84,7 +84,7 @@ class Residuals:
         Args:
             predicted: (n,) standard deviation of its angles, by that of what was fitted [rad].
         """
-        return self._is_noise(_ABOVE_ELSEWHERE, _QUANTILE * predicted)
+        return self._is_noise(_ABOVE_NOISE_HELD_OUT, QUANTILE * predicted)
 
     def _is_noise(self, factor: float, beside: Array | float = 0.0) -> bool:
         """Tell whether no joint has more than so much of its noise, and another error beside it."""

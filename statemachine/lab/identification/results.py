@@ -44,6 +44,7 @@ Reason = Literal[
     "play fits as well",  # of a joint, and with it the figure would be another one
     "a tilted base fits as well",
 ]
+EpisodePart = Literal["all", "last third"]  # the last third of the only episode is not fitted
 HypothesisVerdict = Literal["fits better", "fits worse", "cannot tell"]
 FEWEST_STARTS = 8
 _MOST_STARTS = 64
@@ -54,7 +55,7 @@ class RecordingRequest:
     """Question how a recording of a real arm differs from its model.
 
     Attributes:
-        recording: "lerobot:DIR#EPISODE", or "lerobot:DIR" for episode 0.
+        recording: "lerobot:DIR#EPISODE", or "lerobot:DIR" for the first episode.
         model: A name or a file of the arm.
         calibration: LeRobot's calibration file; None to take unit and scale from the numbers.
         names: Joints of the recording that have other names in the model.
@@ -109,7 +110,7 @@ class RecordingGap:
 
     Attributes:
         episode: Number of the episode.
-        part: Which part of it: all, or the last third that was not fitted.
+        part: Which part of it.
         seconds: Its length [s].
         joints: One for each joint.
         commanded: Over all joints [rad].
@@ -118,7 +119,7 @@ class RecordingGap:
     """
 
     episode: int
-    part: Literal["all", "last third"]
+    part: EpisodePart
     seconds: float
     joints: tuple[JointGap, ...]
     commanded: float
@@ -127,27 +128,40 @@ class RecordingGap:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RecordingResult(ShownResult):
-    """How far a model is from a recording of a real arm.
+class ResultOfRecording(ShownResult):
+    """What every question about a recording of a real arm is answered with.
 
     Attributes:
         request: What was asked.
         provenance: What it was computed with.
-        units: What the numbers of the recording were taken to mean.
-        fps: Frames per second [1/s].
-        gap: Of the episode that was named.
+        gap: Before and after a fit on what was not fitted; without a fit of the episode that was
+            named.
         recordings: Both episodes; not in JSON.
-        arm: The Model that was run; not in JSON.
+        arm: The Model as it is; not in JSON.
     """
 
-    page_function: ClassVar[str] = "identification.recording_page:page"
     request: RecordingRequest
     provenance: Provenance
-    units: tuple[JointUnit, ...]
-    fps: float
     gap: RecordingGap
     recordings: ArmRecordings = field(metadata={"json": False})
     arm: Model = field(metadata={"json": False})
+
+    @property
+    def units(self) -> tuple[JointUnit, ...]:
+        """Return what the numbers of the recording were taken to mean."""
+        return self.recordings.fitted.units
+
+    @property
+    def fps(self) -> float:
+        """Return the frames per second [1/s]."""
+        return self.recordings.fitted.fps
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordingResult(ResultOfRecording):
+    """How far a model is from a recording of a real arm."""
+
+    page_function: ClassVar[str] = "identification.recording_page:page"
 
     def to_dict(self) -> dict[str, Column]:
         """Return the gap of each joint as columns [rad]."""
@@ -166,32 +180,41 @@ class FittedParameter:
     Attributes:
         kind: Which parameter.
         joint: Of which joint; None for delay and payload, which are of the arm.
-        cause: The cause that it belongs to.
-        unit: Of all its figures.
-        model: Its figure in the model.
+        model: Its figure in the model, in the unit of `UNITS`; so are the other figures.
         fitted: Its figure in the best fit.
         low, high: Interval in which it is with 95 %, with what the starts are apart and what play
             that fits as well makes of it.
-        information: Standard deviation after the fit by that before it: 1 where the recording
-            tells nothing.
-        verdict: Whether the recording determines it.
-        reasons: Why not; empty where it is determined.
+        posterior_by_prior: Standard deviation after the fit by that before it: 1 where the
+            recording tells nothing.
+        reasons: Why the recording does not determine it; empty where it does.
         motion: The motion that would determine it; "" for none of those that were tried, and
             where it is determined.
     """
 
     kind: Kind
     joint: str | None
-    cause: Cause
-    unit: str
     model: float
     fitted: float
     low: float
     high: float
-    information: float
-    verdict: Literal["determined", "cannot tell"]
+    posterior_by_prior: float
     reasons: tuple[Reason, ...] = ()
     motion: str = ""
+
+    @property
+    def cause(self) -> Cause:
+        """Return the cause that it belongs to."""
+        return CAUSE_OF[self.kind]
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of its figures."""
+        return UNITS[self.kind]
+
+    @property
+    def verdict(self) -> Literal["determined", "cannot tell"]:
+        """Return whether the recording determines it."""
+        return "cannot tell" if self.reasons else "determined"
 
 
 @dataclass(frozen=True)
@@ -248,16 +271,11 @@ class StartOutcome:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class IdentificationResult(ShownResult):
+class IdentificationResult(ResultOfRecording):
     """What a recording of a real arm tells of the parameters of its model.
 
     Attributes:
-        request: What was asked.
-        provenance: What it was computed with.
-        units: What the numbers of the recording were taken to mean.
-        fps: Frames per second [1/s].
         fitted_gap: Of what was fitted.
-        gap: Of what was not fitted: before and after.
         residual: Root mean square of the residual of what was fitted [rad].
         floor: What resolution and unmeasured time leave at least [rad].
         holds: Whether the fitted model predicts what was not fitted down to the floor.
@@ -268,19 +286,12 @@ class IdentificationResult(ShownResult):
         starts: Where each start ended.
         saturated: Part of the frames of the best fit in which the servo is at its force limit that
             is so most.
-        recordings: Both episodes; not in JSON.
-        arm: The Model as it is; not in JSON.
         fitted_arm: The Model with the fitted figures (offset and delay are not in it); not in JSON.
         rewritten: The model's file with the fitted figures; None where that was not asked.
     """
 
     page_function: ClassVar[str] = "identification.identification_page:page"
-    request: RecordingRequest
-    provenance: Provenance
-    units: tuple[JointUnit, ...]
-    fps: float
     fitted_gap: RecordingGap
-    gap: RecordingGap
     residual: float
     floor: float
     holds: bool
@@ -290,8 +301,6 @@ class IdentificationResult(ShownResult):
     hypotheses: tuple[Hypothesis, ...]
     starts: tuple[StartOutcome, ...]
     saturated: float
-    recordings: ArmRecordings = field(metadata={"json": False})
-    arm: Model = field(metadata={"json": False})
     fitted_arm: Model = field(metadata={"json": False})
     rewritten: RewrittenFile | None = None
 

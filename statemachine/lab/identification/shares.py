@@ -26,13 +26,13 @@ _TOLERANCE = 1e-2  # of a fit, which begins at the best one of all parameters
 
 
 def cause_shares(
-    fits: Fits, elsewhere: ArmSimulation, progress: Progress = no_progress
+    fits: Fits, held_out: ArmSimulation, progress: Progress = no_progress
 ) -> tuple[CauseShare, ...]:
-    """Return the share of each cause, by what it takes from the gap elsewhere.
+    """Return the share of each cause, by what it takes from the gap on what was not fitted.
 
     Args:
         fits: Of all parameters.
-        elsewhere: Plays what was not fitted.
+        held_out: Plays what was not fitted.
         progress: Told the fraction that is done.
     """
     objective = fits.best.objective
@@ -42,11 +42,11 @@ def cause_shares(
     def gap(causes: Collection[str]) -> float | None:
         key = frozenset(causes)
         if key not in known:
-            known[key] = _gap_elsewhere(fits, elsewhere, key)
+            known[key] = _gap_held_out(fits, held_out, key)
             progress(min(1.0, len(known) / 2 ** len(CAUSES)))
         return known[key]
 
-    whole = gap_of(elsewhere, nothing)
+    whole = gap_of(held_out, nothing)
     if not math.isfinite(whole) or whole <= 0.0:
         return ()
     division = shapley(CAUSES, gap, whole)
@@ -59,19 +59,19 @@ def cause_shares(
     return tuple(shares)
 
 
-def _gap_elsewhere(fits: Fits, elsewhere: ArmSimulation, causes: frozenset[str]) -> float | None:
+def _gap_held_out(fits: Fits, held_out: ArmSimulation, causes: frozenset[str]) -> float | None:
     """Return the gap where these causes are fitted; None where the simulation diverges."""
     best = fits.best
     nothing = np.zeros(len(best.vector))
     chosen: list[Cause] = [cause for cause in CAUSES if cause in causes]
     if not chosen:
-        return gap_of(elsewhere, nothing)
+        return gap_of(held_out, nothing)
     if len(chosen) == len(CAUSES):
-        return gap_of(elsewhere, best.vector)
+        return gap_of(held_out, best.vector)
     free = best.objective.parameters.of_causes(chosen)
     objective = replace(best.objective, free=free, fixed=nothing)
     fitted = fit(objective, best.vector, _RUNS, _TOLERANCE, "rough")
-    gap = gap_of(elsewhere, fitted.vector)
+    gap = gap_of(held_out, fitted.vector)
     return gap if math.isfinite(gap) else None
 
 

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import DivergedWarning
+from ...errors import DivergedError, DivergedWarning
 from ...interface import Array
 from ...worlds import make_worlds, record
 from ..recordings.arm_recording import ArmRecording
-from ..recordings.unit_inference import COUNT
 from .parameters import ArmParameters
 from .play import behind_play
 
@@ -58,7 +57,6 @@ class ArmSimulation:
     def of_motion(cls, parameters: ArmParameters, action: Array, fps: float) -> ArmSimulation:
         """Return the simulation of commands (K, n) [rad] that start at rest."""
         at_rest = np.tile(action[:1], (len(action), 1))
-        resolution = np.full(action.shape[1], COUNT)
         recording = ArmRecording(
             source="",
             episode=0,
@@ -66,8 +64,6 @@ class ArmSimulation:
             joints=parameters.joints,
             action=action,
             state=at_rest,
-            resolution=resolution,
-            units=(),
         )
         return cls.of(parameters, recording)
 
@@ -112,6 +108,17 @@ class ArmSimulation:
         NaN where the simulation diverges.
         """
         return self.angles_of_each(vector[None])[0]
+
+    def finite_angles(self, vector: Array) -> Array:
+        """Return the same angles (K, n) [rad] where the simulation does not diverge.
+
+        Raises:
+            DivergedError: It does.
+        """
+        angles = self.angles(vector)
+        if not np.isfinite(angles).all():
+            raise DivergedError("the simulation of the recorded commands diverges")
+        return angles
 
     def angles_of_each(self, vectors: Array, with_error: bool = False) -> Array:
         """Return the angles (W, K, n) for each of several vectors (W, P).

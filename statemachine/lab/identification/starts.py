@@ -9,15 +9,16 @@ import numpy as np
 
 from ...interface import Array
 from ..runs.drive import Progress, no_progress
-from .fit import Fit, Objective, fit, starting_points
+from .fit import Fit, Objective, fit, fit_near, starting_points
 from .residuals import Residuals, root_mean_square
 
 _RUNS_TO_BEST = 8  # simulations of a start that goes on with the derivatives of the best
 _RUNS_BY_ITSELF = 20  # of one that goes on with its own
-AS_GOOD = 1.92  # half the sum of squares: the 95 % quantile of one parameter
+AS_GOOD = 1.92  # half the sum of squares: 0.5 * QUANTILE**2, for one parameter
 _NEAR_THE_END = 1e-2  # of the sum of squares, where a start waits for the best one
 _FIRST_NOISE = 0.6  # counts: taken for the noise before any residual is known
 _WEAKER = (0.15, 0.3)  # logarithms of the factors by which joints are taken to be weaker
+_LEAST_DEVIATION = 1e-9  # rad
 _POSSIBLE = 2.0 * AS_GOOD  # half the sum of squares: a joint that is weaker fits hardly worse
 
 
@@ -44,6 +45,15 @@ class Fits:
     def as_good(self) -> tuple[Fit, ...]:
         """Return those that fit as well as the best one, which is among them."""
         return tuple(each for each in self.each if each.cost - self.best.cost < AS_GOOD)
+
+    @property
+    def objective_by_residuals(self) -> Objective:
+        """Return the objective that weighs angles by what the best fit leaves, not by the noise.
+
+        By it other readings of the recording are compared, which may all be wrong.
+        """
+        deviation = np.maximum(self.residuals.rms, _LEAST_DEVIATION)
+        return replace(self.best.objective, deviation=deviation)
 
     @property
     def informations(self) -> tuple[Array, ...]:
@@ -108,8 +118,7 @@ def informations_beside(best: Fit) -> tuple[Array, ...]:
         possible = np.array(objective.costs(vectors)) - best.cost < _POSSIBLE
         if possible.any():
             vector = vectors[possible].min(axis=0)
-            jacobian = objective.jacobian(vector[objective.free])[: -len(objective.free)]
-            informations.append(jacobian.T @ jacobian)
+            informations.append(objective.information(vector[objective.free]))
     return tuple(informations)
 
 
@@ -144,16 +153,16 @@ def fits_from_starts(
     residuals = Residuals.of(best.errors, recording)
     weighted = replace(objective, deviation=np.minimum(residuals.noise, residuals.most))
     best = best.weighed(weighted)
-    best = _better(best, fit(weighted, best.vector, derivatives=best.jacobian))
+    best = _better(best, fit_near(weighted, best.vector, best.jacobian))
     others: list[Fit] = []
     for number, end in enumerate(fits):
         others.append(gone_on(end.weighed(weighted), best))
         progress((starts + number + 2) / (2 * starts + 2))
-    every_one = _in_order([best, *others])
-    residuals = Residuals.of(every_one[0].errors, recording)
-    beside = informations_beside(every_one[0])
+    in_order = sorted([best, *others], key=_cost)
+    residuals = Residuals.of(in_order[0].errors, recording)
+    beside = informations_beside(in_order[0])
     progress(1.0)
-    return Fits(every_one, residuals, beside)
+    return Fits(tuple(in_order), residuals, beside)
 
 
 def gone_on(end: Fit, best: Fit) -> Fit:
@@ -162,7 +171,7 @@ def gone_on(end: Fit, best: Fit) -> Fit:
     They do where it becomes as good.
     """
     objective = best.objective
-    further = _better(end, fit(objective, end.vector, _RUNS_TO_BEST, derivatives=best.jacobian))
+    further = _better(end, fit_near(objective, end.vector, best.jacobian, _RUNS_TO_BEST))
     if further.cost - best.cost < AS_GOOD:
         return further
     return _better(further, fit(objective, further.vector, _RUNS_BY_ITSELF))
@@ -176,7 +185,3 @@ def _better(end: Fit, further: Fit) -> Fit:
 
 def _cost(fit: Fit) -> float:
     return fit.cost
-
-
-def _in_order(fits: Sequence[Fit]) -> tuple[Fit, ...]:
-    return tuple(sorted(fits, key=_cost))

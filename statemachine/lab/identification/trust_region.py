@@ -1,8 +1,8 @@
-"""Least squares within bounds that asks for few Jacobians, each of which costs as many simulations
-as there are parameters.
+"""Least squares within bounds that asks for few Jacobians.
 
-SciPy's trust region makes the steps (T. Coleman and Y. Li, 1996). Between two Jacobians one is
-carried on by the change of the residuals along the last step (C. Broyden, 1965).
+Each of them costs as many simulations as there are parameters. SciPy's trust region makes the steps
+(T. Coleman and Y. Li, 1996). Between two Jacobians one is carried on by the change of the residuals
+along the last step (C. Broyden, 1965).
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ from pathlib import Path
 from ...program import NAME
 from ..compare.typed_command import TypedCommand
 from ..compare.what import without_folders
+from ..recordings.arm_recording import PREFIX
 from .results import RecordingRequest
 
-_SCHEME = "lerobot:"
 _SOME_FOLDER = "DIR"
 
 
@@ -29,7 +29,7 @@ def typed_question(request: RecordingRequest, *further: str, folders: bool = Tru
 def recording_name(recording: str) -> str:
     """Return a recording as it is typed, without the folder that its data set lies in."""
     # A folder of the data set ends in its name, an episode behind it included.
-    return f"{_SCHEME}{Path(recording.removeprefix(_SCHEME)).name}"
+    return f"{PREFIX}{Path(recording.removeprefix(PREFIX)).name}"
 
 
 def _words_of(request: RecordingRequest, folders: bool) -> list[str]:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...interface import Array
 from .motions import MotionInformation
-from .parameters import Parameter
 from .refinements import Refinement
-from .results import UNITS, FittedParameter, Reason
+from .residuals import QUANTILE
+from .results import FittedParameter, Reason
 from .starts import Fits, least_certain
 
 TELLS = 0.3  # standard deviation after the fit, by that before it
-_QUANTILE = 1.96  # of the normal distribution, for 95 %
 _MOVED = 0.5  # standard deviations: an interval of 95 % that is off by that covers 92 %
-AGREEING = 0.5  # of the starts, of which more end in the same fit if it is taken for the best one
+AGREEING = 0.5  # part of the starts, of which more must fit as well as the best one
 
 
 def fitted_parameters(
@@ -37,32 +35,82 @@ def fitted_parameters(
     """
     objective = fits.best.objective
     deviations = fits.deviations
-    prior = objective.prior_deviations
+    ratios = (deviations / objective.prior_deviations).tolist()
     values = fits.best.vector[objective.free]
-    low, high = values - _QUANTILE * deviations, values + _QUANTILE * deviations
-    ends = np.array([fit.vector[objective.free] for fit in fits.as_good])
-    agree = np.all((ends >= low) & (ends <= high), axis=0).tolist()
-    low = np.minimum(low, ends.min(axis=0))
-    high = np.maximum(high, ends.max(axis=0))
-    changed: dict[Reason, NDArray[np.bool_]] = {
-        each.reason: np.zeros(len(prior), bool) for each in refinements
-    }
+    lows, highs = _intervals(fits, deviations, refinements)
+    agree = _agree(fits, deviations)
+    changed = _changed_by_reason(refinements, deviations)
+    fitted: list[FittedParameter] = []
+    for place, number in enumerate(objective.free.tolist()):
+        reasons = _reasons(ratios[place], fits, agree[place], holds)
+        for reason, is_changed in changed.items():
+            if is_changed[place]:
+                reasons.append(reason)
+        motion = "" if ratios[place] < TELLS else _motion_for(place, fits, motions)
+        parameter = objective.parameters.each[number]
+        entries = (values[place], lows[place], highs[place])
+        figure, low, high = (parameter.figure(float(entry)) for entry in entries)
+        told = FittedParameter(
+            kind=parameter.kind,
+            joint=parameter.joint,
+            model=parameter.model,
+            fitted=figure,
+            low=low,
+            high=high,
+            posterior_by_prior=ratios[place],
+            reasons=tuple(reasons),
+            motion=motion,
+        )
+        fitted.append(told)
+    return tuple(fitted)
+
+
+def _intervals(
+    fits: Fits, deviations: Array, refinements: Sequence[Refinement]
+) -> tuple[Array, Array]:
+    """Return the ends (free,) of the intervals in which parameters are with 95 %.
+
+    They reach to where starts end that fit as well, and to what refinements make of a parameter.
+
+    Args:
+        fits: From all starts.
+        deviations: (free,) standard deviations after the fit.
+        refinements: What the model lacks and the arm may have.
+    """
+    objective = fits.best.objective
+    values, ends = fits.best.vector[objective.free], _ends(fits)
+    low = np.minimum(values - QUANTILE * deviations, ends.min(axis=0))
+    high = np.maximum(values + QUANTILE * deviations, ends.max(axis=0))
     for each in refinements:
         low = np.minimum(low, values + each.least)
         high = np.maximum(high, values + each.most)
-        changed[each.reason] |= _changed_by(each, deviations)
-    low = np.maximum(low, objective.parameters.low[objective.free])
-    told = (deviations / prior).tolist()
-    fitted: list[FittedParameter] = []
-    for place, number in enumerate(objective.free.tolist()):
-        interval = _Interval(float(values[place]), float(low[place]), float(high[place]))
-        agrees = agree[place] and len(ends) > AGREEING * len(fits.each)
-        motion = "" if told[place] < TELLS else _motion_for(place, fits, motions)
-        reasons = _reasons(told[place], fits, agrees, holds)
-        others: list[Reason] = [reason for reason, mine in changed.items() if mine[place]]
-        parameter = objective.parameters.each[number]
-        fitted.append(_verdict(parameter, interval, told[place], (*reasons, *others), motion))
-    return tuple(fitted)
+    return np.maximum(low, objective.parameters.low[objective.free]), high
+
+
+def _ends(fits: Fits) -> Array:
+    """Return where the starts end (starts, free) that fit as well as the best."""
+    free = fits.best.objective.free
+    return np.array([fit.vector[free] for fit in fits.as_good])
+
+
+def _agree(fits: Fits, deviations: Array) -> NDArray[np.bool_]:
+    """Tell of each parameter (free,) whether most starts end within its interval."""
+    values, ends = fits.best.vector[fits.best.objective.free], _ends(fits)
+    if len(ends) <= AGREEING * len(fits.each):
+        return np.zeros(len(values), bool)
+    low, high = values - QUANTILE * deviations, values + QUANTILE * deviations
+    return np.all((ends >= low) & (ends <= high), axis=0)
+
+
+def _changed_by_reason(
+    refinements: Sequence[Refinement], deviations: Array
+) -> dict[Reason, NDArray[np.bool_]]:
+    """Tell of each parameter (free,) whether refinements change it, by the reason that they are."""
+    changed: dict[Reason, NDArray[np.bool_]] = {}
+    for each in refinements:
+        before = changed.get(each.reason, np.zeros(len(deviations), bool))
+        changed[each.reason] = before | _changed_by(each, deviations)
+    return changed
 
 
 def _changed_by(refinement: Refinement, deviations: Array) -> NDArray[np.bool_]:
@@ -70,54 +118,22 @@ def _changed_by(refinement: Refinement, deviations: Array) -> NDArray[np.bool_]:
 
     Where that fits better, a parameter may hardly move; where it fits as well, within its interval.
     """
-    allowed = _MOVED if refinement.fits_better else _QUANTILE
+    allowed = _MOVED if refinement.fits_better else QUANTILE
     return np.maximum(-refinement.least, refinement.most) > allowed * deviations
 
 
-@dataclass(frozen=True)
-class _Interval:
-    """An entry of the vector, and within what it is."""
-
-    value: float
-    low: float
-    high: float
-
-
-def _verdict(
-    parameter: Parameter,
-    interval: _Interval,
-    told: float,
-    reasons: tuple[Reason, ...],
-    motion: str,
-) -> FittedParameter:
-    """Return what is said of a parameter."""
-    return FittedParameter(
-        kind=parameter.kind,
-        joint=parameter.joint,
-        cause=parameter.cause,
-        unit=UNITS[parameter.kind],
-        model=parameter.model,
-        fitted=parameter.figure(interval.value),
-        low=parameter.figure(interval.low),
-        high=parameter.figure(interval.high),
-        information=told,
-        verdict="cannot tell" if reasons else "determined",
-        reasons=reasons,
-        motion=motion,
-    )
-
-
-def _reasons(told: float, fits: Fits, agrees: bool, holds: bool) -> tuple[Reason, ...]:
-    """Return why a parameter is not determined; empty where it is.
+def _reasons(ratio: float, fits: Fits, agrees: bool, holds: bool) -> list[Reason]:
+    """Return why the fits do not determine a parameter; empty where they do.
 
     Args:
-        told: Its standard deviation after the fit, by that before it.
+        ratio: Its standard deviation after the fit, by that before it.
         fits: From all starts.
-        agrees: Whether all starts that fit as well as the best have it within its interval.
+        agrees: Whether all starts that fit as well as the best have it within its interval, and
+            they are most of all starts.
         holds: Whether the best fit holds on what was not fitted.
     """
     reasons: list[Reason] = []
-    if told >= TELLS:
+    if ratio >= TELLS:
         reasons.append("too little information")
     if not fits.residuals.at_floor:
         reasons.append("residual above the floor")
@@ -125,7 +141,7 @@ def _reasons(told: float, fits: Fits, agrees: bool, holds: bool) -> tuple[Reason
         reasons.append("starts disagree")
     if not holds:
         reasons.append("does not hold elsewhere")
-    return tuple(reasons)
+    return reasons
 
 
 def _motion_for(place: int, fits: Fits, motions: Sequence[MotionInformation]) -> str:

@@ -30,7 +30,7 @@ from ...interface import Model
 from ...models import resolve
 from ..why.rewriting import RewrittenFile, changes_of, check_target, text_at
 from .parameter_texts import name_of_parameter
-from .recorded_gap import gap_elsewhere
+from .recorded_gap import gap_held_out
 from .results import FittedParameter, IdentificationResult, RecordingRequest
 
 _SUFFIXES = (".xml", ".mjcf")
@@ -40,7 +40,7 @@ _CALIBRATION = "it is how the arm was calibrated, and no figure of the model"
 _OTHERWISE = "the model that is compiled of the file has another figure"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Planned:
     """A parameter that is to be written.
 
@@ -83,10 +83,8 @@ def with_written(result: IdentificationResult) -> IdentificationResult:
     request = result.request
     if request.write is None:
         return result
-    target, model = Path(request.write), load(request.model, menagerie=request.menagerie)
-    source = XmlSource(model.path)
-    writer = _FittedFile(result, model, source, target)
-    return replace(result, rewritten=writer.written())
+    file = _FittedFile(result, XmlSource(result.arm.path), Path(request.write))
+    return replace(result, rewritten=file.written())
 
 
 class _FittedFile:
@@ -94,15 +92,12 @@ class _FittedFile:
 
     Args:
         result: What the recording tells.
-        model: The model as its file has it.
-        source: The file.
+        source: The file of the model as it is.
         target: The file that is written.
     """
 
-    def __init__(
-        self, result: IdentificationResult, model: Model, source: XmlSource, target: Path
-    ) -> None:
-        self._result, self._model = result, model
+    def __init__(self, result: IdentificationResult, source: XmlSource, target: Path) -> None:
+        self._result, self._model = result, result.arm
         self._source, self._target = source, target
         self._not_written: list[UnwrittenChange] = []
 
@@ -114,7 +109,7 @@ class _FittedFile:
             good = [each for each in planned if _has(model.compiled, each.edits)]
             if len(good) < len(planned):
                 model = self._loaded(Path(part), good)
-        gap = gap_elsewhere(model, self._result.recordings)
+        gap = gap_held_out(model, self._result.recordings)
         for each in planned:
             if each not in good:
                 self._not_written.append(UnwrittenChange(each.name, _OTHERWISE))

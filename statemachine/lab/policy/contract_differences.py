@@ -7,10 +7,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ...measures.text import few, significant
+from ...measures.text import NO_NUMBER, few, significant
 from .contract import Clock, Contract
-
-_NONE = "–"
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ def _are_equal(first: object, second: object) -> bool:
 def _text(value: object) -> str:
     """Return a value as a cell of a table."""
     if value is None:
-        return _NONE
+        return NO_NUMBER
     if isinstance(value, np.ndarray):
         if np.all(value == value.flat[0]):
             return significant(float(value.flat[0]), 4)
@@ -83,7 +81,7 @@ def _text(value: object) -> str:
     if isinstance(value, float):
         return significant(value, 4)
     if isinstance(value, tuple):
-        return few([str(entry) for entry in value]) or _NONE
+        return few([str(entry) for entry in value]) or NO_NUMBER
     if isinstance(value, Clock):
         return f"{value.period:g} s, {value.offset_steps} calls ahead"
     return str(value)

@@ -65,6 +65,10 @@ class ContractSection:
         self._read.add(key)
         return self._content.get(key)
 
+    def ignore(self, *keys: str) -> None:
+        """Take fields for read from which nothing is computed."""
+        self._read.update(keys)
+
     def has(self, key: str) -> bool:
         """Tell whether a field is there, and not null."""
         self._looked_for.add(key)
@@ -231,7 +235,6 @@ class ContractSection:
             BadInputError: It is no pair of numbers in order.
         """
         if not self.has(key):
-            self.value(key)
             return None
         if not _is_list(self.value(key)):
             raise self.error(key, "a lower and an upper limit are expected")
@@ -298,7 +301,9 @@ class ContractSection:
             numbers.append(float(number))
         return np.array(numbers)
 
-    def from_zero(self, key: str, joints: Sequence[str], null: float | None = None) -> Array | None:
+    def non_negative(
+        self, key: str, joints: Sequence[str], null: float | None = None
+    ) -> Array | None:
         """Return a number from 0 on for each joint, (n,); arguments as of `per_joint`.
 
         Raises:

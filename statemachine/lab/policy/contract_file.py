@@ -108,8 +108,7 @@ def _has_too_many_entries(content: object) -> bool:
 
 def _contract_of(root: ContractSection, file: str) -> Contract:
     """Return the contract of a file in gaitkeeper's format."""
-    for key in _SOURCES:
-        root.value(key)
+    root.ignore(*_SOURCES)
     policy_io, control = root.section("policy_io"), root.section("control")
     joints = policy_io.section("joints").names("names")
     default = control.per_joint("default_joint_pos", joints)
@@ -153,7 +152,7 @@ class _Imu:
 
 def _imu(imu: ContractSection) -> _Imu:
     """Return how the harness reads the sensors of the base."""
-    imu.value("body")
+    imu.ignore("body")
     rotation = imu.numbers("rotation_in_root", 4) if imu.has("rotation_in_root") else None
     if rotation is not None and not np.array_equal(np.abs(rotation), (1.0, 0.0, 0.0, 0.0)):
         raise imu.error(
@@ -192,20 +191,13 @@ def _term(
         raise parameters.error("lag", "the last action alone (1) can be observed")
     if parameters.has("index"):
         raise parameters.error("index", "terms are taken whole")
-    frame: Frame = "body"
-    site = ""
-    if term_id == "base_ang_vel":
-        frame, site = imu.frame, imu.site
-    if term_id in ("base_lin_vel", "base_ang_vel"):
-        frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
-        site = parameters.text("site", (), "") if parameters.has("site") else site
+    frame, site = _frame_and_site(term_id, parameters, imu)
     told = _told_joints(parameters, joints) if term_id in _OF_ENCODERS else ()
     reference: Array | None = None
     if term_id == "joint_pos_rel":
         reference = parameters.per_joint("default", told or joints)
         if reference is None:
-            order = [joints.index(joint) for joint in told or joints]
-            reference = default[order]
+            reference = default[[joints.index(joint) for joint in told or joints]]
     values: tuple[float, ...] = ()
     if term_id == "constant":
         values = tuple(parameters.numbers("value", dim).tolist())
@@ -221,6 +213,18 @@ def _term(
         clock=_clock(parameters) if term_id in _OF_CLOCK else None,
         values=values,
     )
+
+
+def _frame_and_site(term_id: TermId, parameters: ContractSection, imu: _Imu) -> tuple[Frame, str]:
+    """Return in which axes a velocity is told, and the site of its sensor; "" for the base."""
+    frame: Frame = "body"
+    site = ""
+    if term_id == "base_ang_vel":
+        frame, site = imu.frame, imu.site
+    if term_id in ("base_lin_vel", "base_ang_vel"):
+        frame = cast("Frame", parameters.text("frame", _FRAMES, frame))
+        site = parameters.text("site", (), "") if parameters.has("site") else site
+    return frame, site
 
 
 def _told_joints(parameters: ContractSection, joints: Sequence[str]) -> tuple[str, ...]:
@@ -249,8 +253,7 @@ def _dim(term_id: TermId, parameters: ContractSection, n: int) -> int:
 
 def _clock(parameters: ContractSection) -> Clock:
     """Return the clock of a term that tells a phase."""
-    parameters.value("clock")
-    parameters.value("arithmetic")  # of which precision the phase is
+    parameters.ignore("clock", "arithmetic")
     if parameters.has("stand") or parameters.has("gate"):
         key = "stand" if parameters.has("stand") else "gate"
         raise parameters.error(key, "a clock that stops is told by stand_threshold alone")
@@ -280,17 +283,15 @@ def _history(section: ContractSection) -> History:
 
 def _action(section: ContractSection, joints: Sequence[str], default: Array) -> Action:
     """Return how actions become targets."""
-    section.value("kind")
-    section.value("joints")
+    section.ignore("kind", "joints")
     stage = section.text("clip_stage", ("processed", "none"), "processed")
     section.text("filter", ("none",), "none")
     scale = section.per_joint("scale", joints)
     offset = section.per_joint("offset", joints)
     clip: Array | None = None
+    section.ignore("clip")  # at the stage "none"
     if section.has("clip") and stage == "processed":
         clip = section.pairs("clip", len(joints))
-    else:
-        section.value("clip")
     return Action(
         scale=np.ones(len(joints)) if scale is None else scale,
         offset=default if offset is None else offset,
@@ -301,23 +302,19 @@ def _action(section: ContractSection, joints: Sequence[str], default: Array) -> 
 
 def _servos(actuators: ContractSection, model: ContractSection, joints: Sequence[str]) -> Servos:
     """Return what drives the joints."""
-    for key in ("pd_period", "integrator", "torque_limit_at"):
-        actuators.value(key)
+    actuators.ignore("pd_period", "integrator", "torque_limit_at")
     kind: ActuatorKind | None = None
     if actuators.has("kind"):
         kind = cast("ActuatorKind", actuators.text("kind", _KINDS))
-    else:
-        actuators.value("kind")
-    for key in ("root", "velocity_limit", "training_envelope"):
-        model.value(key)
+    model.ignore("root", "velocity_limit", "training_envelope")
     servos = Servos(
         kind=kind,
-        kp=actuators.from_zero("kp", joints),
-        kd=actuators.from_zero("kd", joints),
-        effort_limit=model.from_zero("effort_limit", joints, np.inf),
-        armature=model.from_zero("armature", joints),
-        damping=model.from_zero("joint_damping", joints),
-        friction=model.from_zero("joint_friction", joints),
+        kp=actuators.non_negative("kp", joints),
+        kd=actuators.non_negative("kd", joints),
+        effort_limit=model.non_negative("effort_limit", joints, np.inf),
+        armature=model.non_negative("armature", joints),
+        damping=model.non_negative("joint_damping", joints),
+        friction=model.non_negative("joint_friction", joints),
     )
     for key, gains in (("kp", servos.kp), ("kd", servos.kd)):
         if kind == "explicit_pd" and gains is None:
@@ -327,8 +324,7 @@ def _servos(actuators: ContractSection, model: ContractSection, joints: Sequence
 
 def _timing(section: ContractSection) -> CallTiming:
     """Return how often the policy is called."""
-    for key in ("order", "target_hold"):
-        section.value(key)
+    section.ignore("order", "target_hold")
     policy_dt = section.positive("policy_dt")
     decimation: int | None = None
     if section.has("decimation"):
@@ -345,14 +341,12 @@ def _timing(section: ContractSection) -> CallTiming:
 
 def _command_limits(section: ContractSection) -> dict[str, tuple[float, float]]:
     """Return the speeds that the policy may be asked for, by axis."""
-    for key in ("name", "trained", "heading"):
-        section.value(key)
+    section.ignore("name", "trained", "heading")
     for key in ("shaping", "gate"):
         if section.has(key):
             raise section.error(key, "commands go to the policy as they are")
     limits: dict[str, tuple[float, float]] = {}
     if not section.has("limit"):
-        section.value("limit")
         return limits
     limit = section.section("limit")
     for axis in limit.fields():

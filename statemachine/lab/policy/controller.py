@@ -61,14 +61,12 @@ class PolicyController:
         self._last_action = np.zeros(n)
         # What acts before the first action has come through its delay: the offset alone.
         self._pending = [np.zeros(n)] * contract.action.delay_steps
-        low, high = driven.model.actuator_ctrlrange[binding.ctrl].T
-        if driven.kind == "explicit_pd":
-            low, high = np.full(n, -np.inf), np.full(n, np.inf)
-        self._low, self._high = low, high
+        self._commands_torques = driven.kind == "explicit_pd"
+        self._gain = driven.model.actuator_gain[binding.ctrl]  # of motors
+        self._low, self._high = driven.model.actuator_ctrlrange[binding.ctrl].T
+        if self._commands_torques:
+            self._low, self._high = np.full(n, -np.inf), np.full(n, np.inf)
         self._targets = self._targets_of(np.zeros(n))
-        self._gain = np.ones(n)
-        if driven.kind == "explicit_pd":
-            self._gain = driven.model.actuator_gain[binding.ctrl]
         self.calls: list[PolicyCall] = []
         self.saturated = np.zeros(n, dtype=np.int64)
         self.steps = 0
@@ -92,7 +90,7 @@ class PolicyController:
         power = float(np.maximum(torque * joint_vel, 0.0).sum())
         self.work += power * driven.model.timestep
         ctrl = np.array(data.ctrl)
-        ctrl[self._binding.ctrl] = torque / self._gain if driven.kind == "explicit_pd" else targets
+        ctrl[self._binding.ctrl] = torque / self._gain if self._commands_torques else targets
         return ctrl
 
     def _call(self, data: Data) -> None:

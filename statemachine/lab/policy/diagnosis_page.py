@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...measures.command_lines import folded_command
-from ...measures.text import significant
+from ...measures.text import NO_NUMBER, significant
 from ...show.blocks import Page, Table
 from ...show.templates import PageContent, render
-from .contract_fields import UnreadField
 from .diagnosis import LEAST_GAIN, PART_OF_COST, DiagnosisResult, EngineDiagnosis, TriedHypothesis
 from .request import words_of_request
 from .term_gaps import TermGap
 from .walk import Walk
 
-_NO_NUMBER = "–"
 _TINY = 1e-12  # of a term that is zero
 _ROWS = 5  # of the table of an engine, without details
 
@@ -86,11 +84,6 @@ class DiagnosisPage(PageContent):
         return self.result.contract.file
 
     @property
-    def misspelt(self) -> Sequence[UnreadField]:
-        """Return the fields of the contract that nothing reads, and that are near to one."""
-        return self.result.contract.misspelt
-
-    @property
     def seconds(self) -> float:
         """Return how long each run is [s]."""
         return self.result.request.seconds
@@ -132,12 +125,12 @@ def _table(tried: Sequence[TriedHypothesis], engine: EngineDiagnosis) -> Table:
     """Return the table of changes: what each is, what comes of it, and which term it moves."""
     headers = ("change", "of", "to", "it then", "cost", "moves most")
     rows: list[tuple[str, ...]] = [
-        ("none", _NO_NUMBER, _NO_NUMBER, _outcome(engine.walks), f"{engine.cost:.2f}", _NO_NUMBER)
+        ("none", NO_NUMBER, NO_NUMBER, _outcome(engine.walks), f"{engine.cost:.2f}", NO_NUMBER)
     ]
     for each in tried:
-        cost = _NO_NUMBER if each.cost is None else f"{each.cost:.2f}"
+        cost = NO_NUMBER if each.cost is None else f"{each.cost:.2f}"
         outcome = _outcome(each.walks) if each.walks else "refused"
-        rows.append((each.kind, each.term or _NO_NUMBER, each.after, outcome, cost, _moved(each)))
+        rows.append((each.kind, each.term or NO_NUMBER, each.after, outcome, cost, _moved(each)))
     return Table(headers, rows, words=frozenset({0, 1, 2, 3, 5}), wide=frozenset({5}))
 
 
@@ -154,7 +147,7 @@ def _moved(tried: TriedHypothesis) -> str:
     """Return the term that a change moves most, on the same states."""
     terms = [gap for gap in tried.gaps if gap.term != "action"]
     if not terms:
-        return _NO_NUMBER
+        return NO_NUMBER
     worst = max(terms, key=_relative)
     return f"{worst.term} by {significant(worst.rms, 2)}"
 

@@ -1,38 +1,28 @@
-"""Whether there is anything that a walking robot could stand on."""
+"""The refusal of a walking robot without a floor, with the scenes that have one."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from ...errors import BadInputError
 from ...interface import Model
 from ...models import kind_of_path, models_dir
 from ..runs.floating import free_joint_of_base
-from ..runs.robot import carried_by
+from ..runs.floor import has_floor
 
 _GROUNDS: Final = ('"plane"', '"hfield"')
 
 
 def check_floor(model: Model) -> None:
-    """Check that something other than the robot can be touched.
+    """Check that a robot with a floating base has a floor.
 
-    Nothing is checked where the robot has no floating base, or where shapes are not known.
+    Nothing is checked where shapes are not known.
 
     Raises:
-        BadInputError: There is nothing; the message names a scene that has the robot on a floor.
+        BadInputError: It has none; the message names a scene that has the robot on a floor.
     """
-    base = free_joint_of_base(model)
-    compiled = model.compiled
-    if base is None or compiled is None:
-        return
-    touches = (compiled.geom_contype != 0) | (compiled.geom_conaffinity != 0)
-    touches[compiled.pair_geom1] = True
-    touches[compiled.pair_geom2] = True
-    robot = carried_by(model, [int(model.jnt_bodyid[base])])
-    if (touches & ~np.isin(model.geom_bodyid, list(robot))).any():
+    if free_joint_of_base(model) is None or has_floor(model) is not False:
         return
     scenes = [typed_name(scene) for scene in scenes_of(model.path)]
     instead = f": take {' or '.join(scenes)}" if scenes else ""
@@ -49,7 +39,7 @@ def scenes_of(path: Path) -> list[Path]:
             continue
         try:
             text = scene.read_text("utf-8", errors="replace")
-        except OSError:  # what cannot be read is nothing to take
+        except OSError:  # what cannot be read is no scene
             continue
         if f'"{path.name}"' in text and any(ground in text for ground in _GROUNDS):
             scenes.append(scene)

@@ -9,7 +9,16 @@ from typing import Final, Literal
 import numpy as np
 
 from ...interface import Array
-from .contract import CallTiming, Contract, ObservedTerm, Servos, TermId
+from .contract import (
+    ActuatorKind,
+    CallTiming,
+    Contract,
+    Frame,
+    ObservedTerm,
+    QuatOrder,
+    Servos,
+    TermId,
+)
 
 HypothesisKind = Literal[
     "quaternion order",
@@ -89,7 +98,7 @@ def with_term(contract: Contract, term: ObservedTerm, changed: ObservedTerm) -> 
 
 def _quaternion_order(contract: Contract) -> Iterator[ContractHypothesis]:
     before = contract.quat_order
-    after: Literal["wxyz", "xyzw"] = "xyzw" if before == "wxyz" else "wxyz"
+    after: QuatOrder = "xyzw" if before == "wxyz" else "wxyz"
     changed = replace(contract, quat_order=after)
     yield ContractHypothesis("quaternion order", "", before, after, changed)
 
@@ -102,7 +111,7 @@ def _frames(contract: Contract) -> Iterator[ContractHypothesis]:
         kind: HypothesisKind = "velocity frame"
         if term.id == "base_ang_vel":
             kind = "gyroscope frame"
-        after: Literal["body", "world"] = "world" if term.frame == "body" else "body"
+        after: Frame = "world" if term.frame == "body" else "body"
         changed = with_term(contract, term, replace(term, frame=after))
         yield ContractHypothesis(kind, term.name, term.frame, after, changed)
 
@@ -288,7 +297,7 @@ def _servos(contract: Contract) -> Iterator[ContractHypothesis]:
     servos: Servos = contract.servos
     if servos.kp is None or servos.kd is None or servos.kind is None:
         return
-    after: Literal["implicit_pd", "explicit_pd"] = "explicit_pd"
+    after: ActuatorKind = "explicit_pd"
     if servos.kind == "explicit_pd":
         after = "implicit_pd"
     changed = replace(contract, servos=replace(servos, kind=after))

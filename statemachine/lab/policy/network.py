@@ -67,18 +67,7 @@ class Network:
             raise BadInputError(f"there is no policy {path}") from None
         except OSError as error:
             raise BadInputError(f"{path} cannot be read: {one_line(error)}") from error
-        options = runtime.SessionOptions()
-        options.log_severity_level = _ERRORS_ONLY
-        # One thread, and in order: the same observation gives the same bits.
-        options.intra_op_num_threads = 1
-        options.inter_op_num_threads = 1
-        try:
-            # By its path, for its weights may stand in a file beside it.
-            self._session = runtime.InferenceSession(
-                str(path), options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:  # onnxruntime has an exception for each of its codes
-            raise BadInputError(f"{path} is no ONNX network: {one_line(error)}") from error
+        self._session = _session_of(path, runtime)
         inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
         _check(path, inputs, outputs)
         self._input = inputs[0].name
@@ -123,6 +112,28 @@ class Network:
         for entry, value in zip(self._memory_inputs, memory, strict=False):
             self._memory[entry.name] = value
         return np.asarray(action, dtype=np.float64).reshape(-1)
+
+
+def _session_of(path: Path, runtime: Any) -> Any:
+    """Return what runs a network, with the same bits for the same observation.
+
+    Args:
+        path: Of its file.
+        runtime: The module onnxruntime.
+
+    Raises:
+        BadInputError: It is no network.
+    """
+    options = runtime.SessionOptions()
+    options.log_severity_level = _ERRORS_ONLY
+    # One thread, and in order: sums of several have other last bits from run to run.
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    try:
+        # By its path, for its weights may stand in a file beside it.
+        return runtime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has an exception for each of its codes
+        raise BadInputError(f"{path} is no ONNX network: {one_line(error)}") from error
 
 
 def _check(path: Path, inputs: list[Any], outputs: list[Any]) -> None:

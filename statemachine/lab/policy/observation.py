@@ -158,10 +158,6 @@ class Stack:
         self.history = history
         self._moments: list[list[Array]] = []  # the oldest first, the terms of each
 
-    def reset(self) -> None:
-        """Forget all moments."""
-        self._moments = []
-
     def add(self, values: dict[str, Array]) -> Array:
         """Add the terms of a moment, and return the observation (size,)."""
         present = list(values.values())

@@ -8,18 +8,16 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...measures.command_lines import folded_command
-from ...measures.text import percent, significant
+from ...measures.text import NO_NUMBER, percent, significant
 from ...show.blocks import Page, Table, TableCell
 from ...show.templates import PageContent, render
 from .adapted import ContractChange
 from .checks import ContractNote
 from .command import LEAST_TOLERANCE, LEAST_TURN_TOLERANCE, RELATIVE_TOLERANCE
 from .contract import AXES
-from .contract_fields import UnreadField
 from .request import EngineWalks, PolicyResult, words_of_request
 from .walk import Walk
 
-_NO_NUMBER = "–"
 # What came of a run, and which way its worst speed is off.
 _WalkOutcome = Literal["falls", "diverges", "too slow", "too fast", "not asked"]
 
@@ -194,11 +192,6 @@ class PolicyPage(PageContent):
         return LEAST_TURN_TOLERANCE
 
     @property
-    def misspelt(self) -> Sequence[UnreadField]:
-        """Return the fields of the contract that nothing reads, and that are near to one."""
-        return self.result.contract.misspelt
-
-    @property
     def notes(self) -> Sequence[ContractNote]:
         """Return what else is odd about the contract and the model."""
         return [note for note in self.result.notes if note.kind != "misspelt"]
@@ -261,13 +254,13 @@ def _speeds(walk: Walk) -> list[str]:
 def speed_cells(walk: Walk) -> list[str]:
     """Return the speeds that a run reached, a cell each; dashes where it ended before."""
     if walk.reached is None:
-        return [_NO_NUMBER] * len(AXES)
+        return [NO_NUMBER] * len(AXES)
     return [f"{speed:z.2f}" for speed in walk.reached]
 
 
 def _details(walk: Walk) -> list[str]:
     """Return what a row of the details shows of a run."""
-    height = _NO_NUMBER if walk.height is None else f"{walk.height:.3f} m"
+    height = NO_NUMBER if walk.height is None else f"{walk.height:.3f} m"
     return [
         _outcome(walk),
         f"{walk.lateral:z.2f} m",

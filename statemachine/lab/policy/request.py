@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -104,7 +104,8 @@ class PolicyResult:
         contract: As it was read.
         network: What the file of the policy says.
         commands: The speeds that were asked for.
-        notes: What is odd about the contract and the model, and no fault.
+        notes: What is odd about the contract and the model, and no fault, on the first engine with
+            something odd.
         engines: One for each engine.
     """
 
@@ -132,30 +133,42 @@ def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
     contract = read_contract(request.contract)
     network = opened_network(request, contract)
     commands = request.commands or usual_commands(contract)
-    notes: list[ContractNote] = []
 
-    def compute(model: Model, backend: str, progress: Progress) -> EngineWalks:
+    def compute(model: Model, backend: str, progress: Progress) -> _EngineAnswer:
         source = provenance(model, onnxruntime=network.facts.version)
-        if not notes:
-            start = _start_of(model, request.keyframe)
-            notes.extend(notes_of(contract, model, bind(contract, model), start, commands))
+        start = _start_of(model, request.keyframe)
+        notes = notes_of(contract, model, bind(contract, model), start, commands)
         try:
             policy = PolicyOnModel.of(contract, network, model)
         except UnsupportedError as error:
-            return EngineWalks(backend, source, (), (), str(error))
+            return _EngineAnswer(EngineWalks(backend, source, (), (), str(error)), notes)
         recorded = all_walked(policy, commands, request.seconds, request.keyframe, progress)
         walks = tuple(run.walk for run in recorded)
-        return EngineWalks(backend, source, policy.driven.changes, walks)
+        return _EngineAnswer(EngineWalks(backend, source, policy.driven.changes, walks), notes)
 
-    engines = on_each_engine(request, Path(request.policy).name, compute, reporter)
+    answers = on_each_engine(request, Path(request.policy).name, compute, reporter)
+    notes = [each.notes for each in answers if each.notes]
     return PolicyResult(
         request=request,
         contract=contract,
         network=network.facts,
         commands=commands,
-        notes=tuple(notes),
-        engines=engines,
+        notes=tuple(notes[0]) if notes else (),
+        engines=tuple(each.walks for each in answers),
     )
+
+
+@dataclass(frozen=True)
+class _EngineAnswer:
+    """What came of a question on one engine.
+
+    Attributes:
+        walks: How the policy walks.
+        notes: What is odd about the contract and the model.
+    """
+
+    walks: EngineWalks
+    notes: Sequence[ContractNote]
 
 
 def opened_network(request: PolicyRequest, *contracts: Contract) -> Network:

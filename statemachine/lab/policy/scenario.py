@@ -76,24 +76,29 @@ def policy_scenario(
         qpos[binding.qpos] = expected.default_joint_pos
         return qpos
 
-    called = Path(file).name
-    every = milliseconds(expected.timing.policy_dt)
-    says = (
-        f"{called} is called every {every}, as {expected.file} says, and asked for {speeds.vx:g} "
-        f"m/s forward, {speeds.vy:g} m/s to the left and {speeds.wz:g} rad/s."
-    )
+    name = Path(file).name
+    description = _description(name, expected, speeds)
     return Scenario(
-        name=called,
-        description=says,
+        name=name,
+        description=description,
         model="",
         seconds=_SECONDS,
         controller=controller_of,
-        general_description=says,
+        general_description=description,
         needs=lambda _model: None,
         keyframe=keyframe,
         is_user_function=True,
         is_policy=True,
         start=start_of,
+    )
+
+
+def _description(name: str, contract: Contract, command: Command) -> str:
+    """Return what happens where a policy is run, in a sentence."""
+    every = milliseconds(contract.timing.policy_dt)
+    return (
+        f"{name} is called every {every}, as {contract.file} says, and asked for {command.vx:g} "
+        f"m/s forward, {command.vy:g} m/s to the left and {command.wz:g} rad/s."
     )
 
 

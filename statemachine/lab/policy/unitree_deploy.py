@@ -192,8 +192,7 @@ def _term(section: ContractSection, name: str, default: Array) -> ObservedTerm:
     """Return one term of an observation."""
     term_id = _TERMS[name]
     parameters = section.section("params")
-    for key in ("command_name", "sensor_cfg"):
-        parameters.value(key)
+    parameters.ignore("command_name", "sensor_cfg")
     if parameters.section("asset_cfg").has("joint_ids"):
         raise parameters.error("asset_cfg", "all joints of the policy are observed")
     dim = 3
@@ -225,10 +224,9 @@ def _action(actions: ContractSection, n: int) -> Action:
     if not actions.has("JointPositionAction"):
         raise actions.error("JointPositionAction", "how actions become targets is expected")
     section = actions.section("JointPositionAction")
-    section.value("joint_names")
+    section.ignore("joint_names")
     if section.has("joint_ids") and section.ids("joint_ids") != list(range(n)):
         raise section.error("joint_ids", "all joints, in their order, are expected")
-    section.value("joint_ids")
     return Action(
         scale=section.numbers("scale", n, 1.0),
         offset=section.numbers("offset", n, 0.0),
@@ -239,7 +237,7 @@ def _action(actions: ContractSection, n: int) -> Action:
 def _limits(velocity: ContractSection) -> dict[str, tuple[float, float]]:
     """Return the speeds that the policy may be asked for, by axis."""
     ranges = velocity.section("ranges")
-    ranges.value("heading")
+    ranges.ignore("heading")
     limits: dict[str, tuple[float, float]] = {}
     for key, axis in _RANGES.items():
         pair = ranges.pair(key)

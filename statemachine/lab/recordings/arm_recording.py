@@ -6,8 +6,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ...errors import BadInputError, printable
 from ...interface import Array
+from .calibration import COUNT
 from .joint_units import JointUnit
 
 PREFIX = "lerobot:"
@@ -29,8 +32,7 @@ class ArmRecording:
         action: (K, n) commanded angles [rad], in the model's zero, truncated to counts as they
             were sent.
         state: (K, n) measured angles [rad], in the model's zero.
-        resolution: (n,) angle of one count of the servos [rad].
-        units: What the numbers of the file mean, one for each joint.
+        units: What the numbers of the file mean, one for each joint; empty where there is no file.
         robot: Type of the robot as the data set has it; "" where it does not say.
     """
 
@@ -40,9 +42,13 @@ class ArmRecording:
     joints: tuple[str, ...]
     action: Array
     state: Array
-    resolution: Array
-    units: tuple[JointUnit, ...]
+    units: tuple[JointUnit, ...] = ()
     robot: str = ""
+
+    @property
+    def resolution(self) -> Array:
+        """Return the angle (n,) of one count of the servos [rad]."""
+        return np.full(len(self.joints), COUNT)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array, JointType, Model
 from ...models import AnyPath
 from .arm_recording import PREFIX, SYNTHETIC, ArmRecording, ArmRecordings
-from .calibration import read_calibration
+from .calibration import COUNT, read_calibration
 from .joint_units import JointUnit
 from .lerobot import FEWEST_FRAMES, LerobotDataSet, LerobotEpisode, open_data_set
 from .lerobot_description import joint_name
 from .robot_types import check_robot
-from .unit_inference import COUNT, MeasuredJoint, infer_units, measured_joint
+from .unit_inference import MeasuredJoint, infer_units, measured_joint
 
 _FORM = f"{PREFIX}DIR or {PREFIX}DIR#EPISODE"
 _SYNTHETIC_FOLDER = Path(__file__).resolve().parent / "synthetic"
@@ -167,9 +167,13 @@ def _measured_joints(
 
 
 def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
+    """Return an episode with angles of the model's joints.
+
+    Raises:
+        BadInputError: A command is one that no servo reaches.
+    """
     _check_reach(arm, episode)
     joints = tuple(unit.joint for unit in arm.units)
-    resolution = np.full(len(arm.units), COUNT)
     action = _angles(arm.sent(episode.action), arm.units)
     return ArmRecording(
         source=source,
@@ -178,7 +182,6 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
         joints=joints,
         action=action,
         state=_angles(episode.state, arm.units),
-        resolution=resolution,
         units=arm.units,
         robot=arm.data_set.robot,
     )

@@ -8,6 +8,7 @@ LeRobot writes it beside no recording, but into
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -17,6 +18,7 @@ from ...errors import BadInputError, printable, shown
 from ...models import AnyPath
 
 COUNTS_OF_A_TURN = 4096  # of the STS3215 of the SO-101: `MODEL_RESOLUTION` in feetech/tables.py
+COUNT = 2.0 * math.pi / COUNTS_OF_A_TURN  # rad
 
 
 @dataclass(frozen=True)

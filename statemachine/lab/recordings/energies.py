@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...backends import on_default
 from ...engines import raw_engine_of
@@ -21,7 +21,7 @@ def energies(
     defaults: Defaults,
     qpos: Array,
     qvel: Array,
-    gravity: Any = None,
+    gravity: ArrayLike | None = None,
     load: Callable[[Model], Model] = on_default,
     made: Callable[[Model], AbstractContextManager[Data]] = make_data,
 ) -> tuple[Array, str]:
@@ -35,11 +35,11 @@ def energies(
     Args:
         model: What the states are of.
         defaults: What `load` was given for it.
-        qpos: (n, nq) positions [rad or m]; qvel: (n, nv) velocities.
-        qvel: See qpos.
+        qpos: (n, nq) positions [rad or m].
+        qvel: (n, nv) velocities [rad/s or m/s].
         gravity: (3,) that `Model.replace` was given for it [m/s²]; None for none.
-        load: Gives the model's file on MuJoCo; made: a Data of a Model there, which is changed.
-        made: See load.
+        load: Gives the model's file on MuJoCo.
+        made: Makes a Data of a Model there, which is changed.
 
     Returns:
         (n, 2) kinetic and potential energy [J], and the engine and version that gave them;

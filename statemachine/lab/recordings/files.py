@@ -81,7 +81,7 @@ def read(path: AnyPath) -> Trace:
         raise TraceError(f"{source.name}: does not fit into the memory that is free") from None
     except MissingEngineError:
         raise
-    except Exception as error:  # bytes that are not trace may raise anything in those who read them
+    except Exception as error:  # damaged bytes may raise anything in NumPy and pyarrow
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         raise TraceError(f"{source.name} is not a trace: {reason}") from None
 
@@ -161,10 +161,10 @@ def _candidate_model_files(
     for where in (None, folder) if folder else (None,):
         with suppress(StateMachineError):
             yield resolve(name, where)
-    last = Path(name).name
+    file_name = Path(name).name
     for place in (Path(), Path(beside).parent) if beside is not None else (Path(),):
         with suppress(StateMachineError):
-            yield resolve(place.absolute() / last)
+            yield resolve(place.absolute() / file_name)
 
 
 def export_csv(trace: Trace, path: AnyPath) -> list[Path]:
@@ -194,6 +194,12 @@ def _write_columns(file: str, trace: Trace) -> None:
 
 
 def write_contacts(file: str, trace: Trace) -> None:
+    """Write the contacts of a trace as CSV, a row for each: time, geoms, bodies, place, force.
+
+    Args:
+        file: Where to write them.
+        trace: One that has contacts.
+    """
     header = trace.header
     labels = [
         *("time", "geom_1", "geom_2", "body_1", "body_2", "dist", "pos.x", "pos.y", "pos.z"),

@@ -62,15 +62,19 @@ class Header:
         defaults: "model", or "engine" for the engine as its own users meet it.
         options: What `Model.replace` was given, and `load` of `READ_OPTIONS`.
         keyframe: Where it started; None for the default state, or one that was given.
-        timestep: Simulated time between rows [s]; substeps: engine steps within it.
+        timestep: Simulated time between rows [s].
+        substeps: Steps of the engine within it.
         gravity: (3,) [m/s²], as the engine had it.
         nq, nv, nu, nmocap: Lengths of qpos, qvel, ctrl and mocap_pos.
         joints, sites, bodies, geoms, actuators: Names by id.
         jnt_type, jnt_qposadr, jnt_dofadr: As in a Model.
-        geom_bodyid, body_parentid, actuator_jntid, jnt_bodyid, site_bodyid: As in a Model.
+        geom_bodyid, body_parentid, actuator_jntid: As in a Model.
+        jnt_bodyid, site_bodyid: As in a Model; empty where the trace does not tell them, as some
+            that come with the package.
         ctrlrange: (nu, 2), infinite where unlimited.
         servo_gear: (nu,) the gear of each position servo on a hinge or a slide, whose ctrl is the
-            target of the joint times the gear; 0 of another actuator.
+            target of the joint times the gear; 0 of another actuator. Empty where the trace does
+            not tell it.
         energy_by: The engine that computed the energies, or "".
         rewritten: Rows whose state is not what the step before left: the controller wrote it
             (or the engine does not give the same bits twice).
@@ -110,8 +114,8 @@ class Header:
     single_precision: bool = False
     recorded: bool = False
     nmocap: int = 0
-    jnt_bodyid: tuple[int, ...] = ()  # traces before it have none
-    site_bodyid: tuple[int, ...] = ()  # nor have they this
+    jnt_bodyid: tuple[int, ...] = ()
+    site_bodyid: tuple[int, ...] = ()
     servo_gear: tuple[float, ...] = ()
     schema: int = SCHEMA
 
@@ -202,7 +206,7 @@ class Header:
         _check_ids("actuator_jntid", self.actuator_jntid, self.nu, range(-1, joints))
         _check_length("actuators", self.actuators, self.nu)
         _check_length("ctrlrange", self.ctrlrange, self.nu)
-        if self.jnt_bodyid:  # traces before it have none
+        if self.jnt_bodyid:
             _check_ids("jnt_bodyid", self.jnt_bodyid, joints, range(bodies))
         if self.site_bodyid:
             _check_ids("site_bodyid", self.site_bodyid, len(self.sites), range(bodies))
@@ -240,12 +244,12 @@ def _check_ids(name: str, ids: Sequence[int], length: int, known: range) -> None
 def labels_of_joints(
     joints: Sequence[str], kinds: Iterable[int], owners: Iterable[int], bodies: Sequence[str]
 ) -> tuple[str, ...]:
-    """See `Header.joint_labels`.
+    """Return a name for each joint, as `Header.joint_labels` does.
 
     Args:
         joints: Names by id.
-        kinds: `jnt_type`; owners: `jnt_bodyid`, empty if they are not known.
-        owners: See kinds.
+        kinds: (njnt,) `jnt_type`.
+        owners: (njnt,) `jnt_bodyid`; empty where they are not known.
         bodies: Names by id.
     """
     labels = [name or f"joint {k}" for k, name in enumerate(joints)]

@@ -91,11 +91,9 @@ def _are_versions(value: Any) -> bool:
     return all(_is_text(name) and _is_text(version) for name, version in value.items())
 
 
-_are_texts, _are_integers, _are_finite = (
-    _is_tuple_of(_is_text),
-    _is_tuple_of(_is_integer),
-    _is_tuple_of(_is_finite),
-)
+_are_texts = _is_tuple_of(_is_text)
+_are_integers = _is_tuple_of(_is_integer)
+_are_finite = _is_tuple_of(_is_finite)
 _are_intervals = _is_tuple_of(_is_interval)
 KINDS: dict[str, Callable[[Any], bool]] = {
     "nq": _is_count,

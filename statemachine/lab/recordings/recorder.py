@@ -3,8 +3,8 @@
 The run itself is watched as little as possible: each step keeps the bytes of its inputs, and
 nothing else. What the engine derives from them is read while the run is *repeated* from its
 beginning with the recorded commands. The repetition must end in the same bits, row by row,
-which is checked: a trace is a proof that the run can be replayed. Runs that nobody keeps, of which
-many are made, are not repeated: there it is read as they go.
+which is checked: a trace is a proof that the run can be replayed. Of runs that nobody keeps, of
+which many are made, it is read as the run goes, or not at all.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ from .header import Header
 from .repetition import DerivedRows, compute_derived, is_stale
 from .trace import Trace
 
-Derive = bool | Literal["at once"]
+# How a trace comes to what the engine derives: from a repetition of the run, from the run itself as
+# it goes, or not at all.
+DerivedFrom = Literal["repetition", "run", "nothing"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,7 @@ def record(
     *,
     start: RunStart = RunStart(),
     metadata: RunMetadata = RunMetadata(),
-    derive: Derive = True,
+    derived: DerivedFrom = "repetition",
     writes_state: bool = True,
     progress: Progress = no_progress,
 ) -> Trace:
@@ -117,8 +119,11 @@ def record(
         seconds: Simulated time.
         start: Where to start; the default state where nothing is said.
         metadata: What the header of the trace says of the run.
-        derive: Whether to record what the engine derives, too: True in a repetition, "at once" as
-            the run goes, where derived arrays are of the state that a step began in.
+        derived: From what the columns are that the engine derives; "nothing" leaves them out.
+            "run" does not check that the run can be repeated. Under a controller that writes ctrl
+            alone it gives the bits of "repetition". It needs an engine whose derived arrays are,
+            after a step, of the state that the step began in, and a run that does not diverge:
+            others are repeated.
         writes_state: Whether the controller may write more than ctrl.
         progress: Told the fraction that is done.
 
@@ -134,30 +139,30 @@ def record(
     if controller is not None:
         check_controller(controller)
     total = number_of_steps(model, seconds)
-    share = 0.3 if derive else 1.0
-    derived = DerivedRows() if derive == "at once" and is_stale(model) else None
+    share = 1.0 if derived == "nothing" else 0.3
+    rows = DerivedRows() if derived == "run" and is_stale(model) else None
     with make_data(model) as data:
         start.put(model, data)
         warn_of_start(model, data)
         moments = drive(model, data, controller, total, once_more=True)
-        if derived is not None:
-            moments = derived.read_along(model, data, moments)
+        if rows is not None:
+            moments = rows.read_along(model, data, moments)
         inputs, ended = _run(model, data, moments, total, progress_of_stage(progress, 0.0, share))
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""
-    if derive:
-        if derived is not None and not ended:
-            more = derived.columns()
+    if derived != "nothing":
+        if rows is not None and not ended:
+            columns |= rows.columns()
         else:
-            more, rewritten = compute_derived(
-                model, start.put, inputs, progress_of_stage(progress, share, 1.0 - share)
-            )
-        if rewritten and (controller is None or not writes_state):
+            stage = progress_of_stage(progress, share, 1.0 - share)
+            repeated, rewritten = compute_derived(model, start.put, inputs, stage)
+            columns |= repeated
+        may_write_state = controller is not None and writes_state
+        if rewritten and not may_write_state:
             raise EngineError(
                 f"the run could not be repeated: {rewritten} rows began in another state; the "
                 "engine does not give the same bits twice"
             )
-        columns |= more
         gravity = metadata.options.get("gravity")
         columns["energy"], energy_by = energies(
             model, metadata.defaults, inputs["qpos"], inputs["qvel"], gravity
@@ -267,7 +272,7 @@ def _run(
     """Run, and return the inputs of each row as the step begins, and why the run ended early."""
     times: list[float] = []
     rows: tuple[list[bytes], ...] = ([], [], [])
-    led: dict[str, list[Array]] = {name: [] for name in MOCAP if model.nmocap}
+    mocap: dict[str, list[Array]] = {name: [] for name in MOCAP if model.nmocap}
     # Bound methods: this loop is all that a recording costs while the run goes on.
     keep_time, (keep_qpos, keep_qvel, keep_ctrl) = times.append, (row.append for row in rows)
     qpos, qvel, ctrl = data.qpos.tobytes, data.qvel.tobytes, data.ctrl.tobytes
@@ -278,7 +283,7 @@ def _run(
             keep_qpos(qpos())
             keep_qvel(qvel())
             keep_ctrl(ctrl())
-            for name, poses in led.items():
+            for name, poses in mocap.items():
                 poses.append(getattr(data, name).copy())
             if not len(times) & 255:
                 progress(len(times) / total)
@@ -287,23 +292,21 @@ def _run(
             raise
         # Without its advice, which is of no use here.
         ended = str(error).partition(". This Data")[0]
-    kept = zip(INPUTS, rows, (model.nq, model.nv, model.nu), strict=True)
     inputs: Arrays = {"time": np.array(times)}
-    for name, parts, width in kept:
+    for name, parts, width in zip(INPUTS, rows, (model.nq, model.nv, model.nu), strict=True):
         inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
-    inputs |= {name: np.array(poses) for name, poses in led.items()}
-    rows_left = _rows_within_bounds(inputs)
-    if rows_left < len(times):
-        if not ended:
-            ended = f"a coordinate left every bound at {times[-1]:g} s"
-        inputs = {name: array[:rows_left] for name, array in inputs.items()}
+    inputs |= {name: np.array(poses) for name, poses in mocap.items()}
+    count = _rows_within_bounds(inputs)
+    if count < len(times) and not ended:
+        ended = f"a coordinate left every bound at {times[-1]:g} s"
+    inputs = {name: array[:count] for name, array in inputs.items()}
     _check_last_row(inputs)
     progress(1.0)
     return inputs, ended
 
 
 def _check_last_row(inputs: Arrays) -> None:
-    """Check that the controller left numbers: a step finds what is none, the last row has no step.
+    """Check that the last row has numbers: no step checks what a controller writes into it.
 
     Raises:
         BadInputError: An entry is not a finite number.

@@ -84,7 +84,7 @@ def compute_derived(
     """
     rows = len(inputs["time"])
     derived = DerivedRows()
-    after = is_stale(model)
+    reads_after_step = is_stale(model)
     rewritten = 0
     with make_data(model) as data:
         begin(model, data)
@@ -92,14 +92,14 @@ def compute_derived(
             rewritten += put_row(data, inputs, k)
             if data.time != inputs["time"][k]:
                 data.time = float(inputs["time"][k])
-            if not after:
+            if not reads_after_step:
                 forward(model, data)
                 derived.append(data)
             if k < rows - 1:
                 step(model, data)
-            elif after:
+            elif reads_after_step:
                 _take_final_step(model, data)
-            if after:
+            if reads_after_step:
                 derived.append(data)
             if k % 32 == 0:
                 progress(k / rows)
@@ -119,13 +119,15 @@ def is_stale(model: Model) -> bool:
 
 def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
     """Write row `k` of the inputs into a Data, and tell whether it was in another state."""
-    others = [n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()]
-    for name in others:
-        getattr(data, name)[:] = inputs[name][k]
+    differing: list[str] = []
+    for name in ("qpos", "qvel"):
+        if getattr(data, name).tobytes() != inputs[name][k].tobytes():
+            differing.append(name)
+            getattr(data, name)[:] = inputs[name][k]
     for name in ("ctrl", *MOCAP):
         if name in inputs:
             getattr(data, name)[:] = inputs[name][k]
-    return bool(others)
+    return bool(differing)
 
 
 def _take_final_step(model: Model, data: Data) -> None:

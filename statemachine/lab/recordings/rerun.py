@@ -15,12 +15,18 @@ from ...interface.records import Defaults
 from ..runs.drive import Controller, Progress, check_length, no_progress
 from ..runs.scenarios import Scenario
 from .header import Header
-from .recorder import Derive, RunMetadata, RunStart, record
+from .recorder import DerivedFrom, RunMetadata, RunStart, record
 from .trace import Trace
 
 
 class SideStart(NamedTuple):
-    """The start of a run: qpos (nq,), qvel (nv,), ctrl (nu,)."""
+    """The start of a run.
+
+    Attributes:
+        qpos: (nq,) positions [rad or m].
+        qvel: (nv,) velocities [rad/s or m/s].
+        ctrl: (nu,) command [unit of the actuator].
+    """
 
     qpos: Array
     qvel: Array
@@ -48,10 +54,14 @@ class Rerun:
         model: With all its options.
         controller: Makes a fresh controller of a Model; it may give None for none.
         seconds: Simulated time.
-        keyframe: Where it starts; qpos, qvel: written over that.
-        defaults: What `load` was given, for the header of the trace.
-        options: What `Model.replace` was given, likewise.
-        experiment, description, seed: Name, sentence and seed of what is done, likewise.
+        keyframe: Where it starts; None for the default state.
+        qpos: (nq,) positions that are written over that start [rad or m]; None for its own.
+        qvel: (nv,) velocities that are written over it [rad/s or m/s]; None for its own.
+        defaults: What `load` was given; this and all that follows stand in the header of the trace.
+        options: What `Model.replace` was given.
+        experiment: Name of what is done.
+        description: What happens, in a sentence.
+        seed: What the controller was drawn from; None for nothing.
         writes_state: Whether the controller may write more than ctrl.
     """
 
@@ -75,7 +85,7 @@ class Rerun:
         qpos: Array | None = None,
         qvel: Array | None = None,
         command: str = "",
-        derive: Derive = True,
+        derived: DerivedFrom = "repetition",
         progress: Progress = no_progress,
     ) -> Trace:
         """Record the run.
@@ -85,7 +95,7 @@ class Rerun:
             qpos: (nq,) where it starts, instead of its own [rad or m].
             qvel: (nv,) its velocities there, instead of its own [rad/s or m/s].
             command: What makes the trace again.
-            derive: Whether to record what the engine derives, too, as `recorder.record` takes it.
+            derived: From what the columns are that the engine derives, as of `recorder.record`.
             progress: Told the fraction that is done.
         """
         start = RunStart(
@@ -107,13 +117,13 @@ class Rerun:
             self.seconds,
             start=start,
             metadata=metadata,
-            derive=derive,
+            derived=derived,
             writes_state=self.writes_state,
             progress=progress,
         )
 
     def start(self) -> tuple[Array, Array]:
-        """Return the positions (nq,) and velocities (nv,) that it starts with."""
+        """Return positions (nq,) [rad or m] and velocities (nv,) [rad/s or m/s] at its start."""
         qpos, qvel, _ = start_of(self.model, self.keyframe)
         if self.qpos is not None:
             qpos = np.array(self.qpos)
@@ -257,20 +267,21 @@ def _check_layout(header: Header, model: Model) -> None:
 def controller_of_trace(trace: Trace) -> Controller:
     """Return a controller that gives the ctrl of a trace.
 
-    A command holds until the time of the next. The poses of mocap bodies are written likewise.
+    A command holds until the time of the next. It also writes the poses of mocap bodies.
     """
-    led = [name for name in MOCAP if name in trace]
+    mocap = [name for name in MOCAP if name in trace]
     commands, start = trace.ctrl, float(trace.time[0])
-    # A hair early, so that a sum of timesteps does not miss the row that it means.
+    # A little early, so that a sum of timesteps does not miss the row that it means.
     times = trace.time - start - 1e-6 * trace.timestep
-    began: list[float] = []
+    began: float | None = None
 
     def controller(_model: Model, data: Data) -> Array:
-        if not began:
-            began.append(data.time)
-        row = int(np.searchsorted(times, data.time - began[0], side="right")) - 1
+        nonlocal began
+        if began is None:
+            began = data.time
+        row = int(np.searchsorted(times, data.time - began, side="right")) - 1
         row = max(0, min(row, len(commands) - 1))
-        for name in led:
+        for name in mocap:
             getattr(data, name)[:] = trace[name][row]
         return commands[row]
 
@@ -278,7 +289,12 @@ def controller_of_trace(trace: Trace) -> Controller:
 
 
 def with_first_ctrl(first: Callable[[Data], Array], controller: Controller) -> Controller:
-    """Return a controller that begins with some ctrl (nu,), where it gives none of its own."""
+    """Return a controller that begins with another ctrl where it gives none of its own.
+
+    Args:
+        first: Gives that ctrl (nu,) [unit of the actuator] of a Data in its start.
+        controller: Whose ctrl it gives from then on.
+    """
     begun = False
 
     def beginning(model: Model, data: Data) -> Any:

@@ -150,17 +150,20 @@ class Trace:
 
     @property
     def qpos(self) -> Array:
-        """Return the positions (n, nq)."""
+        """Return the positions (n, nq) [rad or m]."""
         return self.columns["qpos"]
 
     @property
     def qvel(self) -> Array:
-        """Return the velocities (n, nv)."""
+        """Return the velocities (n, nv) [rad/s or m/s]."""
         return self.columns["qvel"]
 
     @property
     def ctrl(self) -> Array:
-        """Return the commands (n, nu); those of a row are in force from its time on."""
+        """Return the commands (n, nu) [unit of the actuator].
+
+        Those of a row are in force from its time on.
+        """
         return self.columns["ctrl"]
 
     def site(self, name: str) -> tuple[Array, Array]:

@@ -24,11 +24,10 @@ import numpy as np
 
 from ...errors import BadInputError
 from ...interface import Array
-from .calibration import COUNTS_OF_A_TURN, MotorCalibration
+from .calibration import COUNT, COUNTS_OF_A_TURN, MotorCalibration
 from .count_grid import FEWEST_LEVELS, CountGrid, grid_of
 from .joint_units import JointUnit
 
-COUNT = 2.0 * math.pi / COUNTS_OF_A_TURN  # rad
 FEWEST_COUNTS = 300  # of a range that was swept
 # Of a degree, in LeRobot since June 2025 and before.
 _DEGREES = (360.0 / (COUNTS_OF_A_TURN - 1), 360.0 / COUNTS_OF_A_TURN)
@@ -62,7 +61,7 @@ class MeasuredJoint:
     @property
     def is_gripper(self) -> bool:
         """Tell whether it is the gripper, whose unit is always 0 to 100."""
-        return "gripper" in self.name
+        return _is_gripper(self.name)
 
     @property
     def moves(self) -> bool:
@@ -72,16 +71,32 @@ class MeasuredJoint:
     @property
     def width(self) -> float:
         """Return how wide its range is where it is not in degrees."""
-        return 100.0 if self.is_gripper else 200.0
+        return _width(self.name)
 
 
 def measured_joint(
     name: str, joint: str, values: Array, joint_range: tuple[float, float]
 ) -> MeasuredJoint:
-    """Return a joint with its different values (all that are finite), and their grid."""
+    """Return a joint with its different values (all that are finite), and their grid.
+
+    Args:
+        name: In the recording.
+        joint: In the model.
+        values: (rows,) over all episodes, in the unit of the file.
+        joint_range: Its range in the model [rad].
+    """
     levels = np.unique(values[np.isfinite(values)])
-    finest = (100.0 if "gripper" in name else 200.0) / COUNTS_OF_A_TURN
-    return MeasuredJoint(name, joint, levels, *joint_range, grid_of(levels, finest))
+    grid = grid_of(levels, finest=_width(name) / COUNTS_OF_A_TURN)
+    return MeasuredJoint(name, joint, levels, *joint_range, grid)
+
+
+def _is_gripper(name: str) -> bool:
+    return "gripper" in name
+
+
+def _width(name: str) -> float:
+    """Return how wide the range of a joint is where it is not in degrees."""
+    return 100.0 if _is_gripper(name) else 200.0
 
 
 def infer_units(

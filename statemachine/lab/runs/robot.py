@@ -39,23 +39,12 @@ SO101_JOINTS = (
     "wrist_roll",
     "gripper",
 )
-_PLANE, _HFIELD = 0, 1  # mjtGeom
 
 
 def is_so101(model: Model) -> bool:
     """Return whether the robot is an SO-101: its driven joints have those names, in order."""
     driven = model.actuator_jntid.tolist()
     return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == SO101_JOINTS
-
-
-def has_floor(model: Model) -> bool:
-    """Return whether a plane or a height field that can be touched stands still in the scene."""
-    compiled = model.compiled
-    if compiled is None:
-        return False
-    static = ~np.isin(model.geom_bodyid, list(carried_by(model, set(model.jnt_bodyid.tolist()))))
-    touches = (compiled.geom_contype != 0) | (compiled.geom_conaffinity != 0)
-    return bool((static & touches & np.isin(compiled.geom_type, (_PLANE, _HFIELD))).any())
 
 
 def scalar_joint(model: Model, name: str) -> tuple[int, int]:

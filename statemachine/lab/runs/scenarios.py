@@ -16,7 +16,8 @@ from ...errors import BadInputError, check_name
 from ...interface import Array, Data, Model
 from ...interface.options import OptionValue
 from .drive import Controller
-from .robot import FREE_FALL, UNACTUATED, has_floor, home_keyframe, is_so101
+from .floor import has_floor
+from .robot import FREE_FALL, UNACTUATED, home_keyframe, is_so101
 from .usual_commands import check_has_actuators, draw_waves, hold_ctrl
 
 # Swings the arm with the box in its jaws by 23 degrees.

@@ -241,7 +241,7 @@ class Trials:
             model = self.setup.model(run)
             was_begun = True
             rerun = self.setup.rerun(run, model)
-            trace = rerun.record(derive=False, progress=self._deadline.check)
+            trace = rerun.record(derived="nothing", progress=self._deadline.check)
             return self._measured(run.side, model, trace)
         except DivergedError as error:
             return Trial(None, str(error), was_begun, error.time)
@@ -285,7 +285,7 @@ class Trials:
         model = self.setup.models[side]
         finer = model.replace(substeps=times * model.substeps)
         rerun = self.setup.rerun(_AS_THEY_COME[side], finer)
-        trace = rerun.record(derive=False, progress=self._deadline.check)
+        trace = rerun.record(derived="nothing", progress=self._deadline.check)
         return self._measured(side, finer, trace).curves
 
     def repeats(self) -> bool:
