@@ -236,6 +236,35 @@ def test_values_beyond_the_range_are_no_parts_of_it(column: int, shift: float) -
         infer_units(joints_of(state))
 
 
+def test_every_other_count_alone_is_not_taken_for_half_a_range() -> None:
+    each = servos("-100 to 100")
+    counts = moved_counts(each)
+    counts[:, 2] = 2.0 * np.round(0.5 * counts[:, 2])
+    with pytest.raises(BadInputError, match=r"elbow_flex makes its range 97° wide, .* is 183°"):
+        infer_units(joints_of(frames_of(each, counts).state))
+
+
+def test_values_beyond_the_range_are_refused_with_a_calibration_too() -> None:
+    each = servos("-100 to 100")
+    state = frames_of(each, moved_counts(each)).state
+    state[:, 0] += 100.0
+    with pytest.raises(BadInputError, match="shoulder_pan are neither"):
+        infer_units(joints_of(state), calibration_of(each))
+
+
+@pytest.mark.parametrize("value", [1e6, 1e300])
+def test_a_damaged_value_is_named_with_what_it_is(value: float) -> None:
+    each = servos("degrees")
+    values = frames_of(each, moved_counts(each)).state
+    values[17, 1] = value
+    joints = [
+        measured_joint(name, name, values[:, column], RANGES[column])
+        for column, name in enumerate(JOINTS)
+    ]
+    with pytest.raises(BadInputError, match=r"shoulder_lift reach from .* a value is damaged"):
+        infer_units(joints)
+
+
 def test_values_that_are_near_counts_and_not_on_them_are_refused() -> None:
     state = frames_of(servos("degrees"), moved_counts(servos("degrees"))).state
     state += np.random.default_rng(0).normal(0.0, 0.04 * DEGREE, state.shape)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from ...backends import load
-from ...errors import DivergedError, UnsupportedError
+from ...errors import BadInputError, DivergedError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
 from ..recordings.arm_recording import ArmRecording, ArmRecordings
 from ..recordings.arm_source import read_arm_recordings
+from ..recordings.lerobot import FEWEST_FRAMES
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from .parameters import ArmParameters
@@ -55,8 +57,17 @@ def asked_of(request: RecordingRequest) -> Asked:
 
 
 def shortened(recording: ArmRecording, seconds: float) -> ArmRecording:
-    """Return the first seconds of a recording."""
+    """Return the first seconds of a recording.
+
+    Raises:
+        BadInputError: They are too few frames.
+    """
     frames = round(seconds * recording.fps)
+    if frames < FEWEST_FRAMES:
+        raise BadInputError(
+            f"{seconds:g} s are {frames} frames of {recording.fps:g} a second; at least "
+            f"{FEWEST_FRAMES} are needed: take {math.ceil(FEWEST_FRAMES / recording.fps)} s or more"
+        )
     return replace(recording, action=recording.action[:frames], state=recording.state[:frames])
 
 

@@ -9,6 +9,7 @@ extrapolation from two step lengths.
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, replace
 
@@ -22,7 +23,7 @@ from ..recordings.unit_inference import COUNT
 from .parameters import ArmParameters
 from .play import behind_play
 
-_STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
+_STEPS = 240.0  # a second, at least; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
 _AFTER_UNKNOWN = 0.5  # commands before a start in motion act on so long [s]
@@ -142,7 +143,7 @@ class ArmSimulation:
     @property
     def _steps(self) -> int:
         """Return the number of steps of a frame."""
-        return max(1, round(_STEPS / self.recording.fps))
+        return math.ceil(_STEPS / self.recording.fps)
 
     def _played(self, vectors: Array, steps: int) -> Array:
         """Return the angles (W, K, n) with so many steps a frame, NaN of worlds that diverge."""
