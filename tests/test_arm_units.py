@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -353,6 +354,10 @@ def test_a_calibration_is_read_as_lerobot_writes_it(tmp_path: Path) -> None:
         ({"range_min": 900.5}, "range_min is 900.5, not a whole number"),
         ({"range_min": 4000}, "between them are 1 to 4095 counts"),
         ({"range_max": 9000}, "between them are 1 to 4095 counts"),
+        (
+            {"range_min": 10**400, "range_max": 10**400 + 10},
+            r"range_min is 10+\.\.\. and",
+        ),
         ({"drive_mode": 2}, "drive_mode is 2, not 0 or 1"),
         ({"id": 2}, "two motors have the same id"),
     ],
@@ -378,6 +383,20 @@ def test_a_file_that_is_no_calibration_is_refused(text: str, message: str, tmp_p
     path.write_text(text, "utf-8")
     with pytest.raises(BadInputError, match=message):
         read_calibration(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_pipe_in_place_of_a_calibration_is_refused_unopened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "arm.json")
+    with pytest.raises(BadInputError, match="is a named pipe, not a file"):
+        read_calibration(tmp_path / "arm.json")
+
+
+def test_a_calibration_may_lie_in_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calibration_file(tmp_path, servos("degrees"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))  # on Windows
+    assert read_calibration("~/arm.json") == calibration_of(servos("degrees"))
 
 
 def test_a_calibration_that_is_not_there_is_refused(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...errors import BadInputError, printable, shown
 from ...installed import require_extra
 from ...interface import Array, Ints
-from ...models import kind_of_path
+from ...models import check_is_file
 
 _LFS_POINTER = b"version https://git-lfs"
 MOST_ROWS = 10_000_000  # of a file: 90 hours at 30 frames per second
@@ -79,13 +79,14 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
         BadInputError: It is not there, or a pointer of git-lfs, or damaged, or lacks a column.
         MissingEngineError: pyarrow is not installed.
     """
-    if kind_of_path(path) != "a file":
-        raise BadInputError(f"there is no file {path}, which the data set's meta/ names")
     try:
+        check_is_file(path)
         with path.open("rb") as start:
             is_pointer = start.read(len(_LFS_POINTER)) == _LFS_POINTER
+    except FileNotFoundError:
+        raise BadInputError(f"there is no file {path}, which the data set's meta/ names") from None
     except OSError as error:
-        raise BadInputError(f"{path} cannot be read: {printable(error.strerror)}") from None
+        raise BadInputError(f"{path} cannot be read: {error.strerror}") from None
     if is_pointer:
         raise _pointer_error(path)
     require_extra("pyarrow.parquet", "a recording of LeRobot", "pyarrow", "recordings")
