@@ -9,6 +9,7 @@ import numpy as np
 
 from ...interface import Array
 from ..runs.drive import Progress, no_progress
+from .clock import moved_by_clock
 from .fit import Fit, Objective, fit, starting_points
 from .residuals import Residuals, root_mean_square
 
@@ -29,11 +30,13 @@ class Fits:
         each: At least one; `cost` of each is by the noise that the best one leaves.
         residuals: Of the best one.
         beside: Fisher informations (free, free) of arms with joints that are weaker.
+        clock_shift: (free,) by how much parameters move if the clock is off by what is uncertain.
     """
 
     each: tuple[Fit, ...]
     residuals: Residuals
     beside: tuple[Array, ...] = ()
+    clock_shift: Array | float = 0.0
 
     @property
     def best(self) -> Fit:
@@ -55,11 +58,12 @@ class Fits:
         """Return the standard deviations (free,) of what was fitted, with the prior.
 
         By the noise of each joint; where more than noise is left, by so much more. Of the best fit
-        or of an arm beside it, whichever tells less.
+        or of an arm beside it, whichever tells less. And by the clock, which no recording tells.
         """
         prior = self.best.objective.prior_deviations
         more = self._more_than_noise
-        return least_certain([each / more**2 for each in self.informations], prior)
+        by_noise = least_certain([each / more**2 for each in self.informations], prior)
+        return np.hypot(by_noise, self.clock_shift)
 
     @property
     def covariance(self) -> Array:
@@ -152,8 +156,9 @@ def fits_from_starts(
     every_one = _in_order([best, *others])
     residuals = Residuals.of(every_one[0].errors, recording)
     beside = informations_beside(every_one[0])
+    clock_shift = moved_by_clock(every_one[0])
     progress(1.0)
-    return Fits(every_one, residuals, beside)
+    return Fits(every_one, residuals, beside, clock_shift)
 
 
 def gone_on(end: Fit, best: Fit) -> Fit:
