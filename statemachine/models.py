@@ -48,6 +48,14 @@ def model_names() -> list[str]:
     return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
 
 
+def expanded(path: AnyPath) -> Path:
+    """Return a path with "~" replaced by a home; as it is where there is no such user."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
+
+
 def kind_of_path(path: Path) -> str:
     """Say what a path leads to, in two words: "a file", "a folder", "a named pipe", "nothing".
 
@@ -119,7 +127,7 @@ def _path_of(model: AnyPath, menagerie: AnyPath | None) -> Path:
     if path.suffix.lower() in SUFFIXES:
         return path.absolute() if path.is_file() else _path_of_name(text, menagerie)
     if menagerie is not None:
-        return _in_menagerie(text, Path(menagerie).expanduser())
+        return _in_menagerie(text, expanded(menagerie))
     name = text if "/" in text else f"{text}/{text}"
     if name in model_names():
         return models_dir() / f"{name}.xml"
@@ -130,7 +138,7 @@ def _path_of(model: AnyPath, menagerie: AnyPath | None) -> Path:
     if path.is_file():
         raise ModelFileError(f"model file {text} does not end in {', '.join(SUFFIXES)}")
     if os.environ.get("MENAGERIE") and "/" in text:
-        return _in_menagerie(text, Path(os.environ["MENAGERIE"]).expanduser())
+        return _in_menagerie(text, expanded(os.environ["MENAGERIE"]))
     raise unknown_name("model", text, model_names())
 
 
@@ -142,9 +150,9 @@ def _path_of_name(name: str, menagerie: AnyPath | None) -> Path:
     """
     if menagerie is None and name.removesuffix(".xml") in model_names():
         return models_dir() / name
-    if menagerie is not None and (Path(menagerie).expanduser() / name).is_file():
-        return (Path(menagerie).expanduser() / name).absolute()
-    kind = kind_of_path(Path(name).expanduser())
+    if menagerie is not None and (expanded(menagerie) / name).is_file():
+        return (expanded(menagerie) / name).absolute()
+    kind = kind_of_path(expanded(name))
     what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
     raise ModelFileError(f"model file {name} {what}")
 

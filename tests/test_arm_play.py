@@ -145,7 +145,7 @@ def test_a_refit_says_where_a_fit_with_play_ends(clean):
     profile = play_profiles(LinearRefit.of(clean.best))[ELBOW]
     place = 2
     play = np.zeros(6)
-    play[ELBOW] = profile.widths[place]
+    play[ELBOW] = profile.sizes[place]
     objective = clean.best.objective
     other = replace(objective, simulation=replace(objective.simulation, play=play))
     end = fit(other, clean.best.vector, derivatives="exact")

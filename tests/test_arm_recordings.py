@@ -202,10 +202,10 @@ def test_a_command_on_a_count_stays_there(arm: sm.Model, tmp_path: Path) -> None
     each = servos("-100 to 100")
     made = data_set(each)
     first = made.episodes[0]
-    told = replace(first, action=first.state)
+    told = replace(first, action=np.roll(first.state, 7, axis=0))
     source = written(tmp_path, replace(made, episodes=[told, made.episodes[1]]))
     fitted = recordings(source, arm).fitted
-    np.testing.assert_allclose(fitted.action, fitted.state, atol=1e-9)
+    np.testing.assert_allclose(fitted.action, np.roll(fitted.state, 7, axis=0), atol=1e-9)
 
 
 def test_several_files_of_version_3_are_one_data_set(arm: sm.Model, tmp_path: Path) -> None:
@@ -267,7 +267,12 @@ def test_another_arm_is_read_with_a_model_of_its_own(arm: sm.Model, tmp_path: Pa
         ("lerobot:", "a recording is lerobot:DIR"),
         ("lerobot:#3", "a recording is lerobot:DIR"),
         ("lerobot:DIR#three", "an episode is a number"),
+        ("lerobot:DIR#-1", "an episode is a number"),
+        ("lerobot:DIR#0-2", "an episode is a number"),
+        ("lerobot:DIR#" + 5000 * "1", "an episode is a number"),
         ("lerobot:nowhere/at/all", "there is no folder"),
+        ("lerobot:~nobody-of-that-name/x", "there is no folder ~nobody-of-that-name/x"),
+        ("lerobot:" + 300 * "a", "there is no folder"),
     ],
 )
 def test_words_that_name_no_recording_are_refused(source: str, message: str, arm: sm.Model) -> None:
@@ -297,6 +302,11 @@ V3_FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "no version": (lambda d: set_info(d, codebase_version=None), "codebase_version is None"),
     "fps 0": (lambda d: set_info(d, fps=0), "fps must be positive; got 0"),
     "fps below 0": (lambda d: set_info(d, fps=-30), "fps must be positive; got -30"),
+    "fps of 400 digits": (
+        lambda d: set_info(d, fps=10**400),
+        r"fps is 10+\.\.\., and at most 1000",
+    ),
+    "fps no number": (lambda d: set_info(d, fps=float("nan")), "fps must be positive; got nan"),
     "fps text": (lambda d: set_info(d, fps="30"), "fps is '30', not a number"),
     "no features": (lambda d: set_info(d, features={}), "features has no observation.state"),
     "no names": (lambda d: set_names(d, "action", None), "action has no names"),
@@ -344,6 +354,10 @@ V3_FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda d: _without_column(d / V3_DATA, "timestamp"),
         "has no column timestamp",
     ),
+    "rows of several lengths": (
+        lambda d: _with_ragged_lists(d / V3_DATA, "observation.state"),
+        "column observation.state has more numbers in some rows than in others",
+    ),
     "frame_index of text": (
         lambda d: _with_text(d / V3_DATA, "frame_index"),
         "does not hold whole numbers",
@@ -355,6 +369,18 @@ def _without_column(path: Path, name: str) -> None:
     from pyarrow import parquet
 
     parquet.write_table(parquet.read_table(path).drop_columns([name]), path)
+
+
+def _with_ragged_lists(path: Path, name: str) -> None:
+    """Move a number from a row to the one before."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    table = parquet.read_table(path)
+    rows = table[name].to_pylist()
+    rows[3] = [*rows[3], rows[4].pop(0)]
+    ragged = pa.array(rows, pa.list_(pa.float32()))
+    parquet.write_table(table.set_column(table.column_names.index(name), name, ragged), path)
 
 
 def _with_text(path: Path, name: str) -> None:
@@ -439,6 +465,36 @@ def test_a_command_of_more_than_a_turn_is_refused(arm: sm.Model, tmp_path: Path)
     source = written(tmp_path, replace(made, episodes=[replace(first, action=far)]))
     with pytest.raises(BadInputError, match="action of elbow_flex is 2048 in frame 17"):
         recordings(source, arm)
+
+
+@pytest.mark.parametrize("later", [0, 1])
+def test_actions_that_are_what_was_measured_are_no_commands(
+    later: int, arm: sm.Model, tmp_path: Path
+) -> None:
+    made = data_set(DEGREES)
+    first = made.episodes[0]
+    guided = replace(first, action=np.roll(first.state, -later, axis=0))
+    source = written(tmp_path, replace(made, episodes=[guided]))
+    with pytest.raises(BadInputError, match="guided by hand"):
+        recordings(source, arm)
+
+
+def test_an_encoder_that_goes_over_its_end_is_named_with_its_frame(
+    arm: sm.Model, tmp_path: Path
+) -> None:
+    made = data_set(DEGREES)
+    over = np.array(made.episodes[0].state)
+    over[60:, 4] -= 4096 * 360 / 4095
+    with pytest.raises(BadInputError, match=r"wrist_roll turns by 3..° from frame 59 to 60"):
+        recordings(written(tmp_path, with_state(made, over)), arm)
+
+
+def test_a_change_that_a_fast_servo_can_make_is_read(arm: sm.Model, tmp_path: Path) -> None:
+    made = data_set(DEGREES)
+    turned = np.array(made.episodes[0].state)
+    turned[60:, 4] += 340 * 360 / 4095  # counts: 900° a second
+    state = recordings(written(tmp_path, with_state(made, turned)), arm).fitted.state
+    assert state[60, 4] - state[59, 4] > np.radians(29.0)
 
 
 def test_too_few_frames_are_refused(arm: sm.Model, tmp_path: Path) -> None:

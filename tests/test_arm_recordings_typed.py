@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from statemachine import cli, lab
 from statemachine.cli.compare.recordings import OPTIONS_OF_RECORDINGS, recording_request_of
 from statemachine.errors import BadInputError, StateMachineError
 from statemachine.lab.compare.typed_sides import split_words
-from statemachine.lab.identification import question, recorded_gap
+from statemachine.lab.identification import arm_report, question, recorded_gap
 from statemachine.lab.identification.results import (
     IdentificationResult,
     RecordingRequest,
@@ -206,6 +208,35 @@ def test_json_has_the_figures_and_no_arrays(capfd: pytest.CaptureFixture[str]) -
 def test_a_page_is_checked_before_anything_is_asked(answered: list[str]) -> None:
     assert cli.main(["compare", RECORDING, "so101", "--html", "x.txt"]) == 2
     assert answered == []
+
+
+@pytest.mark.usefixtures("answered")
+def test_what_was_found_is_shown_where_the_page_cannot_be_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def fill_disk(file: Path, _result: object) -> str:
+        raise OSError(errno.ENOSPC, "No space left on device", str(file))
+
+    monkeypatch.setattr(arm_report, "write_arm_page", fill_disk)
+    page = tmp_path / "page.html"
+    assert cli.main(["compare", RECORDING, "so101", "--why", "--json", "--html", str(page)]) == 2
+    shown = capfd.readouterr()
+    assert shown.err == f"statemachine: {page}: No space left on device\n"
+    assert json.loads(shown.out)["gap"]["episode"] == identification_result().gap.episode
+
+
+# How much is taken.
+
+
+@pytest.mark.parametrize(
+    ("fps", "seconds", "least"), [(1.0, 1.0, 30), (20.0, 1.4, 2), (29.0, 1.0, 2)]
+)
+def test_too_few_frames_are_refused_with_how_many_seconds_are_needed(
+    fps: float, seconds: float, least: int
+) -> None:
+    recording = replace(recording_result().recordings.fitted, fps=fps)
+    with pytest.raises(BadInputError, match=f"take {least} s or more"):
+        recorded_gap.shortened(recording, seconds)
 
 
 # From Python.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -236,6 +237,35 @@ def test_values_beyond_the_range_are_no_parts_of_it(column: int, shift: float) -
         infer_units(joints_of(state))
 
 
+def test_every_other_count_alone_is_not_taken_for_half_a_range() -> None:
+    each = servos("-100 to 100")
+    counts = moved_counts(each)
+    counts[:, 2] = 2.0 * np.round(0.5 * counts[:, 2])
+    with pytest.raises(BadInputError, match=r"elbow_flex makes its range 97° wide, .* is 183°"):
+        infer_units(joints_of(frames_of(each, counts).state))
+
+
+def test_values_beyond_the_range_are_refused_with_a_calibration_too() -> None:
+    each = servos("-100 to 100")
+    state = frames_of(each, moved_counts(each)).state
+    state[:, 0] += 100.0
+    with pytest.raises(BadInputError, match="shoulder_pan are neither"):
+        infer_units(joints_of(state), calibration_of(each))
+
+
+@pytest.mark.parametrize("value", [1e6, 1e300])
+def test_a_damaged_value_is_named_with_what_it_is(value: float) -> None:
+    each = servos("degrees")
+    values = frames_of(each, moved_counts(each)).state
+    values[17, 1] = value
+    joints = [
+        measured_joint(name, name, values[:, column], RANGES[column])
+        for column, name in enumerate(JOINTS)
+    ]
+    with pytest.raises(BadInputError, match=r"shoulder_lift reach from .* a value is damaged"):
+        infer_units(joints)
+
+
 def test_values_that_are_near_counts_and_not_on_them_are_refused() -> None:
     state = frames_of(servos("degrees"), moved_counts(servos("degrees"))).state
     state += np.random.default_rng(0).normal(0.0, 0.04 * DEGREE, state.shape)
@@ -324,6 +354,10 @@ def test_a_calibration_is_read_as_lerobot_writes_it(tmp_path: Path) -> None:
         ({"range_min": 900.5}, "range_min is 900.5, not a whole number"),
         ({"range_min": 4000}, "between them are 1 to 4095 counts"),
         ({"range_max": 9000}, "between them are 1 to 4095 counts"),
+        (
+            {"range_min": 10**400, "range_max": 10**400 + 10},
+            r"range_min is 10+\.\.\. and",
+        ),
         ({"drive_mode": 2}, "drive_mode is 2, not 0 or 1"),
         ({"id": 2}, "two motors have the same id"),
     ],
@@ -349,6 +383,20 @@ def test_a_file_that_is_no_calibration_is_refused(text: str, message: str, tmp_p
     path.write_text(text, "utf-8")
     with pytest.raises(BadInputError, match=message):
         read_calibration(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_pipe_in_place_of_a_calibration_is_refused_unopened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "arm.json")
+    with pytest.raises(BadInputError, match="is a named pipe, not a file"):
+        read_calibration(tmp_path / "arm.json")
+
+
+def test_a_calibration_may_lie_in_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calibration_file(tmp_path, servos("degrees"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))  # on Windows
+    assert read_calibration("~/arm.json") == calibration_of(servos("degrees"))
 
 
 def test_a_calibration_that_is_not_there_is_refused(tmp_path: Path) -> None:

@@ -127,6 +127,12 @@ WRONG = [
     ("timing.sim_dt", 0.003),
     ("timing.sim_dt", 0.04),
     ("timing.sim_dt", 0.0),
+    ("timing.sim_dt", 1e-320),
+    ("timing.policy_dt", 1.5),
+    ("timing.decimation", 1_000_000),
+    (f"{POLICY}.history.length", 1_000_000_000),
+    (f"{ACTION}.delay_steps", 1e300),
+    (f"{ACTUATORS}.kp", 10**400),
     ("timing.decimation", 5),
     ("timing.decimation", 0),
     ("timing", 3),
@@ -168,6 +174,33 @@ def test_a_misspelt_name_is_answered_with_the_nearest(
     with pytest.raises(BadInputError) as caught:
         contract(tmp_path, changes)
     assert str(caught.value).split("Did you mean ")[1].startswith(f"{nearest}?")
+
+
+@pytest.mark.parametrize("key", [1, None, True])
+def test_a_field_whose_name_is_no_text_is_unread(tmp_path: Path, key: object) -> None:
+    fields = {**content(), key: "what"}
+    read = read_contract(contract_file(tmp_path, fields))
+    assert [field.name for field in read.unread] == [str(key)]
+
+
+@pytest.mark.parametrize("field", ["timing", "kp"])
+def test_a_key_that_stands_twice_is_refused_with_its_line(tmp_path: Path, field: str) -> None:
+    file = contract_file(tmp_path, content())
+    lines = file.read_text("utf-8").splitlines()
+    number = next(i for i, line in enumerate(lines) if line.strip().startswith(f"{field}:"))
+    indent = lines[number][: len(lines[number]) - len(lines[number].lstrip())]
+    lines.append(f"{indent}{field}: 1")  # the sections of kp and timing: the last, the whole
+    written(file, "\n".join(lines))
+    says = rf"contract\.yaml: '{field}' stands twice in a table, again in line {len(lines)}"
+    with pytest.raises(BadInputError, match=says):
+        read_contract(file)
+
+
+def test_a_key_that_an_alias_merges_may_stand_for_another(tmp_path: Path) -> None:
+    file = contract_file(tmp_path, content())
+    merged = "first: &first {a: 1}\nsecond: {<<: *first, a: 2}\n"
+    written(file, file.read_text("utf-8") + merged)
+    assert [field.name for field in read_contract(file).unread] == ["first", "second"]
 
 
 def test_nothing_of_a_whole_contract_is_unread(tmp_path: Path) -> None:

@@ -209,6 +209,42 @@ def test_an_action_that_is_no_number_is_refused_with_its_time(tmp_path: Path, mo
         run(on_model(tmp_path, model, network), 1)
 
 
+@pytest.mark.parametrize(("action", "scale"), [(1e38, 1.0), (0.1, 1e308), (1.0, 1e11)])
+def test_a_target_that_no_servo_can_be_told_is_refused_with_its_time(
+    tmp_path: Path, model: Model, action: float, scale: float
+) -> None:
+    network = constant_network(tmp_path, [action, 0.0])
+    policy = on_model(tmp_path, model, network, {"control.actions.joint_pos.scale": scale})
+    with pytest.raises(BadInputError, match=r"policy\.onnx gave at 0\.000 s .* no servo"):
+        run(policy, 1)
+
+
+def test_a_torque_of_a_far_target_is_at_its_limit(tmp_path: Path) -> None:
+    need_engine("mujoco")
+    model = load(robot(tmp_path, motors(8.0)))
+    policy = on_model(tmp_path, model, constant_network(tmp_path, [1e30, 1e30]), EXPLICIT)
+    assert run(policy, 1).ctrl[0].tolist() == [8.0, 8.0]
+
+
+def test_an_observation_beyond_single_precision_is_refused_with_its_time(
+    tmp_path: Path, model: Model
+) -> None:
+    policy = on_model(tmp_path, model, constant_network(tmp_path, [0.0, 0.0]))
+    with pytest.raises(BadInputError, match=r"contract\.yaml observes at 0\.000 s"):
+        run(policy, 1, command=(1e300, 0.0, 0.0))
+
+
+def test_a_run_that_is_over_before_the_second_call_is_refused(tmp_path: Path, model: Model) -> None:
+    policy = on_model(tmp_path, model, constant_network(tmp_path, [0.0, 0.0]))
+    with pytest.raises(BadInputError, match=r"in 0\.03 s .* each 0\.02 s"):
+        walked(policy, Command(0.5), 0.03)
+
+
+def test_two_calls_are_enough_to_tell_a_speed(tmp_path: Path, model: Model) -> None:
+    policy = on_model(tmp_path, model, constant_network(tmp_path, [0.0, 0.0]))
+    assert walked(policy, Command(0.5), 0.04).walk.reached is not None
+
+
 def test_another_number_of_actions_is_refused(tmp_path: Path, model: Model) -> None:
     network = saved(
         tmp_path / "policy.onnx",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +144,64 @@ def test_an_input_of_other_numbers_is_refused_by_its_name(tmp_path: Path, kind: 
     )
     with pytest.raises(BadInputError, match="'seen'"):
         Network(file)
+
+
+@pytest.mark.parametrize("kind", ["INT32", "STRING"])
+def test_an_action_that_is_no_number_is_refused_by_its_name(tmp_path: Path, kind: str) -> None:
+    target = getattr(onnx.TensorProto, kind)
+    file = saved(
+        tmp_path / "policy.onnx",
+        [onnx.helper.make_node("Cast", ["obs"], ["told"], to=target)],
+        [tensor("obs", [1, 2])],
+        [tensor("told", [1, 2], kind)],
+    )
+    with pytest.raises(BadInputError, match="'told'"):
+        Network(file)
+
+
+def test_a_pointer_of_git_lfs_is_told(tmp_path: Path) -> None:
+    text = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 3\n"
+    with pytest.raises(BadInputError, match="git lfs pull"):
+        Network(written(tmp_path / "policy.onnx", text))
+
+
+def _of_unknown_ir(file: Path) -> None:
+    model = onnx.load(file)
+    model.ir_version = 99
+    file.write_bytes(model.SerializeToString())
+
+
+def _of_unknown_opset(file: Path) -> None:
+    model = onnx.load(file)
+    model.opset_import[0].version = 99
+    file.write_bytes(model.SerializeToString())
+
+
+@pytest.mark.parametrize("damage", [_of_unknown_ir, _of_unknown_opset])
+def test_of_what_onnxruntime_says_the_reason_is_told_alone(
+    tmp_path: Path, damage: Callable[[Path], None]
+) -> None:
+    file = constant_network(tmp_path, [0.0])
+    damage(file)
+    with pytest.raises(BadInputError, match="99") as caught:
+        Network(file)
+    assert not re.search(r"ONNXRuntimeError|\.(cc|h):\d|std::", str(caught.value))
+
+
+def test_onnxruntime_writes_nothing_of_a_failure_itself(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Sizes that the file leaves open are found to be others only when it runs."""
+    file = saved(
+        tmp_path / "policy.onnx",
+        [node("Gemm", "obs w b", "actions")],
+        [tensor("obs", ["batch", "size"])],
+        [tensor("actions", ["batch", "size"])],
+        {"w": np.zeros((4, 2)), "b": np.zeros(2)},
+    )
+    with pytest.raises(BadInputError, match="Gemm"):
+        Network(file)(np.zeros(3))
+    assert capfd.readouterr().err == ""
 
 
 def test_an_input_that_no_output_feeds_is_refused(tmp_path: Path) -> None:

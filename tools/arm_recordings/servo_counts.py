@@ -10,7 +10,7 @@ import numpy as np
 
 from statemachine.interface import Array, Model
 from statemachine.lab.recordings.calibration import COUNTS_OF_A_TURN, MotorCalibration
-from statemachine.lab.recordings.unit_inference import COUNT
+from statemachine.lab.recordings.calibration import COUNT
 
 from .arm_truth import GRIPPER
 

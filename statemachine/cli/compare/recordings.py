@@ -113,9 +113,12 @@ def run_recording(options: argparse.Namespace) -> int:
         check_page(page_file, reporter)
     with stop_is_said():
         result = _result_of(request, options.why, reporter)
-    if page_file is not None:
-        print(write_arm_page(page_file, result), file=sys.stderr)
-    return show(result.page(options.details), result, options.json)
+    try:
+        if page_file is not None:
+            print(write_arm_page(page_file, result), file=sys.stderr)
+    finally:  # a disk that is full takes nothing from what took a minute
+        code = show(result.page(options.details), result, options.json)
+    return code
 
 
 def _result_of(

@@ -30,6 +30,7 @@ _SPREAD = 0.7  # of draws, by the standard deviations of the prior
 _DRAWS_FOR_EACH = 12  # draws for each start, of which the best are taken
 _STIFFNESS = (-5.5, 0.5)  # logarithm of the factor of all gains, drawn from between
 _AMONG_SERVOS = 0.3  # spread of the gains of one arm, by that of the prior
+_AT_ONCE = 48  # vectors that are simulated together, for their memory
 _RESIDUAL_OF_NAN = 1e4  # of an angle of a simulation that diverged: no such point is kept
 
 
@@ -91,11 +92,13 @@ class Objective:
             vectors: Of the parameters.
             with_error: As of `ArmSimulation.angles_of_each`.
         """
-        angles = self.simulation.angles_of_each(vectors, with_error)
         costs: list[float] = []
-        for world, vector in enumerate(vectors):
-            residuals = self.residuals(vector[self.free], angles[world])
-            costs.append(0.5 * float(residuals @ residuals))
+        for first in range(0, len(vectors), _AT_ONCE):
+            few = vectors[first : first + _AT_ONCE]
+            angles = self.simulation.angles_of_each(few, with_error)
+            for world, vector in enumerate(few):
+                residuals = self.residuals(vector[self.free], angles[world])
+                costs.append(0.5 * float(residuals @ residuals))
         return costs
 
     def jacobian(self, values: Array, with_error: bool = False) -> Array:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import NO_NUMBER, degrees, fixed
+from ...measures.text import degrees, fixed
 from ...show.blocks import Table
 from ...show.templates import PageContent
+from .clock import UNCERTAIN_RATE
 from .hypotheses import EVIDENCE
 from .parameter_table import determined_table, share_table, undetermined_table
-from .parameter_texts import name_of_parameter
+from .parameter_texts import name_of_parameter, size_text
 from .recording_page import gap_table
 from .results import IdentificationResult, StartOutcome
 from .unknown import TellingMotion, motions_of, undeterminable
@@ -69,14 +70,18 @@ class IdentificationDetails(PageContent):
         rows: list[tuple[str, ...]] = []
         for each in self.result.hypotheses:
             residual, evidence = degrees(each.residual, 3), fixed(each.evidence, 1)
-            size = NO_NUMBER if each.size is None else degrees(each.size, 2)
-            rows.append((each.name, size, residual, evidence, each.verdict))
+            rows.append((each.name, size_text(each), residual, evidence, each.verdict))
         return Table(headers, rows, words=frozenset({0, 4}))
 
     @property
     def decisive(self) -> float:
         """Return the evidence above which a reading fits better."""
         return EVIDENCE
+
+    @property
+    def uncertain_rate(self) -> float:
+        """Return how uncertain the rate of frames is taken to be, as a part of it."""
+        return UNCERTAIN_RATE
 
     @property
     def has_hypotheses(self) -> bool:

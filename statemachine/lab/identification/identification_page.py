@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...measures.text import degrees, grouped
+from ...measures.text import grouped
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits, with_answer
 from ...show.templates import PageContent, render, render_blocks
 from .identification_details import IdentificationDetails
 from .page_of_recording import PageOfRecording
 from .parameter_table import UNKNOWN, joint_table, ranked_shares
-from .parameter_texts import figure_text, interval_text
+from .parameter_texts import figure_text, interval_text, size_text
 from .results import (
     CauseShare,
     FittedParameter,
@@ -110,8 +110,8 @@ class IdentificationPage(PageOfRecording, PageContent):
     @property
     def lacking(self) -> list[str]:
         """Return what the model lacks and fits better with, and how much of it."""
-        sized = [(each.name, each.size) for each in self._better]
-        return [f"{name} ({degrees(size, 2)})" for name, size in sized if size is not None]
+        sized = [each for each in self._better if each.size is not None]
+        return [f"{each.name} ({size_text(each)})" for each in sized]
 
     @property
     def _better(self) -> list[Hypothesis]:

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import math
 
-from ...measures.text import NO_NUMBER, figure, fixed, rough, significant, unit_suffix
-from .results import UNITS, FittedParameter, Kind, Reason
+from ...measures.text import (
+    NO_NUMBER,
+    degrees,
+    figure,
+    fixed,
+    percent,
+    rough,
+    significant,
+    unit_suffix,
+)
+from .results import UNITS, FittedParameter, Hypothesis, Kind, Reason
 
 # Of what the model has none of: from the unit of a result to the one that is read, that, and how
 # many decimals it has.
@@ -20,6 +29,7 @@ REASON_WORDS: dict[Reason, str] = {
     "starts disagree": "starts",
     "does not hold elsewhere": "elsewhere",
     "play fits as well": "play",
+    "friction of the load fits as well": "load",
     "a tilted base fits as well": "tilt",
 }
 
@@ -58,6 +68,15 @@ def half_width_text(parameter: FittedParameter) -> str:
 def figure_text(kind: Kind, value: float) -> str:
     """Return a figure of a parameter with its unit; arguments as of `number_text`."""
     return f"{number_text(kind, value)}{unit_suffix(unit_text(kind))}"
+
+
+def size_text(hypothesis: Hypothesis) -> str:
+    """Return the size of what the model lacks, with its unit; a dash of what has none."""
+    if hypothesis.size is None:
+        return NO_NUMBER
+    if hypothesis.unit == "rad":
+        return degrees(hypothesis.size, 2)
+    return f"{percent(hypothesis.size)} {hypothesis.unit}"
 
 
 def interval_text(parameter: FittedParameter) -> str:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...backends import load
-from ...errors import DivergedError, UnsupportedError
+from ...errors import BadInputError, DivergedError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
 from ..recordings.arm_recording import ArmRecording, ArmRecordings
 from ..recordings.arm_source import read_arm_recordings
+from ..recordings.lerobot import FEWEST_FRAMES
 from ..runs.provenance import provenance
 from ..runs.reporter import QUIET, Reporter
 from .parameters import ArmParameters
@@ -54,8 +56,18 @@ def recorded_arm_of(request: RecordingRequest) -> RecordedArm:
 
 
 def shortened(recording: ArmRecording, seconds: float) -> ArmRecording:
-    """Return the first seconds of a recording."""
-    return _first_frames(recording, round(seconds * recording.fps))
+    """Return the first seconds of a recording.
+
+    Raises:
+        BadInputError: They are too few frames.
+    """
+    frames = round(seconds * recording.fps)
+    if frames < FEWEST_FRAMES:
+        raise BadInputError(
+            f"{seconds:g} s are {frames} frames of {recording.fps:g} a second; at least "
+            f"{FEWEST_FRAMES} are needed: take {math.ceil(FEWEST_FRAMES / recording.fps)} s or more"
+        )
+    return _first_frames(recording, frames)
 
 
 def _first_frames(recording: ArmRecording, frames: int) -> ArmRecording:

@@ -1,6 +1,6 @@
-"""What a model lacks and an arm may have, play of its joints and a tilted base, tried on a fit.
+"""What a model lacks and an arm may have, tried on a fit: play, loaded gears, a tilted base.
 
-Either may pass for friction, gains or offsets, and leave no more than noise. What it would change
+Each may pass for friction, gains or offsets, and leave no more than noise. What it would change
 is not determined.
 """
 
@@ -15,6 +15,7 @@ from ...interface import Array
 from .fit import Fit, fit
 from .hypotheses import EVIDENCE, verdict_of
 from .linear_refit import LinearRefit
+from .load_friction import load_friction_profile
 from .play_profiles import play_profiles
 from .residuals import root_mean_square
 from .results import Hypothesis, Reason
@@ -56,7 +57,7 @@ class Refinement:
 
 
 def tried_refinements(fits: Fits) -> tuple[Refinement, ...]:
-    """Return how well play of each joint and a tilted base fit.
+    """Return how well play of each joint, friction of loaded gears and a tilted base fit.
 
     All are tried by the Jacobian of the best fit. What then fits better is fitted.
 
@@ -67,14 +68,14 @@ def tried_refinements(fits: Fits) -> tuple[Refinement, ...]:
     if not math.isfinite(best.cost):
         return ()
     refit = LinearRefit.of(best)
-    return (*_of_play(refit), _of_tilt(refit))
+    return (*_of_play(refit), _of_load_friction(refit), _of_tilt(refit))
 
 
 def _of_play(refit: LinearRefit) -> list[Refinement]:
     """Return play of each joint; the joints that are likely to have some are fitted together."""
     best = refit.fit
     profiles = play_profiles(refit)
-    widths = np.array([profile.widths[profile.best] for profile in profiles])
+    widths = np.array([profile.sizes[profile.best] for profile in profiles])
     residuals = [profile.ends[profile.best].residual for profile in profiles]
     shifts = [profile.as_good for profile in profiles]
     likely = np.array([profile.evidence > EVIDENCE for profile in profiles])
@@ -86,7 +87,7 @@ def _of_play(refit: LinearRefit) -> list[Refinement]:
             shifts[place] = np.vstack([shifts[place], _moved(best, fitted)])
         # Widths come out larger once friction is less, which had stood in for play.
         again = play_profiles(LinearRefit.of(fitted))
-        widths = np.where(likely, [each.widths[each.best] for each in again], widths)
+        widths = np.where(likely, [each.sizes[each.best] for each in again], widths)
     refinements: list[Refinement] = []
     for place, joint in enumerate(best.objective.parameters.joints):
         evidence = profiles[place].evidence
@@ -99,6 +100,29 @@ def _of_play(refit: LinearRefit) -> list[Refinement]:
         )
         refinements.append(Refinement(hypothesis, "play fits as well", shifts[place]))
     return refinements
+
+
+def _of_load_friction(refit: LinearRefit) -> Refinement:
+    """Return friction in the gears of all servos, of one make, that grows with their force."""
+    best = refit.fit
+    profile = load_friction_profile(refit)
+    part, end = float(profile.sizes[profile.best]), profile.ends[profile.best]
+    shifts, is_nearer = profile.as_good, False
+    if profile.evidence > EVIDENCE:
+        loaded = replace(best.objective.simulation, load_friction=np.array([part]))
+        fitted = _fitted(best, loaded)
+        is_nearer = fitted.cost < refit.cost - EVIDENCE
+        if is_nearer:
+            shifts = np.vstack([shifts, _moved(best, fitted)])
+    hypothesis = Hypothesis(
+        name="friction that grows with the load",
+        residual=end.residual,
+        evidence=profile.evidence,
+        verdict=verdict_of(profile.evidence, is_nearer),
+        size=part,
+        unit="of the force",
+    )
+    return Refinement(hypothesis, "friction of the load fits as well", shifts)
 
 
 def _of_tilt(refit: LinearRefit) -> Refinement:

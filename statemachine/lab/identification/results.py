@@ -42,6 +42,7 @@ Reason = Literal[
     "starts disagree",
     "does not hold elsewhere",  # on what was not fitted
     "play fits as well",  # of a joint, and with it the figure would be another one
+    "friction of the load fits as well",  # in the gears of servos
     "a tilted base fits as well",
 ]
 EpisodePart = Literal["all", "last third"]  # the last third of the only episode is not fitted
@@ -244,8 +245,9 @@ class Hypothesis:
         residual: Of its best fit [rad].
         evidence: How much half the sum of squares falls by it; above 5 it fits better.
         verdict: Whether the recording tells.
-        size: How wide the play is, how far the base is tilted [rad]; of play at least a count. None
-            of what has no size.
+        size: How wide the play is, of a count at least, or how far the base is tilted [rad]; or
+            which part of a servo's force is lost in its gears. None of what has no size.
+        unit: Of the size.
     """
 
     name: str
@@ -253,6 +255,7 @@ class Hypothesis:
     evidence: float
     verdict: HypothesisVerdict
     size: float | None = None
+    unit: Literal["rad", "of the force"] = "rad"
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ extrapolation from two step lengths.
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, replace
 
@@ -16,14 +17,16 @@ import numpy as np
 
 from ...errors import DivergedError, DivergedWarning
 from ...interface import Array
-from ...worlds import make_worlds, record
+from ...worlds import Worlds, make_worlds, record, reset
 from ..recordings.arm_recording import ArmRecording
+from .loaded_servos import LoadedServos
 from .parameters import ArmParameters
 from .play import behind_play
 
-_STEPS = 240.0  # a second; where the error of a step is taken away, twice as many, too
+_STEPS = 240.0  # a second, at least; where the error of a step is taken away, twice as many, too
 _REST = 2.0  # counts that a joint moves in the first frames of a recording that starts at rest
 _FIRST_FRAMES = 4
+_LOADED_RUNS = 2  # with what is lost to friction, which is computed of the run before
 _AFTER_UNKNOWN = 0.5  # commands before a start in motion act on so long [s]
 
 
@@ -39,6 +42,8 @@ class ArmSimulation:
         play: (n,) widths of the play between each joint and its encoder [rad], or (W, n) of each
             world, of which there may be more than of vectors; None for no play.
         gravity: (3,) in the axes of the base [m/s²]; None for that of the model.
+        load_friction: (W,) part of the force of each servo that is lost as friction, in each world;
+            or (1,) of all worlds; None for none.
     """
 
     parameters: ArmParameters
@@ -47,6 +52,7 @@ class ArmSimulation:
     viscous_outside: bool = False
     play: Array | None = None
     gravity: Array | None = None
+    load_friction: Array | None = None
 
     @classmethod
     def of(cls, parameters: ArmParameters, recording: ArmRecording) -> ArmSimulation:
@@ -140,6 +146,16 @@ class ArmSimulation:
         """
         return replace(self, play=widths[:, None]).angles_of_each(vector[None])
 
+    def angles_with_load_friction(self, vector: Array, parts: Array) -> Array:
+        """Return the angles (M, K, n) of one arm that loses some parts of its servos' forces.
+
+        Args:
+            vector: (P,) of the parameters.
+            parts: (M,) that are lost as friction.
+        """
+        vectors = np.tile(vector, (len(parts), 1))
+        return replace(self, load_friction=parts).angles_of_each(vectors)
+
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
         limits = self.parameters.model.actuator_forcerange[self.parameters.servo]
@@ -149,36 +165,52 @@ class ArmSimulation:
     @property
     def _steps(self) -> int:
         """Return the number of steps of a frame."""
-        return max(1, round(_STEPS / self.recording.fps))
+        return math.ceil(_STEPS / self.recording.fps)
 
     def _played(self, vectors: Array, steps: int) -> Array:
         """Return the angles (W, K, n) with so many steps a frame, NaN of worlds that diverge."""
         parameters = self.parameters
-        offsets = vectors[:, parameters.of_kind("offset")]
-        action, first = self.action, self.state[0] - offsets
         timestep = 1.0 / (self.recording.fps * steps)
         model = parameters.model.replace(timestep=timestep, integrator="euler", contacts=False)
         options = parameters.options(vectors, self.viscous_outside)
         if self.gravity is not None:
             options["gravity"] = np.tile(self.gravity, (len(vectors), 1))
+        offsets = vectors[:, None, parameters.of_kind("offset")]
+        told = np.repeat(self.action[:-1], steps, axis=0) - offsets
         with make_worlds(model, len(vectors), derived=(), **options) as worlds:
-            worlds.qpos[:, parameters.position] = first
-            worlds.qvel[:, parameters.dof] = self.first_velocity
-            total = (len(action) - 1) * steps
-            commands = np.repeat(worlds.ctrl[:, None], total, axis=1)
-            told = np.repeat(action[:-1], steps, axis=0)
-            commands[:, :, parameters.servo] = told - offsets[:, None]
-            with warnings.catch_warnings():
-                # What diverges has no angles, and the fit leaves it again.
-                warnings.simplefilter("ignore", DivergedWarning)
-                positions = record(worlds, total, ctrl=commands)["qpos"][:, :, parameters.position]
-            diverged = sorted(worlds.diverged)
-        history = np.concatenate([first[:, None], positions], axis=1)
-        history[diverged] = np.nan
+            history = self._moved(worlds, told, offsets)
+            if self.load_friction is not None:
+                servos = LoadedServos.of(parameters, options, self.load_friction, timestep)
+                for _ in range(_LOADED_RUNS):
+                    lost = servos.lost(told, history)
+                    history = self._moved(worlds, told + lost, offsets)
         if self.play is not None:
             history = behind_play(history, self.play)
         delays = vectors[:, parameters.of_kind("delay")[0]]
-        return _late(history, delays / timestep, steps, len(action)) + offsets[:, None]
+        return _late(history, delays / timestep, steps, len(self.action)) + offsets
+
+    def _moved(self, worlds: Worlds, told: Array, offsets: Array) -> Array:
+        """Return the angles (W, 1 + T, n) at the start and after each step; NaN after divergence.
+
+        Args:
+            worlds: Of which each is reset before.
+            told: (W, T, n) command of each step [rad].
+            offsets: (W, 1, n) by which measured angles are larger [rad].
+        """
+        parameters = self.parameters
+        reset(worlds)
+        first = self.state[0] - offsets
+        worlds.qpos[:, parameters.position] = first[:, 0]
+        worlds.qvel[:, parameters.dof] = self.first_velocity
+        commands = np.repeat(worlds.ctrl[:, None], told.shape[1], axis=1)
+        commands[:, :, parameters.servo] = told
+        with warnings.catch_warnings():
+            # What diverges has no angles, and the fit leaves it again.
+            warnings.simplefilter("ignore", DivergedWarning)
+            positions = record(worlds, told.shape[1], ctrl=commands)["qpos"]
+        history = np.concatenate([first, positions[:, :, parameters.position]], axis=1)
+        history[sorted(worlds.diverged)] = np.nan
+        return history
 
     def _forces(self, vector: Array) -> Array:
         """Return the servo forces before the limit (K, n), from angles and commands [N·m]."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...interface import Array
 from ..runs.drive import Progress, no_progress
+from .clock import moved_by_clock
 from .fit import Fit, Objective, fit, fit_near, starting_points
 from .residuals import Residuals, root_mean_square
 
@@ -30,11 +31,13 @@ class Fits:
         each: At least one; `cost` of each is by the noise that the best one leaves.
         residuals: Of the best one.
         beside: Fisher informations (free, free) of arms with joints that are weaker.
+        clock_shift: (free,) by how much parameters move if the clock is off by what is uncertain.
     """
 
     each: tuple[Fit, ...]
     residuals: Residuals
     beside: tuple[Array, ...] = ()
+    clock_shift: Array | float = 0.0
 
     @property
     def best(self) -> Fit:
@@ -65,11 +68,12 @@ class Fits:
         """Return the standard deviations (free,) of what was fitted, with the prior.
 
         By the noise of each joint; where more than noise is left, by so much more. Of the best fit
-        or of an arm beside it, whichever tells less.
+        or of an arm beside it, whichever tells less. And by the clock, which no recording tells.
         """
         prior = self.best.objective.prior_deviations
         more = self._more_than_noise
-        return least_certain([each / more**2 for each in self.informations], prior)
+        by_noise = least_certain([each / more**2 for each in self.informations], prior)
+        return np.hypot(by_noise, self.clock_shift)
 
     @property
     def covariance(self) -> Array:
@@ -161,8 +165,9 @@ def fits_from_starts(
     in_order = sorted([best, *others], key=_cost)
     residuals = Residuals.of(in_order[0].errors, recording)
     beside = informations_beside(in_order[0])
+    clock_shift = moved_by_clock(in_order[0])
     progress(1.0)
-    return Fits(tuple(in_order), residuals, beside)
+    return Fits(tuple(in_order), residuals, beside, clock_shift)
 
 
 def gone_on(end: Fit, best: Fit) -> Fit:

@@ -30,6 +30,7 @@ Order = Literal["oldest_first", "newest_first"]
 Init = Literal["repeat_first", "zeros"]
 # Format of the files of the package gaitkeeper 0.5 (Apache-2.0).
 SCHEMA: Final = "gaitkeeper/contract/v3"
+LONGEST_CALL: Final = 1.0  # from one call of a walking policy to the next [s]
 AXES = ("vx", "vy", "wz")  # of a command of speed
 
 

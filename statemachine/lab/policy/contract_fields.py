@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeGuard, cast
+from typing import Final, TypeGuard, cast
 
 import numpy as np
 
 from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array
 from .misspellings import nearest_name
+
+_MOST: Final = 100_000  # calls, steps or numbers that a field counts
 
 
 @dataclass(frozen=True)
@@ -128,26 +131,31 @@ class ContractSection:
             raise self.error(key, "a finite number is expected")
         return float(value)
 
-    def positive(self, key: str) -> float:
+    def positive(self, key: str, most: float = math.inf) -> float:
         """Return a number above 0.
 
+        Args:
+            key: The field.
+            most: The largest that is taken.
+
         Raises:
-            BadInputError: It is none.
+            BadInputError: It is none, or larger.
         """
         value = self.number(key)
-        if value <= 0.0:
-            raise self.error(key, "a number above 0 is expected")
+        if not 0.0 < value <= most:
+            up_to = "" if most == math.inf else f" and at most {most:g}"
+            raise self.error(key, f"a number above 0{up_to} is expected")
         return value
 
     def count(self, key: str, default: int | None = None, least: int = 0) -> int:
         """Return a whole number.
 
         Raises:
-            BadInputError: It is none, or below the least.
+            BadInputError: It is none, below the least, or more than any contract has.
         """
         value = self.number(key, default)
-        if value != int(value) or value < least:
-            raise self.error(key, f"a whole number from {least} on is expected")
+        if value != int(value) or not least <= value <= _MOST:
+            raise self.error(key, f"a whole number from {least} to {_MOST} is expected")
         return int(value)
 
     def flag(self, key: str, default: bool) -> bool:
@@ -317,8 +325,9 @@ class ContractSection:
     def unread(self) -> Iterator[UnreadField]:
         """Yield the fields that nothing has read, and that are not null."""
         missing = sorted((self._read | self._looked_for) - set(self.fields()))
-        for key in self.fields():
-            if key not in self._read and self._content.get(key) is not None:
+        for field, value in self._content.items():
+            if field not in self._read and value is not None:
+                key = str(field)
                 nearest = nearest_name(key, missing)
                 yield UnreadField(self.name_of(key), self.name_of(nearest) if nearest else "")
         for section in self._sections:
@@ -326,7 +335,10 @@ class ContractSection:
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Tell whether a value is a finite number, and no whole number beyond all of these."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max  # of NaN it is false
 
 
 def _is_list(value: object) -> TypeGuard[Sequence[object]]:

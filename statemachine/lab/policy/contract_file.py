@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, cast, get_args
+from typing import Any, Final, cast, get_args
 
 import numpy as np
 
-from ...errors import BadInputError, did_you_mean, one_line
+from ...errors import BadInputError, did_you_mean, one_line, shown
 from ...installed import require_extra
 from ...interface import Array
 from ...models import AnyPath, check_is_file
 from .contract import (
     AXES,
+    LONGEST_CALL,
     SCHEMA,
     Action,
     ActuatorKind,
@@ -45,6 +46,7 @@ _OF_CLOCK = {"gait_phase": 2, "gait_phase_legs": 4}
 _SOURCES = ("schema", "source", "provenance", "evidence")
 _LARGEST_FILE = 2_000_000  # bytes; a contract has a few thousand
 _MOST_ENTRIES = 200_000  # with those that an alias repeats
+_MOST_STEPS = 100_000.0  # between two calls
 _WHOLE = 1e-6  # of a step: a number of steps that is nearer to a whole one is that one
 
 
@@ -78,7 +80,9 @@ def _yaml_of(path: Path) -> Mapping[str, object]:
     try:
         if path.stat().st_size > _LARGEST_FILE:
             raise BadInputError(f"{path} is too large for a contract (2 MB)")
-        content = yaml.safe_load(path.read_text("utf-8"))
+        content = yaml.load(path.read_text("utf-8"), _loader_of(yaml, path.name))
+    except BadInputError:
+        raise
     except FileNotFoundError:
         raise BadInputError(f"there is no contract {path}") from None
     except (OSError, UnicodeDecodeError, RecursionError, ValueError) as error:
@@ -90,6 +94,33 @@ def _yaml_of(path: Path) -> Mapping[str, object]:
     if _has_too_many_entries(content):
         raise BadInputError(f"{path.name} is too large for a contract: its aliases repeat too much")
     return cast("Mapping[str, object]", content)
+
+
+def _loader_of(yaml: Any, file: str) -> Any:
+    """Return PyYAML's safe loader, which takes the last of two equal keys, without that."""
+
+    class UniqueKeyLoader(yaml.SafeLoader):
+        """Refuses a table in which a key stands twice."""
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            """Return the table of a node.
+
+            Raises:
+                BadInputError: A key stands in it twice.
+            """
+            keys: set[str] = set()
+            for key, _ in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    continue
+                if key.value in keys:
+                    line = key.start_mark.line + 1
+                    raise BadInputError(
+                        f"{file}: {shown(key.value)} stands twice in a table, again in line {line}"
+                    )
+                keys.add(key.value)
+            return super().construct_mapping(node, deep)
+
+    return UniqueKeyLoader
 
 
 def _has_too_many_entries(content: object) -> bool:
@@ -325,13 +356,13 @@ def _servos(actuators: ContractSection, model: ContractSection, joints: Sequence
 def _timing(section: ContractSection) -> CallTiming:
     """Return how often the policy is called."""
     section.ignore("order", "target_hold")
-    policy_dt = section.positive("policy_dt")
+    policy_dt = section.positive("policy_dt", LONGEST_CALL)
     decimation: int | None = None
     if section.has("decimation"):
         decimation = section.count("decimation", None, 1)
     if section.has("sim_dt"):
         steps = policy_dt / section.positive("sim_dt")
-        if abs(steps - round(steps)) > _WHOLE * steps:
+        if steps > _MOST_STEPS or abs(steps - round(steps)) > _WHOLE * steps:
             raise section.error("sim_dt", f"a whole part of policy_dt = {policy_dt:g} is expected")
         if decimation is not None and decimation != round(steps):
             raise section.error("decimation", f"policy_dt / sim_dt = {round(steps)} is expected")

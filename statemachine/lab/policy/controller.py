@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from ...errors import BadInputError
 from ...interface import Array, Data, Model
 from .observation import Observer, Stack
 from .on_model import PolicyOnModel
+
+_LARGEST_SINGLE: Final = float(np.finfo(np.float32).max)  # of what a network is given
+_FARTHEST: Final = 1e10  # MuJoCo's mjMAXVAL: larger commands are taken for none
 
 
 @dataclass(frozen=True)
@@ -64,8 +68,10 @@ class PolicyController:
         self._commands_torques = driven.kind == "explicit_pd"
         self._gain = driven.model.actuator_gain[binding.ctrl]  # of motors
         self._low, self._high = driven.model.actuator_ctrlrange[binding.ctrl].T
-        if self._commands_torques:
+        self._farthest = _FARTHEST
+        if self._commands_torques:  # which are limited
             self._low, self._high = np.full(n, -np.inf), np.full(n, np.inf)
+            self._farthest = np.inf
         self._targets = self._targets_of(np.zeros(n))
         self.calls: list[PolicyCall] = []
         self.saturated = np.zeros(n, dtype=np.int64)
@@ -98,12 +104,24 @@ class PolicyController:
         number = len(self.calls)
         state = self._binding.state(data, self._command, self._last_action, number)
         observation = self._stack.add(self._observer.values(state))
-        action = self._network(observation)
         contract = self._contract
+        if not np.abs(observation).max() <= _LARGEST_SINGLE:
+            raise BadInputError(
+                f"{contract.file} observes at {data.time:.3f} s what no network can be given, a "
+                f"number beyond {_LARGEST_SINGLE:.2g}: look at its scales, and at the command"
+            )
+        action = self._network(observation)
         if action.shape != (len(contract.joints),) or not np.isfinite(action).all():
             raise BadInputError(
                 f"{self._network.facts.file} gave at {data.time:.3f} s what is no action of "
                 f"{len(contract.joints)} finite numbers"
+            )
+        targets = self._targets_of(action)
+        if not np.abs(targets).max() < self._farthest:
+            raise BadInputError(
+                f"{self._network.facts.file} gave at {data.time:.3f} s an action of "
+                f"{np.abs(action).max():g}, whose target no servo can be told, for it is beyond "
+                f"{self._farthest:g}: look at the scale of actions in {contract.file}"
             )
         call = PolicyCall(
             time=data.time,
@@ -119,4 +137,6 @@ class PolicyController:
 
     def _targets_of(self, action: Array) -> Array:
         """Return the targets (n,) [rad] of an action, within what the servos take."""
-        return np.clip(self._contract.action.targets(action), self._low, self._high)
+        with np.errstate(over="ignore"):
+            targets = self._contract.action.targets(action)
+        return np.clip(targets, self._low, self._high)

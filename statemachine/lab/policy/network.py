@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +18,14 @@ from ...models import AnyPath, check_is_file
 from .contract_file import EXTRA
 
 SUFFIX: Final = ".onnx"
-_ERRORS_ONLY = 3  # of onnxruntime's levels of severity
+_FATAL_ONLY = 4  # of onnxruntime's levels of severity: its errors are exceptions, too
+_ACTIONS = ("tensor(float)", "tensor(double)", "tensor(float16)")
+_LFS_POINTER = b"version https://git-lfs"
+# What onnxruntime says before the reason: its code, the file again, a line of its own source.
+_BEFORE_REASON = re.compile(
+    r"^\[ONNXRuntimeError\] : \d+ : \w+ : |Load model from .*? failed:\s*"
+    r"|/\S+\.(?:cc|h):\d+ .*?\)(?: const)? (?=[A-Z\"'])"
+)
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,11 @@ class Network:
             raise BadInputError(f"there is no policy {path}") from None
         except OSError as error:
             raise BadInputError(f"{path} cannot be read: {one_line(error)}") from error
+        if content.startswith(_LFS_POINTER):
+            raise BadInputError(
+                f"{path} is a pointer of git-lfs in place of the file: type `git lfs pull` in its "
+                "folder"
+            )
         self._session = _session_of(path, runtime)
         inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
         _check(path, inputs, outputs)
@@ -104,11 +117,13 @@ class Network:
         Raises:
             BadInputError: The network does not take it, or gives what is no action.
         """
-        given = {self._input: observation[None].astype(np.float32), **self._memory}
+        with np.errstate(over="ignore"):  # what comes of it is looked at by whoever calls
+            single = observation[None].astype(np.float32)
+        given = {self._input: single, **self._memory}
         try:
             action, *memory = self._session.run(None, given)
         except Exception as error:  # onnxruntime has an exception for each of its codes
-            raise BadInputError(f"{self.facts.file}: {one_line(error)}") from error
+            raise BadInputError(f"{self.facts.file}: {_reason_of(error)}") from error
         for entry, value in zip(self._memory_inputs, memory, strict=False):
             self._memory[entry.name] = value
         return np.asarray(action, dtype=np.float64).reshape(-1)
@@ -125,7 +140,7 @@ def _session_of(path: Path, runtime: Any) -> Any:
         BadInputError: It is no network.
     """
     options = runtime.SessionOptions()
-    options.log_severity_level = _ERRORS_ONLY
+    options.log_severity_level = _FATAL_ONLY
     # One thread, and in order: sums of several have other last bits from run to run.
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -133,7 +148,7 @@ def _session_of(path: Path, runtime: Any) -> Any:
         # By its path, for its weights may stand in a file beside it.
         return runtime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has an exception for each of its codes
-        raise BadInputError(f"{path} is no ONNX network: {one_line(error)}") from error
+        raise BadInputError(f"{path} is no ONNX network: {_reason_of(error)}") from error
 
 
 def _check(path: Path, inputs: list[Any], outputs: list[Any]) -> None:
@@ -149,6 +164,16 @@ def _check(path: Path, inputs: list[Any], outputs: list[Any]) -> None:
                 f"{path.name}: the input {entry.name!r} is {entry.type}, and a policy takes "
                 "tensor(float)"
             )
+    if outputs[0].type not in _ACTIONS:
+        raise BadInputError(
+            f"{path.name}: the output {outputs[0].name!r} is {outputs[0].type}, and an action is "
+            f"{_ACTIONS[0]}"
+        )
+
+
+def _reason_of(error: Exception) -> str:
+    """Return what onnxruntime says of an error, without the places in its source."""
+    return _BEFORE_REASON.sub("", one_line(error))
 
 
 def _size(entry: Any) -> int | None:

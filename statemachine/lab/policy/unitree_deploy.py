@@ -16,6 +16,7 @@ from typing import Final
 from ...errors import did_you_mean
 from ...interface import Array
 from .contract import (
+    LONGEST_CALL,
     SCHEMA,
     Action,
     CallTiming,
@@ -131,7 +132,7 @@ def contract_of_deploy(content: Mapping[str, object], file: str) -> Contract:
         clips_before_scale=not scales_first,
         action=_action(root.section("actions"), len(joints)),
         servos=Servos(kp=_of_motors(root, "stiffness", ids), kd=_of_motors(root, "damping", ids)),
-        timing=CallTiming(root.positive("step_dt")),
+        timing=CallTiming(root.positive("step_dt", LONGEST_CALL)),
         command_limits=_limits(root.section("commands").section("base_velocity")),
     )
     return replace(contract, unread=tuple(root.unread()))

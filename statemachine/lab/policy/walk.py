@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...errors import DivergedError
+from ...errors import BadInputError, DivergedError
 from ...interface import Array, Data, make_data, reset
 from ..runs.drive import Progress, drive, no_progress, number_of_steps, progress_of_stage
 from ..runs.floating import fallen_moments
@@ -117,8 +117,15 @@ def walked(
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: The network gives what is no action.
+        BadInputError: The network gives what is no action, or the time is over before its second
+            call, so that no speed is known.
     """
+    policy_dt = policy.contract.timing.policy_dt
+    if seconds < 2.0 * policy_dt:  # the first call is at the beginning
+        raise BadInputError(
+            f"in {seconds:g} s a policy is not called twice that is called each {policy_dt:g} s: "
+            "let it run longer"
+        )
     model, contract = policy.driven.model, policy.contract
     controller = PolicyController(policy, command.vector)
     steps = number_of_steps(model, seconds)

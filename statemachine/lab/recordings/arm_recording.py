@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from ...errors import BadInputError, printable
 from ...interface import Array
+from ...models import expanded, kind_of_path
 from .calibration import COUNT
 from .joint_units import JointUnit
 
@@ -79,5 +79,5 @@ def check_prefix(what: str) -> None:
         BadInputError: It is the folder of a data set, or the recording of this package.
     """
     folder = what.partition("#")[0]
-    if folder == SYNTHETIC or (Path(folder).expanduser() / DESCRIPTION).is_file():
+    if folder == SYNTHETIC or kind_of_path(expanded(folder) / DESCRIPTION) == "a file":
         raise BadInputError(f"a recording of a real arm is typed {PREFIX}{printable(what)}")

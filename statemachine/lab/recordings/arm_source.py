@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +11,12 @@ import numpy as np
 
 from ...errors import BadInputError, did_you_mean, shown
 from ...interface import Array, JointType, Model
-from ...models import AnyPath
+from ...models import AnyPath, expanded, kind_of_path
 from .arm_recording import PREFIX, SYNTHETIC, ArmRecording, ArmRecordings
 from .calibration import COUNT, read_calibration
 from .joint_units import JointUnit
 from .lerobot import FEWEST_FRAMES, LerobotDataSet, LerobotEpisode, open_data_set
+from .lerobot_cache import kept_data_set
 from .lerobot_description import joint_name
 from .robot_types import check_robot
 from .unit_inference import MeasuredJoint, infer_units, measured_joint
@@ -23,6 +25,8 @@ _FORM = f"{PREFIX}DIR or {PREFIX}DIR#EPISODE"
 _SYNTHETIC_FOLDER = Path(__file__).resolve().parent / "synthetic"
 _MOST_EPISODES = 100  # whose values are looked at for their quantum
 _FURTHEST = 360.0  # degrees: a servo turns once, and its counts are from -180 to 180
+_MOST_DIGITS = 18  # of the number of an episode, which is one of 64 bits
+_FASTEST = 20.0  # rad/s: three times what a servo of the SO-101 turns without a load
 _MOVES = 12 * COUNT  # rad, about 1°: an arm whose joints all stay within that does not move
 
 
@@ -64,8 +68,9 @@ def read_arm_recordings(
     """Read an episode of a data set of LeRobot, and one to hold out.
 
     Args:
-        source: "lerobot:DIR#EPISODE"; "lerobot:DIR" for the first episode. The folder "synthetic"
-            is the recording that comes with the package; it was simulated.
+        source: "lerobot:DIR#EPISODE"; "lerobot:DIR" for the first episode. DIR may be the name
+            of a data set that LeRobot keeps, "user/name". The folder "synthetic" is the recording
+            that comes with the package; it was simulated.
         model: Of the arm; its joints give names, zero and, where a joint does not move, scale.
         calibration: LeRobot's calibration file; None to take unit and scale from the numbers.
         names: Joints of the recording that have other names in the model.
@@ -108,14 +113,23 @@ def folder_and_episode(source: str) -> tuple[Path, int | None]:
         raise BadInputError(f"a recording is {_FORM}; got {shown(source)}")
     named = source.removeprefix(PREFIX)
     folder, mark, episode = named.rpartition("#")
-    if not mark or Path(named).is_dir():
+    if not mark or kind_of_path(expanded(named)) == "a folder":
         folder, episode = named, ""
-    elif not (episode.isascii() and episode.isdigit()):
+    elif not (episode.isascii() and episode.isdigit() and len(episode) <= _MOST_DIGITS):
         raise BadInputError(f"an episode is a number, as in {PREFIX}DIR#3; got {shown(source)}")
     if not folder:
         raise BadInputError(f"a recording is {_FORM}; got {shown(source)}")
-    path = _SYNTHETIC_FOLDER if folder == SYNTHETIC else Path(folder).expanduser()
-    return path, int(episode) if episode else None
+    return _path_of(folder), int(episode) if episode else None
+
+
+def _path_of(folder: str) -> Path:
+    """Return the folder that a word names, which may be a data set that LeRobot keeps."""
+    if folder == SYNTHETIC:
+        return _SYNTHETIC_FOLDER
+    path = expanded(folder)
+    if kind_of_path(path) == "nothing":
+        return kept_data_set(folder) or path
+    return path
 
 
 def _joints_of(data_set: LerobotDataSet, model: Model, names: Mapping[str, str]) -> tuple[str, ...]:
@@ -173,9 +187,10 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
         BadInputError: A command is one that no servo reaches.
     """
     _check_reach(arm, episode)
+    _check_commands(arm, episode)
     joints = tuple(unit.joint for unit in arm.units)
     action = _angles(arm.sent(episode.action), arm.units)
-    return ArmRecording(
+    recording = ArmRecording(
         source=source,
         episode=episode.number,
         fps=arm.data_set.fps,
@@ -185,6 +200,8 @@ def _recording(source: str, arm: _Arm, episode: LerobotEpisode) -> ArmRecording:
         units=arm.units,
         robot=arm.data_set.robot,
     )
+    _check_speeds(arm, recording)
+    return recording
 
 
 def _check_reach(arm: _Arm, episode: LerobotEpisode) -> None:
@@ -197,6 +214,41 @@ def _check_reach(arm: _Arm, episode: LerobotEpisode) -> None:
             f"{arm.data_set.folder}, episode {episode.number}: action of {arm.joints[joint].name} "
             f"is {episode.action[frame, joint]:g} in frame {frame}, where its measured values are "
             f"degrees: no servo turns that far. Is the action in another unit?"
+        )
+
+
+def _check_speeds(arm: _Arm, recording: ArmRecording) -> None:
+    """Refuse measured angles that change faster than a servo can turn.
+
+    Between two frames that is a count that went round its end, a damaged value, or a gap.
+    """
+    changes = np.abs(np.diff(recording.state, axis=0))
+    too_fast = np.argwhere(changes * recording.fps > _FASTEST)
+    if not len(too_fast):
+        return
+    frame, joint = (int(index) for index in too_fast[0])
+    degrees = math.degrees(changes[frame, joint])
+    raise BadInputError(
+        f"{arm.data_set.folder}, episode {recording.episode}: {arm.joints[joint].name} turns by "
+        f"{degrees:.0f}° from frame {frame} to {frame + 1}, {degrees * recording.fps:.0f}°/s, "
+        "which no servo of this arm does: an encoder that went over its end, a damaged value, or "
+        "frames that are missing"
+    )
+
+
+def _check_commands(arm: _Arm, episode: LerobotEpisode) -> None:
+    """Refuse actions that are the measured values themselves, of the same frame or the next.
+
+    An arm that is guided by hand is recorded so: what its servos were told is not known.
+    """
+    action, state = episode.action, episode.state
+    same = bool((action == state).all())
+    if same or bool((action[:-1] == state[1:]).all()):
+        frame = "the same" if same else "the next"
+        raise BadInputError(
+            f"{arm.data_set.folder}, episode {episode.number}: each action is what was measured in "
+            f"{frame} frame, as of an arm that is guided by hand: what its servos were told is not "
+            "recorded"
         )
 
 

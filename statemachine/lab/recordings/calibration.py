@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import cast
 
 from ...errors import BadInputError, printable, shown
-from ...models import AnyPath
+from ...models import AnyPath, check_is_file, expanded
 
 COUNTS_OF_A_TURN = 4096  # of the STS3215 of the SO-101: `MODEL_RESOLUTION` in feetech/tables.py
 COUNT = 2.0 * math.pi / COUNTS_OF_A_TURN  # rad
@@ -50,7 +50,8 @@ def read_calibration(path: AnyPath) -> dict[str, MotorCalibration]:
     Raises:
         BadInputError: The file is not there, or is not LeRobot's calibration.
     """
-    file = Path(path)
+    file = expanded(path)
+    check_is_file(file)
     try:
         motors = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -87,9 +88,10 @@ def _checked(name: str, values: object, file: Path) -> MotorCalibration:
     calibration = MotorCalibration(**numbers)
     if calibration.drive_mode not in (0, 1):
         raise BadInputError(f"{where}: drive_mode is {calibration.drive_mode}, not 0 or 1")
-    if not 0 < calibration.counts < COUNTS_OF_A_TURN:
+    low, high = calibration.range_min, calibration.range_max
+    if not 0 < calibration.counts < COUNTS_OF_A_TURN or abs(low) > COUNTS_OF_A_TURN:
         raise BadInputError(
-            f"{where}: range_min is {calibration.range_min} and range_max "
-            f"{calibration.range_max}; between them are 1 to {COUNTS_OF_A_TURN - 1} counts"
+            f"{where}: range_min is {shown(low)} and range_max {shown(high)}; between them are 1 "
+            f"to {COUNTS_OF_A_TURN - 1} counts of one turn"
         )
     return calibration

@@ -20,7 +20,7 @@ _MISFIT = 0.02  # of a quantum: float32 rounds to 0.0001 of one
 _WITHIN = 0.95  # of the values are that near to the grid
 _COHERENT = 0.9  # length of the mean above which a quantum is looked at
 _STEPS_PER_TURN = 10  # between two quanta that are tried, over the span of the values
-_WIDEST = 1000.0  # units that no joint turns: 2.7 turns in degrees
+WIDEST = 1000.0  # units that no joint turns: 2.7 turns in degrees
 _AT_ONCE = 2048  # quanta that are tried together, for their memory
 _MOST_LEVELS = 60  # that all quanta are compared with
 
@@ -58,8 +58,9 @@ def grid_of(levels: Array, finest: float) -> CountGrid | None:
     """
     if len(levels) < FEWEST_LEVELS:
         return None
-    span = float(levels[-1] - levels[0])
-    if span > _WIDEST:
+    with np.errstate(over="ignore"):
+        span = float(levels[-1] - levels[0])
+    if not finest < span <= WIDEST:
         return None
     few = _some_of(levels) - levels[0]
     # Per unit: on the widest grid all values are within a few places.

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...errors import BadInputError
 from ...interface import Array, Ints
+from ...models import kind_of_path
 from .lerobot_description import (
     ACTION,
     STATE,
@@ -92,7 +93,9 @@ class LerobotDataSet:
     def downloaded(self) -> tuple[int, ...]:
         """Return the numbers of the episodes whose file is here, ascending."""
         places = self.description.places
-        return tuple(number for number in self.episodes if places[number].file.is_file())
+        return tuple(
+            number for number in self.episodes if kind_of_path(places[number].file) == "a file"
+        )
 
     def place(self, number: int) -> EpisodePlace:
         """Return where an episode lies.

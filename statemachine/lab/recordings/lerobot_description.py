@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +10,14 @@ from typing import cast
 from ...errors import BadInputError, printable, shown
 from ...models import kind_of_path
 from .arm_recording import DESCRIPTION
+from .lerobot_cache import is_name_of_data_set, lerobot_home
 from .lerobot_files import parse_object, read_columns, read_text
 
 STATE, ACTION = "observation.state", "action"
 VERSIONS = ("v2.0", "v2.1", "v3.0")
 _ONE_FILE_EACH = ("v2.0", "v2.1")
 _CHUNK_SIZE = 1000  # episodes in a folder, where info.json does not say
+_MOST_FPS = 1000.0  # no bus of servos is read as often
 
 
 @dataclass(frozen=True)
@@ -67,14 +68,10 @@ def read_description(folder: Path) -> DataSetDescription:
         BadInputError: There is no such folder, or it is no data set, or of another version.
         MissingEngineError: Version 3.0, and pyarrow is not installed.
     """
-    if not folder.is_dir():
-        kind = kind_of_path(folder)
-        if kind == "nothing":
-            raise BadInputError(
-                f"there is no folder {folder}; lerobot: takes the folder of a data set, which "
-                "LeRobot keeps in ~/.cache/huggingface/lerobot; lerobot:synthetic is the "
-                "recording that comes with this package"
-            )
+    kind = kind_of_path(folder)
+    if kind == "nothing":
+        raise _no_data_set(folder)
+    if kind != "a folder":
         raise BadInputError(f"{folder} is {kind}; lerobot: takes the folder of a data set")
     path = folder / DESCRIPTION
     if not path.is_file():
@@ -97,6 +94,19 @@ def read_description(folder: Path) -> DataSetDescription:
     return DataSetDescription(folder, version, fps, columns, places, robot)
 
 
+def _no_data_set(folder: Path) -> BadInputError:
+    """Return the error of a folder that is not there, which says where else was looked."""
+    home = lerobot_home()
+    if is_name_of_data_set(str(folder)):
+        looked = f"nor a data set of that name in {home}, where LeRobot keeps them"
+    else:
+        looked = f"and a data set that LeRobot keeps in {home} is named as lerobot:USER/NAME"
+    return BadInputError(
+        f"there is no folder {folder}, {looked}; lerobot:synthetic is the recording that comes "
+        "with this package"
+    )
+
+
 def _checked_robot(robot: object, path: Path) -> str:
     """Return the type of the robot; "" where there is none, or LeRobot did not know it."""
     if robot is None or robot == "unknown":
@@ -109,8 +119,10 @@ def _checked_robot(robot: object, path: Path) -> str:
 def _checked_fps(fps: object, path: Path) -> float:
     if isinstance(fps, bool) or not isinstance(fps, int | float):
         raise BadInputError(f"{path}: fps is {shown(fps)}, not a number")
-    if not 0.0 < fps < math.inf:
+    if not fps > 0.0:  # of NaN, too
         raise BadInputError(f"{path}: fps must be positive; got {fps:g}")
+    if fps > _MOST_FPS:
+        raise BadInputError(f"{path}: fps is {shown(fps)}, and at most {_MOST_FPS:g} are read")
     return float(fps)
 
 

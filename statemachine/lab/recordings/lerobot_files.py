@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...errors import BadInputError, printable, shown
 from ...installed import require_extra
 from ...interface import Array, Ints
+from ...models import check_is_file
 
 _LFS_POINTER = b"version https://git-lfs"
 MOST_ROWS = 10_000_000  # of a file: 90 hours at 30 frames per second
@@ -78,10 +79,14 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
         BadInputError: It is not there, or a pointer of git-lfs, or damaged, or lacks a column.
         MissingEngineError: pyarrow is not installed.
     """
-    if not path.is_file():
-        raise BadInputError(f"there is no file {path}, which the data set's meta/ names")
-    with path.open("rb") as start:
-        is_pointer = start.read(len(_LFS_POINTER)) == _LFS_POINTER
+    try:
+        check_is_file(path)
+        with path.open("rb") as start:
+            is_pointer = start.read(len(_LFS_POINTER)) == _LFS_POINTER
+    except FileNotFoundError:
+        raise BadInputError(f"there is no file {path}, which the data set's meta/ names") from None
+    except OSError as error:
+        raise BadInputError(f"{path} cannot be read: {error.strerror}") from None
     if is_pointer:
         raise _pointer_error(path)
     require_extra("pyarrow.parquet", "a recording of LeRobot", "pyarrow", "recordings")
@@ -112,11 +117,22 @@ def _columns_of(path: Path, names: tuple[str, ...]) -> Columns:
 
 def _numbers_of(column: Any, name: str, path: Path) -> NDArray[np.generic]:
     """Return the numbers of a column of pyarrow, those of its lists if it has lists."""
-    has_lists = hasattr(column.type, "value_type")
+    types = importlib.import_module("pyarrow.types")
+    kind = column.type
+    has_lists = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
     values = column.flatten() if has_lists else column
     if column.null_count or values.null_count:
         raise BadInputError(f"{path}: column {name} has rows without a number")
+    if has_lists and not _have_one_length(column):
+        raise BadInputError(f"{path}: column {name} has more numbers in some rows than in others")
     return np.asarray(values.to_numpy(zero_copy_only=False))
+
+
+def _have_one_length(lists: Any) -> bool:
+    """Tell whether all lists of a column of pyarrow have as many numbers."""
+    compute = importlib.import_module("pyarrow.compute")
+    lengths = compute.min_max(compute.list_value_length(lists)).as_py()
+    return lengths["min"] == lengths["max"]
 
 
 def read_text(path: Path) -> str:

@@ -25,10 +25,11 @@ import numpy as np
 from ...errors import BadInputError
 from ...interface import Array
 from .calibration import COUNT, COUNTS_OF_A_TURN, MotorCalibration
-from .count_grid import FEWEST_LEVELS, CountGrid, grid_of
+from .count_grid import FEWEST_LEVELS, WIDEST, CountGrid, grid_of
 from .joint_units import JointUnit
 
 FEWEST_COUNTS = 300  # of a range that was swept
+_LEAST_PART = 0.6  # of a joint's range in the model that a hand sweeps
 # Of a degree, in LeRobot since June 2025 and before.
 _DEGREES = (360.0 / (COUNTS_OF_A_TURN - 1), 360.0 / COUNTS_OF_A_TURN)
 _ALIKE = 1e-4  # two quanta, as parts: a joint with one count less than 2275 has 4e-4 more
@@ -191,6 +192,8 @@ def _by_calibration(
             degrees = _degrees(joint, degree)
             units.append(replace(degrees, counts=motor.counts, source="calibration"))
             continue
+        if joint.moves and not _is_within(joint):
+            raise _on_no_grid(joint)
         if joint.grid and not _alike(joint.grid.quantum, joint.width / motor.counts):
             raise BadInputError(
                 f"the calibration is that of another arm: {joint.name} has {motor.counts} counts "
@@ -225,13 +228,19 @@ def _by_quantum(joint: MeasuredJoint) -> JointUnit:
     if joint.grid is None:
         unit = _of_counts(joint, (joint.high - joint.low) / COUNT)
         return replace(unit, counts=None, source="model range")
-    is_within = joint.is_gripper or np.abs(joint.levels).max() < 100.0 + _BEYOND
     counts = joint.width / joint.grid.quantum
-    if not is_within or counts < FEWEST_COUNTS:
+    if not _is_within(joint) or counts < FEWEST_COUNTS:
         raise _on_no_grid(joint)
+    if counts * COUNT < _LEAST_PART * (joint.high - joint.low):
+        raise _on_coarse_grid(joint, counts)
     if abs(counts - round(counts)) < _WHOLE:
         counts = round(counts)
     return _of_counts(joint, counts)
+
+
+def _is_within(joint: MeasuredJoint) -> bool:
+    """Tell whether values are within -100 to 100, which LeRobot bounds them to."""
+    return joint.is_gripper or bool(np.abs(joint.levels).max() < 100.0 + _BEYOND)
 
 
 def _of_counts(joint: MeasuredJoint, counts: float) -> JointUnit:
@@ -265,7 +274,22 @@ def _alike(quantum: float, other: float) -> bool:
     return abs(quantum / other - 1.0) < _ALIKE
 
 
+def _on_coarse_grid(joint: MeasuredJoint, counts: float) -> BadInputError:
+    swept, whole = (math.degrees(angle) for angle in (counts * COUNT, joint.high - joint.low))
+    return BadInputError(
+        f"the step between the measured values of {joint.name} makes its range {swept:.0f}° wide, "
+        f"and the model's is {whole:.0f}°: was a part of it swept at calibration, or did it take "
+        "on every other count alone? Give LeRobot's calibration file"
+    )
+
+
 def _on_no_grid(joint: MeasuredJoint) -> BadInputError:
+    low, high = float(joint.levels[0]), float(joint.levels[-1])
+    if high - low > WIDEST:
+        return BadInputError(
+            f"the measured values of {joint.name} reach from {low:.4g} to {high:.4g}, and no joint "
+            "turns that far: a value is damaged"
+        )
     return BadInputError(
         f"the unit cannot be told: the measured values of {joint.name} are neither LeRobot's "
         "degrees nor its -100 to 100 (of the gripper, 0 to 100), as they are no whole counts of a "

@@ -1,0 +1,212 @@
+"""Friction in loaded gears, and a clock that is off: what no figure of the model stands for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.interface import Array
+from statemachine.lab.identification.clock import UNCERTAIN_RATE, moved_by_clock
+from statemachine.lab.identification.fit import Fit, fit
+from statemachine.lab.identification.linear_refit import LinearRefit
+from statemachine.lab.identification.load_friction import load_friction_profile
+from statemachine.lab.identification.loaded_servos import LoadedServos
+from statemachine.lab.identification.parameters import ArmParameters
+from statemachine.lab.identification.refinements import Refinement, tried_refinements
+from statemachine.lab.identification.residuals import Residuals
+from statemachine.lab.identification.simulation import ArmSimulation
+from statemachine.lab.identification.starts import Fits
+from statemachine.lab.identification.verdicts import fitted_parameters
+
+from .support.arm_fits import COUNT, FPS, SOFT, arm_parameters, objective_of, swings, vector
+
+pytest.importorskip("scipy")
+NOISE = 0.6 * COUNT
+TRUE = {"kp": SOFT, "viscous": -0.8, "delay": 0.045}
+KINDS = ("kp", "viscous", "friction", "delay")
+PART = 0.12  # of the force that is lost
+
+
+@pytest.fixture(scope="module")
+def parameters() -> ArmParameters:
+    return arm_parameters()
+
+
+@pytest.fixture(scope="module")
+def true(parameters: ArmParameters) -> Array:
+    return vector(parameters, TRUE)
+
+
+@pytest.fixture(scope="module")
+def motion(parameters: ArmParameters) -> ArmSimulation:
+    return ArmSimulation.of_motion(parameters, swings(parameters, 4.0, rate=1.0), FPS)
+
+
+def fits_of(motion: ArmSimulation, true: Array, angles: Array) -> Fits:
+    """Return the fit of the model to angles (K, n) that are measured with noise."""
+    state = angles + np.random.default_rng(0).normal(0.0, NOISE, angles.shape)
+    recording = replace(motion.recording, state=state, resolution=np.full(6, COUNT))
+    objective = objective_of(motion.parameters, recording, KINDS, NOISE)
+    best = fit(replace(objective, fixed=true), true, derivatives="exact")
+    return Fits((best,) * 3, Residuals.of(best.errors, recording))
+
+
+@pytest.fixture(scope="module")
+def clean(motion: ArmSimulation, true: Array) -> Fits:
+    return fits_of(motion, true, motion.angles(true))
+
+
+@pytest.fixture(scope="module")
+def loaded(motion: ArmSimulation, true: Array) -> Fits:
+    return fits_of(motion, true, with_changing_friction(motion, true))
+
+
+def with_changing_friction(motion: ArmSimulation, true: Array) -> Array:
+    """Return angles (K, n) of MuJoCo whose dry friction is set anew before each step."""
+    parameters = motion.parameters
+    steps = 64
+    options = {key: value[0] for key, value in parameters.options(true[None]).items()}
+    timestep = 1.0 / (FPS * steps)
+    arm = parameters.model.replace(timestep=timestep, integrator="euler", contacts=False, **options)
+    without = np.array(arm.dof_frictionloss)
+    angles: list[Array] = []
+    with sm.make_data(arm) as data:
+        data.qpos[:] = motion.state[0]
+        for command in motion.action[:-1]:
+            data.ctrl[:] = command
+            for _ in range(steps):
+                angles.append(data.qpos.copy())
+                force = arm.actuator_kp * (data.ctrl - data.qpos) - arm.actuator_kv * data.qvel
+                arm.raw.dof_frictionloss[:] = without + PART * np.abs(force)
+                sm.step(arm, data)
+        angles.append(data.qpos.copy())
+    moments = np.arange(len(motion.action)) / FPS - true[parameters.of_kind("delay")[0]]
+    times = np.arange(len(angles)) * timestep
+    return np.stack([np.interp(moments, times, column) for column in np.transpose(angles)], axis=1)
+
+
+# The servos.
+
+
+def one_servo(part: float) -> LoadedServos:
+    gains = np.array([[[20.0]]]), np.array([[[1.0]]])
+    return LoadedServos(*gains, np.array([3.0]), np.array([[[part]]]), timestep=0.01)
+
+
+@pytest.mark.parametrize(
+    ("told", "speed", "lost"),
+    [(0.1, 1.0, -0.1 * 1.0 / 20.0), (0.1, -1.0, 0.1 * 3.0 / 20.0), (0.4, 1.0, -0.1 * 3.0 / 20.0)],
+)
+def test_a_part_of_the_force_is_lost_against_the_motion(
+    told: float, speed: float, lost: float
+) -> None:
+    """The force is kp * (command - angle) - kv * speed, and at most 3 N·m."""
+    history = speed * 0.01 * np.arange(-1.0, 2.0)[None, :, None]
+    commands = np.full((1, 2, 1), told)
+    assert one_servo(0.1).lost(commands, history)[0, 1, 0] == pytest.approx(lost)
+
+
+def test_nothing_is_lost_at_rest() -> None:
+    assert not one_servo(0.3).lost(np.full((1, 4, 1), 0.1), np.zeros((1, 5, 1))).any()
+
+
+def test_commands_of_a_world_that_diverged_stay_finite() -> None:
+    lost = one_servo(0.3).lost(np.full((1, 2, 1), 0.1), np.full((1, 3, 1), np.nan))
+    assert np.isfinite(lost).all()
+
+
+def test_no_part_that_is_lost_changes_nothing(motion: ArmSimulation, true: Array) -> None:
+    angles = motion.angles_with_load_friction(true, np.zeros(2))
+    assert np.array_equal(angles, np.stack([motion.angles(true)] * 2))
+
+
+def test_the_arm_moves_as_with_friction_that_is_set_at_each_step(
+    motion: ArmSimulation, true: Array
+) -> None:
+    (angles,) = motion.angles_with_load_friction(true, np.array([PART]))
+    expected = with_changing_friction(motion, true)
+    effect = np.abs(angles - motion.angles(true)).max(axis=0)
+    assert (np.abs(angles - expected).max(axis=0) < 0.15 * effect + 0.3 * COUNT).all()
+
+
+# On a fit.
+
+
+def load_of(fits: Fits) -> Refinement:
+    (found,) = [each for each in tried_refinements(fits) if "load" in each.hypothesis.name]
+    return found
+
+
+def test_friction_of_the_load_is_found_where_it_is(loaded: Fits) -> None:
+    found = load_of(loaded)
+    assert found.fits_better
+    assert found.hypothesis.size == pytest.approx(PART, abs=0.04)
+
+
+def test_without_it_none_fits_better(clean: Fits) -> None:
+    assert not load_of(clean).fits_better
+
+
+def test_gains_that_stand_in_for_it_are_not_determined(
+    loaded: Fits, true: Array, parameters: ArmParameters
+) -> None:
+    found = load_of(loaded)
+    false: list[str] = []
+    said = fitted_parameters(loaded, True, (), [found])
+    for each, number in zip(said, loaded.best.objective.free, strict=True):
+        truth = parameters.each[number].figure(float(true[number]))
+        if each.kind != "friction" and each.verdict == "determined":
+            false += [each.kind] * (not each.low <= truth <= each.high)
+    assert false == []
+    assert any("friction of the load fits as well" in each.reasons for each in said)
+
+
+def test_a_profile_says_where_a_fit_with_it_ends(clean: Fits) -> None:
+    profile = load_friction_profile(LinearRefit.of(clean.best))
+    place = 2
+    objective = clean.best.objective
+    simulation = replace(objective.simulation, load_friction=profile.sizes[place : place + 1])
+    end = fit(replace(objective, simulation=simulation), clean.best.vector, derivatives="exact")
+    assert profile.ends[place].cost == pytest.approx(end.cost, abs=0.3)
+
+
+# A clock.
+
+
+def best_at(motion: ArmSimulation, true: Array, rate: float) -> Fit:
+    """Return the best fit of a recording whose rate is other than it says, without noise."""
+    recording = replace(motion.recording, fps=rate * FPS)
+    angles = replace(motion, recording=recording).angles(true)
+    recorded = replace(motion.recording, state=angles)
+    objective = objective_of(motion.parameters, recorded, KINDS, NOISE)
+    return fit(replace(objective, fixed=true), true, derivatives="exact")
+
+
+def test_what_a_clock_moves_is_what_a_fit_to_another_rate_moves(
+    motion: ArmSimulation, true: Array
+) -> None:
+    best = best_at(motion, true, 1.0)
+    other = best_at(motion, true, 1.0 - UNCERTAIN_RATE)
+    free = best.objective.free
+    moved = (other.vector - best.vector)[free]
+    deviations = 1.0 / np.sqrt(np.diag(best.information))
+    assert moved_by_clock(best) == pytest.approx(moved, abs=0.3 * float(deviations.max()))
+
+
+def test_a_faster_clock_shows_less_viscous_friction_of_light_joints(
+    motion: ArmSimulation, true: Array
+) -> None:
+    """The speed of a wrist is faster by the rate, and weight and inertia hardly matter there."""
+    best = best_at(motion, true, 1.0)
+    kinds = [best.objective.parameters.each[number].kind for number in best.objective.free]
+    viscous = moved_by_clock(best)[[kind == "viscous" for kind in kinds]]
+    assert viscous[-3:] == pytest.approx(-UNCERTAIN_RATE, abs=0.5 * UNCERTAIN_RATE)
+
+
+def test_intervals_are_as_wide_as_an_uncertain_clock_makes_them(clean: Fits) -> None:
+    shift = np.linspace(0.0, 0.1, len(clean.best.objective.free))
+    widened = replace(clean, clock_shift=shift).deviations
+    assert widened == pytest.approx(np.hypot(clean.deviations, shift))
