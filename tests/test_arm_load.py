@@ -48,7 +48,7 @@ def motion(parameters: ArmParameters) -> ArmSimulation:
 def fits_of(motion: ArmSimulation, true: Array, angles: Array) -> Fits:
     """Return the fit of the model to angles (K, n) that are measured with noise."""
     state = angles + np.random.default_rng(0).normal(0.0, NOISE, angles.shape)
-    recording = replace(motion.recording, state=state, resolution=np.full(6, COUNT))
+    recording = replace(motion.recording, state=state)
     objective = objective_of(motion.parameters, recording, KINDS, NOISE)
     best = fit(replace(objective, fixed=true), true, derivatives="exact")
     return Fits((best,) * 3, Residuals.of(best.errors, recording))
