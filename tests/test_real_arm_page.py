@@ -12,6 +12,7 @@ import statemachine as sm
 from examples import record_chirps
 from statemachine.interface import Array
 from statemachine.lab.identification import verdicts
+from statemachine.lab.identification.clock import UNCERTAIN_RATE
 from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.results import FEWEST_STARTS
 from statemachine.lab.recordings.arm_recording import ArmRecording
@@ -79,6 +80,7 @@ def test_what_the_verdict_demands_is_what_the_page_says() -> None:
     assert f"less than {verdicts.TELLS} of what was uncertain" in PAGE
     assert FEWEST_STARTS == 8
     assert verdicts.AGREEING == 0.5
+    assert f"a rate that may be {100.0 * UNCERTAIN_RATE:g} % off" in PAGE
 
 
 def test_the_speed_of_the_script_is_that_of_the_page() -> None:

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from statemachine.interface import Array, Model
-from statemachine.lab.recordings.calibration import COUNTS_OF_A_TURN, MotorCalibration
-from statemachine.lab.recordings.unit_inference import COUNT
+from statemachine.lab.recordings.calibration import COUNT, COUNTS_OF_A_TURN, MotorCalibration
 
 from .arm_truth import GRIPPER
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from .linear_refit import LinearRefit
+from .linear_refit import LinearRefit, RefitEnd
 from .size_profile import SizeProfile
 
 # Tried parts: gears of a servo, which has several stages, lose a tenth to a third.
@@ -13,7 +15,10 @@ _PARTS = np.array((0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0
 
 def load_friction_profile(refit: LinearRefit) -> SizeProfile:
     """Return the profile by the part of its force that each servo loses."""
-    simulation = refit.fit.objective.simulation
-    angles = simulation.angles_with_load_friction(refit.fit.vector, _PARTS)
-    changes = (angles - angles[0])[:, simulation.first_frame :]
-    return SizeProfile(_PARTS, tuple(map(refit.end, changes)), float(_PARTS[1]))
+    simulation, vector = refit.fit.objective.simulation, refit.fit.vector
+    without = simulation.angles(vector)
+    ends: list[RefitEnd] = []
+    for part in _PARTS.tolist():
+        angles = replace(simulation, load_friction=part).angles(vector)
+        ends.append(refit.end((angles - without)[simulation.first_frame :]))
+    return SizeProfile(_PARTS, tuple(ends), float(_PARTS[1]))

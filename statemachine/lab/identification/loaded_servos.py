@@ -2,18 +2,20 @@
 
 Gears lose a part of the force that goes through them (their efficiency is one less that part), so
 that friction is no figure of the joint alone. It pulls against the motion, as dry friction does.
-Worlds have no such friction: the commands are changed by what makes a servo pull as much less.
+Worlds have no such friction: the commands are changed by what makes a servo pull as much less. At
+its limit a servo nearly always drives the motion, and so the limit is less by that part.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...interface import Array
+from ...interface import Array, Model
 from .parameters import ArmParameters
 
 _STICKS = 0.02  # rad/s: below, friction is as much less as the speed is
@@ -24,44 +26,38 @@ class LoadedServos:
     """Servos whose gears lose a part of their force.
 
     Attributes:
-        kp, kv: (W, 1, n) gains in each world [N·m/rad, N·m·s/rad].
-        limit: (n,) largest force [N·m].
-        part: (W, 1, 1) that is lost, or (1, 1, 1).
+        parameters: Of the arm.
+        part: That is lost, below 1.
         timestep: [s].
     """
 
-    kp: Array
-    kv: Array
-    limit: Array
-    part: Array
+    parameters: ArmParameters
+    part: float
     timestep: float
 
-    @classmethod
-    def of(
-        cls, parameters: ArmParameters, options: Mapping[str, Any], part: Array, timestep: float
-    ) -> LoadedServos:
-        """Return the servos of worlds.
+    @property
+    def model(self) -> Model:
+        """Return the model of the arm, whose servos have at most the force that is left."""
+        model = self.parameters.model
+        if not self.part:
+            return model
+        compiled = copy.copy(model.compiled)
+        compiled.actuator_forcerange[self.parameters.servo] *= 1.0 - self.part
+        return model.with_compiled(compiled)
 
-        Args:
-            parameters: Of the arm.
-            options: Of the worlds, as of `ArmParameters.options`.
-            part: (W,) that is lost in each world, or (1,).
-            timestep: [s].
-        """
-        servo = parameters.servo
-        kp, kv = options["kp"][:, None, servo], options["kv"][:, None, servo]
-        limit = parameters.model.actuator_forcerange[servo][:, 1]
-        return cls(kp, kv, limit, part[:, None, None], timestep)
-
-    def lost(self, told: Array, history: Array) -> Array:
+    def lost(self, options: Mapping[str, Any], told: Array, history: Array) -> Array:
         """Return by how much other commands (W, T, n) make the force less that is lost [rad].
 
         Args:
+            options: Of the worlds, as of `ArmParameters.options`.
             told: (W, T, n) commands [rad].
             history: (W, 1 + T, n) angles at the start and after each step [rad].
         """
-        speeds = np.diff(history, axis=1, prepend=history[:, :1]) / self.timestep
-        wanted = self.kp * (told - history[:, :-1]) - self.kv * speeds[:, :-1]
-        force = np.clip(wanted, -self.limit, self.limit)
-        less = self.part * np.abs(force) * np.tanh(speeds[:, :-1] / _STICKS)
-        return np.nan_to_num(-less / self.kp)  # of a world that diverged it does not matter
+        servo = self.parameters.servo
+        kp, kv = options["kp"][:, None, servo], options["kv"][:, None, servo]
+        limit = self.parameters.model.actuator_forcerange[servo][:, 1]
+        before = np.diff(history, axis=1, prepend=history[:, :1])[:, :-1]
+        speeds = before / self.timestep
+        force = np.clip(kp * (told - history[:, :-1]) - kv * speeds, -limit, limit)
+        less = self.part * np.abs(force) * np.tanh(speeds / _STICKS)
+        return np.nan_to_num(-less / kp)  # of a world that diverged it does not matter

@@ -109,7 +109,7 @@ def _of_load_friction(refit: LinearRefit) -> Refinement:
     part, end = float(profile.sizes[profile.best]), profile.ends[profile.best]
     shifts, is_nearer = profile.as_good, False
     if profile.evidence > EVIDENCE:
-        loaded = replace(best.objective.simulation, load_friction=np.array([part]))
+        loaded = replace(best.objective.simulation, load_friction=part)
         fitted = _fitted(best, loaded)
         is_nearer = fitted.cost < refit.cost - EVIDENCE
         if is_nearer:

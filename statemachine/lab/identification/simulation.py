@@ -42,8 +42,7 @@ class ArmSimulation:
         play: (n,) widths of the play between each joint and its encoder [rad], or (W, n) of each
             world, of which there may be more than of vectors; None for no play.
         gravity: (3,) in the axes of the base [m/s²]; None for that of the model.
-        load_friction: (W,) part of the force of each servo that is lost as friction, in each world;
-            or (1,) of all worlds; None for none.
+        load_friction: Part of the force of each servo that its gears lose as friction, below 1.
     """
 
     parameters: ArmParameters
@@ -52,7 +51,7 @@ class ArmSimulation:
     viscous_outside: bool = False
     play: Array | None = None
     gravity: Array | None = None
-    load_friction: Array | None = None
+    load_friction: float = 0.0
 
     @classmethod
     def of(cls, parameters: ArmParameters, recording: ArmRecording) -> ArmSimulation:
@@ -146,16 +145,6 @@ class ArmSimulation:
         """
         return replace(self, play=widths[:, None]).angles_of_each(vector[None])
 
-    def angles_with_load_friction(self, vector: Array, parts: Array) -> Array:
-        """Return the angles (M, K, n) of one arm that loses some parts of its servos' forces.
-
-        Args:
-            vector: (P,) of the parameters.
-            parts: (M,) that are lost as friction.
-        """
-        vectors = np.tile(vector, (len(parts), 1))
-        return replace(self, load_friction=parts).angles_of_each(vectors)
-
     def saturated(self, vector: Array) -> Array:
         """Return the part (n,) of the frames in which each servo is at its force limit."""
         limits = self.parameters.model.actuator_forcerange[self.parameters.servo]
@@ -171,7 +160,8 @@ class ArmSimulation:
         """Return the angles (W, K, n) with so many steps a frame, NaN of worlds that diverge."""
         parameters = self.parameters
         timestep = 1.0 / (self.recording.fps * steps)
-        model = parameters.model.replace(timestep=timestep, integrator="euler", contacts=False)
+        servos = LoadedServos(parameters, self.load_friction, timestep)
+        model = servos.model.replace(timestep=timestep, integrator="euler", contacts=False)
         options = parameters.options(vectors, self.viscous_outside)
         if self.gravity is not None:
             options["gravity"] = np.tile(self.gravity, (len(vectors), 1))
@@ -179,11 +169,9 @@ class ArmSimulation:
         told = np.repeat(self.action[:-1], steps, axis=0) - offsets
         with make_worlds(model, len(vectors), derived=(), **options) as worlds:
             history = self._moved(worlds, told, offsets)
-            if self.load_friction is not None:
-                servos = LoadedServos.of(parameters, options, self.load_friction, timestep)
-                for _ in range(_LOADED_RUNS):
-                    lost = servos.lost(told, history)
-                    history = self._moved(worlds, told + lost, offsets)
+            for _ in range(_LOADED_RUNS if self.load_friction else 0):
+                lost = servos.lost(options, told, history)
+                history = self._moved(worlds, told + lost, offsets)
         if self.play is not None:
             history = behind_play(history, self.play)
         delays = vectors[:, parameters.of_kind("delay")[0]]

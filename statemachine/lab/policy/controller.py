@@ -70,8 +70,8 @@ class PolicyController:
         self._low, self._high = driven.model.actuator_ctrlrange[binding.ctrl].T
         self._farthest = _FARTHEST
         if self._commands_torques:  # which are limited
-            self._farthest = np.inf
             self._low, self._high = np.full(n, -np.inf), np.full(n, np.inf)
+            self._farthest = np.inf
         self._targets = self._targets_of(np.zeros(n))
         self.calls: list[PolicyCall] = []
         self.saturated = np.zeros(n, dtype=np.int64)
