@@ -117,7 +117,7 @@ def compared(folder: Path, fault: str, seconds: float = 0.1) -> ContractsResult:
 
 @pytest.mark.parametrize("fault", sorted(FAULTS))
 def test_two_contracts_that_differ_by_a_fault_name_it(tmp_path: Path, fault: str) -> None:
-    assert compared(tmp_path, fault, 0.04).kinds == (FAULTS[fault][1],)
+    assert compared(tmp_path, fault, 0.08).kinds == (FAULTS[fault][1],)
 
 
 def test_two_equal_contracts_differ_in_nothing(tmp_path: Path) -> None:
