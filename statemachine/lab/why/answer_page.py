@@ -36,6 +36,7 @@ class CauseSentence(PageContent):
         element: Name of the element that the cause is of.
         left, right: The values of both sides, with their units.
         place: The line of the right's file that says it; None where that is not known.
+        option: The option of the right that says it, as it is typed; "" where none does.
         part: What it takes away, as a part of the gap.
         gap: The gap, with its unit.
         alone, last: What it takes away as the only one, and after all others; None where that
@@ -49,6 +50,7 @@ class CauseSentence(PageContent):
     left: str
     right: str
     place: SourceLine | None
+    option: str
     part: float
     gap: str
     alone: float | None
@@ -240,6 +242,7 @@ def _of_cause(result: Explanation) -> CauseSentence:
         times = next(value for value in cause.values if value.quantity == "timeconst")
         left, right = texts_of(times)
     element = cause.name.rpartition(" of ")[2]
+    part = abs(cause.share or 0.0)
     return CauseSentence(
         wording=wording,
         heading=heading_of(cause),
@@ -247,7 +250,8 @@ def _of_cause(result: Explanation) -> CauseSentence:
         left=left,
         right=right,
         place=cause.place,
-        part=abs(cause.share or 0.0),
+        option=cause.option,
+        part=part,
         gap=amount(result, result.gap),
         alone=cause.alone,
         last=cause.last,

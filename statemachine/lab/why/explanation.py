@@ -51,7 +51,8 @@ class Share:
     Attributes:
         name: What it is, and of what.
         values: Each quantity that differs; see `WrittenCause`.
-        place: The one line of the right's file that says it; None where that was not found.
+        place: The one line of the right's file that says it; None where that was not found, and
+            where an option says it.
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
@@ -73,6 +74,8 @@ class Share:
         changes: What of the right's file undoes it, attribute by attribute; empty where that is not
             known.
         not_written: Why no attribute of the right's file undoes it; "" where some do.
+        option: The option of the right side that says its value, as it is typed; "" where none
+            does.
     """
 
     name: str
@@ -89,6 +92,7 @@ class Share:
     chosen: tuple[Literal["left", "right"], str] | None = None
     changes: tuple[AttributeChange, ...] = ()
     not_written: str = ""
+    option: str = ""
 
     def weight(self) -> float:
         """Return the size that it is ranked by: of its share, or of the mean of alone and last."""
@@ -257,6 +261,13 @@ class Explanation:
     def is_complete(self) -> bool:
         """Tell whether the search came to its end."""
         return not (self.ended_by or self.method in ("not ranked", "alone and last"))
+
+    @property
+    def is_written_in_vain(self) -> bool:
+        """Tell whether a file was to close a gap, and nothing could be changed in it."""
+        if self.rewritten is None or self.rewritten.written:
+            return False
+        return self.verdict.divides
 
     @property
     def ranking(self) -> tuple[Effect, ...]:

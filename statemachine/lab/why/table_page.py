@@ -24,6 +24,7 @@ _SHOWN = 12  # rows; the rest is folded away
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
 _SUMMARY_HEADS = ("what", "left", "right", "part", "right's file")
+_FILE_OR_OPTION = "right's file or option"
 _HEADS = ("what", "left", "right", "part", "alone", "last")
 _WORDS = frozenset({0, 1, 2})  # columns
 _TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
@@ -60,6 +61,8 @@ def summary_table(result: Explanation, most: int) -> Table:
             share = result.explained + result.located - sum(part for _, part in parts[:most])
         shown.append(_row_of_rest(more, share))
     heads = _SUMMARY_HEADS
+    if any(row.option for row in acting):
+        heads = (*heads[:4], _FILE_OR_OPTION)
     # Where nothing stands in the file; and ranges need the room.
     if not result.is_complete or all(row[4] == NO_NUMBER for row in shown):
         heads, shown = heads[:4], [row[:4] for row in shown]
@@ -67,10 +70,12 @@ def summary_table(result: Explanation, most: int) -> Table:
 
 
 def _summary_of_cause(result: Explanation, row: Share) -> Row:
-    """Return a cause in one row, with the line of the right's file that says it."""
+    """Return a cause in one row, with the option or the line of the right's file that says it."""
     left, right = sides_of(row, most=1)
     place = NO_NUMBER
-    if row.place is not None:
+    if row.option:
+        place = row.option
+    elif row.place is not None:
         place = f"{row.place.file}:{row.place.line}"
     elif row.changes:
         place = f"{row.changes[0].file}:{row.changes[0].line}"
