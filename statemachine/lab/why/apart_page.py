@@ -29,9 +29,9 @@ class ApartSentence(PageContent):
 
     @property
     def gap(self) -> Deviation | None:
-        """Return the gap of the quantity that is explained; None where it is rounding."""
+        """Return the gap that is explained, of one joint if it is of joints; None of rounding."""
         result = self.result
-        return result.first[result.quantity] if result.gap > result.negligible else None
+        return result.shown_gap if result.gap > result.negligible else None
 
     @property
     def divides(self) -> bool:

@@ -54,8 +54,8 @@ class CausesPart(PageContent):
 
     @property
     def gap(self) -> Deviation:
-        """Return the gap of the quantity that is explained."""
-        return self.result.first[self.result.quantity]
+        """Return the gap of the quantity that is explained; of one joint if it is of joints."""
+        return self.result.shown_gap
 
     @property
     def elsewhere(self) -> tuple[OtherGap, ...]:

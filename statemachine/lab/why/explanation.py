@@ -198,8 +198,9 @@ class Explanation:
         rewritten: The right's file with the left's values; None where none was to be written.
         split: The gap divided into import, joint dynamics and contact; None where there is no gap
             to divide, one engine runs one file on both sides, or the search was ended before.
-        joint: Which joint is farthest apart as the sides come, where `quantity` is of several; else
-            "".
+        joint: Which joint is farthest apart as the sides come, by `measure`, where `quantity` is of
+            several; else "".
+        joint_gap: How far that joint alone is apart; None where `joint` is "".
         cited_case: The case of the battery that decides the cause, and which side is nearer to the
             truth in it; None where the cause has none, or where the run that was asked does not
             say the same.
@@ -254,6 +255,7 @@ class Explanation:
     rewritten: RewrittenFile | None = None
     split: GapSplit | None = None
     joint: str = ""
+    joint_gap: Deviation | None = None
     cited_case: CitedCase | None = None
     contradicted_case: CitedCase | None = None
 
