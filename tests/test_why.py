@@ -698,7 +698,7 @@ def test_the_joint_that_is_farthest_apart_is_named(arm: Model, measure: Measure)
         alone[name] = explain(asked).first[name]
     assert result.joint == max(alone, key=lambda name: size_of(alone[name], measure))
     assert result.joint_gap == alone[result.joint]
-    assert size_of(result.shown_gap, measure) == result.gap
+    assert size_of(alone[result.joint], measure) == result.gap
 
 
 def test_of_another_quantity_no_joint_is_named(arm: Model) -> None:

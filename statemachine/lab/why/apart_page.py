@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...measures import Deviation
 from ...show.templates import PageContent
 from .answer_page import sentence_of
-from .causes_page import nothing_differs, what_is_apart
+from .causes_page import nothing_differs, shown_gap, what_is_apart
 from .explanation import Explanation
 
 
@@ -31,7 +31,7 @@ class ApartSentence(PageContent):
     def gap(self) -> Deviation | None:
         """Return the gap that is explained, of one joint if it is of joints; None of rounding."""
         result = self.result
-        return result.shown_gap if result.gap > result.negligible else None
+        return shown_gap(result) if result.gap > result.negligible else None
 
     @property
     def divides(self) -> bool:
