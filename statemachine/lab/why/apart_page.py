@@ -35,9 +35,8 @@ class ApartSentence(PageContent):
 
     @property
     def divides(self) -> bool:
-        """Tell whether it is known what of the gap stays with all causes equalized."""
-        verdict = self.result.verdict
-        return verdict.divides and verdict.answer != "stopped"
+        """Tell whether the gap was divided, so that what stays of it is a part of the answer."""
+        return self.result.verdict.divides and self.result.is_complete
 
     @property
     def nothing_differs(self) -> bool:

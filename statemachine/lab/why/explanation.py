@@ -95,10 +95,10 @@ class Share:
     option: str = ""
 
     def weight(self) -> float:
-        """Return the size that it is ranked by: of its share, or of the mean of alone and last."""
+        """Return the size that it is ranked by: of its share, or of the middle of its range."""
         if self.share is not None:
             return abs(self.share)
-        return Effect(self.name, self.alone, self.last).size()
+        return 0.0 if self.range is None else abs(sum(self.range)) / 2
 
 
 @dataclass(frozen=True)
@@ -277,6 +277,11 @@ class Explanation:
         effects = [Effect(row.name, row.alone, row.last) for row in self.shares]
         known = [effect for effect in effects if effect.range is not None]
         return tuple(sorted(known, key=Effect.size, reverse=True))
+
+    def leading(self) -> Share | None:
+        """Return the cause that takes away most by all that is known; None where nothing is."""
+        known = [row for row in self.shares if row.range is not None]
+        return max(known, key=Share.weight, default=None)
 
     @property
     def verdict(self) -> GapVerdict:

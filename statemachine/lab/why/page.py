@@ -86,7 +86,12 @@ class WhyPage(PageContent):
 
     @property
     def split(self) -> Sequence[Block]:
-        """Return what of the gap is import, joint dynamics and contact."""
+        """Return what of the gap is import, joint dynamics and contact.
+
+        The first screen of a search that was ended has its room for the causes.
+        """
+        if not (self.further or self.result.is_complete):
+            return []
         return split_blocks(self.result, details=bool(self.further))
 
     @property

@@ -136,8 +136,10 @@ def without_effect(result: Explanation, rows: Sequence[Share]) -> list[Share]:
 
 
 def has_effect(row: Share) -> bool:
-    """Tell whether a cause takes away a part of the gap: in the mean, alone, or last."""
-    parts = (row.share, row.alone, row.last)
+    """Tell whether a cause takes away a part of the gap: in the mean, alone, last, in an order."""
+    parts = [row.share, row.alone, row.last]
+    if row.share is None and row.range is not None:  # the ends of an estimate are its errors
+        parts += row.range
     return max(abs(part or 0.0) for part in parts) >= _NO_PART
 
 
@@ -183,10 +185,12 @@ def _parts(result: Explanation, row: Share) -> Row:
         return TableCell(f"< {percent(noise)}", share=row.share), NO_NUMBER, NO_NUMBER
     if row.share is None and row.alone is not None and row.last is None:
         return TableCell(f"{percent(row.alone)} alone", share=None), percent(row.alone), NO_NUMBER
+    if row.share is None and row.last is not None and row.range == (row.last, row.last):
+        part = TableCell(f"{percent(row.last)} last", share=None)
+        return part, percent(row.alone), percent(row.last)
     if row.share is None and row.range is not None:
-        least, largest = row.range
-        ends = [f"{100 * round(end, 2) + 0.0:.0f}" for end in (least, largest)]
-        part = TableCell(f"{' to '.join(ends)} %", share=None)
+        ends = [f"{100 * round(end, 2) + 0.0:.0f}" for end in row.range]
+        part = TableCell(f"{' to '.join(dict.fromkeys(ends))} %", share=None)
         return part, percent(row.alone), percent(row.last)
     explains = percent(row.share)
     if row.error and math.isfinite(row.error):
