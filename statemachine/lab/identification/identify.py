@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -18,7 +19,13 @@ from .parameters import ArmParameters
 from .recorded_gap import Asked, asked_of, gap_between, parts_of
 from .refinements import tried_refinements
 from .residuals import Residuals
-from .results import IdentificationResult, RecordingRequest, StartOutcome
+from .results import (
+    CauseShare,
+    IdentificationResult,
+    InterruptedIdentification,
+    RecordingRequest,
+    StartOutcome,
+)
 from .shares import cause_shares
 from .simulation import ArmSimulation
 from .starts import Fits, fits_from_starts
@@ -108,6 +115,8 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         StateMachineError: The recording or the model cannot be read, or they do not fit.
         MissingEngineError: The extra `recordings` is not installed.
         DivergedError: The simulation diverges with the figures of the model.
+        InterruptedIdentification: Ctrl-C while the gap was divided; it holds the fit. One that
+            comes earlier is a plain KeyboardInterrupt.
     """
     asked = asked_of(request)
     with reporter.stage(f"fitting {request.recording}") as progress:
@@ -122,8 +131,7 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         refinements = tried_refinements(fits)
         hypotheses = tried_hypotheses(fits, saturated, progress)
         hypotheses += tuple(each.hypothesis for each in refinements)
-    with reporter.stage("dividing the gap among its causes") as progress:
-        shares = cause_shares(fits, held_out, progress)
+    shares, ended_by = _shares_if_not_ended(fits, held_out, reporter)
     as_it_is = simulation.angles(np.zeros(len(best)))
     part = "last third" if asked.recordings.held_out is None else "all"
     fitted_gap = gap_between(simulation, as_it_is, simulation.angles(best))
@@ -134,7 +142,7 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
     recording, residuals = simulation.recording, fits.residuals
     arm, recordings = asked.parameters.model, asked.recordings
     arm_after = fitted_model(asked.parameters, best)
-    return IdentificationResult(
+    result = IdentificationResult(
         request=request,
         provenance=source,
         units=recording.units,
@@ -153,7 +161,31 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         recordings=recordings,
         arm=arm,
         fitted_arm=arm_after,
+        ended_by=ended_by,
     )
+    if ended_by:
+        raise InterruptedIdentification(result)
+    return result
+
+
+def _shares_if_not_ended(
+    fits: Fits, elsewhere: ArmSimulation, reporter: Reporter
+) -> tuple[tuple[CauseShare, ...], Literal["", "interrupt"]]:
+    """Divide the gap among its causes; of a Ctrl-C before that is done, say so.
+
+    Args:
+        fits: Of all parameters.
+        elsewhere: Plays what was not fitted.
+        reporter: Told how it gets on.
+
+    Returns:
+        The shares, none where Ctrl-C came, and whether it did.
+    """
+    try:
+        with reporter.stage("dividing the gap among its causes") as progress:
+            return cause_shares(fits, elsewhere, progress), ""
+    except KeyboardInterrupt:
+        return (), "interrupt"
 
 
 def _outcomes(fits: Fits) -> tuple[StartOutcome, ...]:
