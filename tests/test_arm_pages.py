@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from statemachine.engines.description.file_changes import UnwrittenChange
 from statemachine.lab.identification.identification_page import IdentificationPage, page
 from statemachine.lab.identification.parameter_texts import half_width_text
 from statemachine.lab.identification.recording_page import RecordingPage, gap_table
@@ -288,6 +289,21 @@ def test_a_written_file_that_lacks_figures_is_told_to_be_farther(
     )
     assert (far.is_farther, near.is_farther) == (True, False)
     assert far.unchanged == len(content(fitted).undetermined)
+
+
+def test_a_written_file_takes_no_joint_from_the_first_screen(
+    fitted: IdentificationResult,
+) -> None:
+    """What was not written for one reason is one row."""
+    joints = ("shoulder_lift", "elbow_flex", "wrist_flex")
+    refused = tuple(UnwrittenChange(f"offset of {joint}", "calibrated") for joint in joints)
+    rewritten = RewrittenFile("a.xml", "so101.xml", (), refused, 0.01, 0.2, "joints", "rad")
+    (row,) = WrittenPart(fitted, rewritten, True).unwritten
+    assert len(row.names) == len(joints)
+    tables = [
+        blocks(page(result), Table)[-1] for result in (fitted, replace(fitted, rewritten=rewritten))
+    ]
+    assert tables[0].rows == tables[1].rows
 
 
 def test_reasons_are_counted_where_there_are_several(fitted: IdentificationResult) -> None:

@@ -42,7 +42,7 @@ COMMANDS = [
     f"compare hold {ITSELF} --one-step",
     f"compare hold {ITSELF} --converge",
     "compare hold so101/scene so101/scene damping=1 --seconds 0.2",
-    "compare hold so101/scene so101/scene damping=1 --seconds 0.2 --why",
+    "compare hold so101/scene damping=1 so101/scene --seconds 0.2 --why",
     "compare hold so101 so101 damping=1 so101 damping=1.001 --seconds 0.2 --no-chaos",
     "compare --models so101 so101/scene",
     "compare lerobot:synthetic so101 --seconds 2",

@@ -23,9 +23,10 @@ from statemachine.lab.recordings import record_scenario, rerun
 from statemachine.lab.runs.scenarios import Scenario, scenario
 from statemachine.lab.why import Explanation, WhyRequest, explain, search
 from statemachine.lab.why import page as report
-from statemachine.lab.why.gap import Measure
+from statemachine.lab.why.gap import Measure, size_of
 from statemachine.lab.why.settings import NEEDS, TITLES
 from statemachine.lab.why.shapley import shapley
+from statemachine.measures import Deviation
 from statemachine.show.as_json import dumps
 
 from .support.backends import registered
@@ -688,15 +689,16 @@ def test_files_and_settings_of_an_engine_are_explained_together(
 
 @pytest.mark.parametrize("measure", ["worst", "end"])
 def test_the_joint_that_is_farthest_apart_is_named(arm: Model, measure: Measure) -> None:
-    """Each joint alone is less far apart than the one that is named, which is all of the gap."""
+    """Each joint alone is less far apart than the one that is named, whose figures are told."""
     other = arm.replace(damping=[0.6, 0.6, 1.4, 0.6, 0.6, 0.6])
     result = explain(WhyRequest(arm, other, HOLD, measure=measure, uncertain=None))
-    alone: dict[str, float] = {}
+    alone: dict[str, Deviation] = {}
     for name in arm.joint_names:
         asked = WhyRequest(arm, other, HOLD, quantity=name, uncertain=None)
-        alone[name] = explain(asked).first[name].worst
-    assert result.joint == max(alone, key=alone.__getitem__)
-    assert alone[result.joint] == result.first["joints"].worst
+        alone[name] = explain(asked).first[name]
+    assert result.joint == max(alone, key=lambda name: size_of(alone[name], measure))
+    assert result.joint_gap == alone[result.joint]
+    assert size_of(alone[result.joint], measure) == result.gap
 
 
 def test_of_another_quantity_no_joint_is_named(arm: Model) -> None:

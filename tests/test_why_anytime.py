@@ -243,8 +243,8 @@ def test_what_is_known_early_leads_with_the_best_candidate(
 ) -> None:
     _after(runs, TimeIsUp(), monkeypatch)
     found = explain(_asked(sides, time_limit=1e6))
-    best = next(each for each in found.ranking if each.alone is not None)
-    assert best.alone is not None
+    best = found.leading()
+    assert best is not None
     expected = f"Best candidate so far: {best.name}, {percent(best.alone)} alone"
     assert sentence_of_answer(found).startswith(expected)
 

@@ -12,7 +12,7 @@ from ..common import INTERRUPTED, TerminalReporter, print_error, show
 from .options import check_options
 from .recordings import names_recording, run_recording
 from .requests import explain_request_of, request_of
-from .stopping import stop_is_said
+from .stopping import end_line_of_terminal, stop_is_said
 
 if TYPE_CHECKING:
     from ...engines.pictures import Renderer
@@ -169,6 +169,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
             made_by = page_command(request, asked, files.html)
             report_page = compare_report.whole_page(result, asked, made_by, reporter)
         except InterruptedExplanation as stop:
+            end_line_of_terminal()
             print_error(f"stopped: {files.html} was not written", 0)
             show(why.page(stop.result, options.details), stop.result, options.json)
             return INTERRUPTED

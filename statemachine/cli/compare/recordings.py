@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ...errors import BadInputError
 from ...installed import DEFAULT
 from ...measures.text import command
-from ..common import PROGRAM, TerminalReporter, is_given, show
+from ..common import INTERRUPTED, PROGRAM, TerminalReporter, is_given, print_error, show
 from .options import refuse_options
 from .requests import pairs_of
 from .stopping import stop_is_said
@@ -106,13 +106,21 @@ def _model_of(options: argparse.Namespace) -> str:
 def run_recording(options: argparse.Namespace) -> int:
     """Compare a recording with its model, or fit that, and show."""
     from ...lab.identification.arm_report import check_page, write_arm_page
+    from ...lab.identification.results import InterruptedIdentification
 
     request, reporter = recording_request_of(options), TerminalReporter()
     page_file = None if options.html is None else Path(options.html)
     if page_file is not None:
         check_page(page_file, reporter)
-    with stop_is_said():
-        result = _result_of(request, options.why, reporter)
+    try:
+        with stop_is_said():
+            result = _result_of(request, options.why, reporter)
+    except InterruptedIdentification as stop:
+        for file in (page_file, request.write):
+            if file is not None:
+                print_error(f"stopped: {file} was not written", 0)
+        show(stop.result.page(options.details), stop.result, options.json)
+        return INTERRUPTED
     try:
         if page_file is not None:
             print(write_arm_page(page_file, result), file=sys.stderr)

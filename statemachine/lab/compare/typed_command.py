@@ -41,6 +41,19 @@ class TypedCommand:
             del words[place : place + 2]
         return replace(self, words=(*words, _EVERY, period))
 
+    def without_option_of_right(self, option: str) -> TypedCommand:
+        """Return the same command without an option of the right side, such as "kp=40"."""
+        if self.run is not None:
+            left, right = self.run.sides
+            name = option.partition("=")[0]
+            options = {key: value for key, value in right.options.items() if key != name}
+            sides = left, replace(right, options=options)
+            return replace(self, run=replace(self.run, sides=sides))
+        words = list(self.words)
+        place = len(words) - 1 - words[::-1].index(option)  # the left may have the same words
+        del words[place]
+        return replace(self, words=tuple(words))
+
     def lines(self, *further: str) -> str:
         """Return the command as one types it, as of `folded_command`.
 

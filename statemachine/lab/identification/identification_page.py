@@ -177,6 +177,8 @@ class IdentificationPage(PageOfRecording, PageContent):
     @property
     def next_command(self) -> str:
         """Return what to type next; "" for nothing."""
+        if self.result.ended_by:
+            return typed_question(self.result.request, "--why")
         if not self.further:
             return typed_question(self.result.request, "--why", "--details")
         if self.none_determined or self.result.rewritten is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +18,14 @@ from .parameters import ArmParameters
 from .recorded_gap import FitSplit, RecordedArm, gap_between, recorded_arm_of, split_of
 from .refinements import tried_refinements
 from .residuals import Residuals
-from .results import IdentificationResult, RecordingGap, RecordingRequest, StartOutcome
+from .results import (
+    CauseShare,
+    IdentificationResult,
+    InterruptedIdentification,
+    RecordingGap,
+    RecordingRequest,
+    StartOutcome,
+)
 from .shares import cause_shares
 from .simulation import ArmSimulation
 from .starts import Fits, fits_from_starts
@@ -116,6 +124,8 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         StateMachineError: The recording or the model cannot be read, or they do not fit.
         MissingEngineError: The extra `recordings` is not installed.
         DivergedError: The simulation diverges with the figures of the model.
+        InterruptedIdentification: Ctrl-C while the gap was divided; it holds the fit. One that
+            comes earlier is a plain KeyboardInterrupt.
     """
     arm = recorded_arm_of(request)
     with reporter.stage(f"fitting {request.recording}") as progress:
@@ -129,9 +139,8 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         refinements = tried_refinements(fits)
         hypotheses = tried_hypotheses(fits, saturated, progress)
         hypotheses += tuple(each.hypothesis for each in refinements)
-    with reporter.stage("dividing the gap among its causes") as progress:
-        shares = cause_shares(fits, fitted.held_out, progress)
-    return IdentificationResult(
+    shares, ended_by = _shares_if_not_ended(fits, fitted.held_out, reporter)
+    result = IdentificationResult(
         request=request,
         provenance=provenance(model, request.seed),
         gap=fitted.gap(),
@@ -148,7 +157,31 @@ def identify(request: RecordingRequest, reporter: Reporter = QUIET) -> Identific
         starts=_outcomes(fits),
         saturated=saturated,
         fitted_arm=fitted_model(arm.parameters, fits.best.vector),
+        ended_by=ended_by,
     )
+    if ended_by:
+        raise InterruptedIdentification(result)
+    return result
+
+
+def _shares_if_not_ended(
+    fits: Fits, held_out: ArmSimulation, reporter: Reporter
+) -> tuple[tuple[CauseShare, ...], Literal["", "interrupt"]]:
+    """Divide the gap among its causes; of a Ctrl-C before that is done, say so.
+
+    Args:
+        fits: Of all parameters.
+        held_out: Plays what was not fitted.
+        reporter: Told how it gets on.
+
+    Returns:
+        The shares, none where Ctrl-C came, and whether it did.
+    """
+    try:
+        with reporter.stage("dividing the gap among its causes") as progress:
+            return cause_shares(fits, held_out, progress), ""
+    except KeyboardInterrupt:
+        return (), "interrupt"
 
 
 def _outcomes(fits: Fits) -> tuple[StartOutcome, ...]:

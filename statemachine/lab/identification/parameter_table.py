@@ -40,6 +40,8 @@ def joint_table(parameters: Sequence[FittedParameter], most: int) -> Table:
     joints = list(dict.fromkeys(each.joint for each in determined if each.kind in kinds))
     cells = {(each.joint, each.kind): _cell_of(each) for each in of_joints}
     rows: list[list[str]] = []
+    if len(joints) == most + 1:  # one that is left out would take as much room
+        most += 1
     for joint in joints[:most]:
         rows.append([joint or "", *(cells.get((joint, kind), NO_NUMBER) for kind in kinds)])
     if len(joints) > most:

@@ -14,6 +14,7 @@ def answer(request: RecordingRequest, reporter: Reporter = QUIET) -> Identificat
     Raises:
         BadInputError: The recording cannot be read, or the file cannot be written.
         StateMachineError: The model cannot be loaded.
+        InterruptedIdentification: Ctrl-C once the fit was known; no file was written.
     """
     check_written(request)
     return with_written(identify(request, reporter))

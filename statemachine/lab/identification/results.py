@@ -284,13 +284,15 @@ class IdentificationResult(ResultOfRecording):
         holds: Whether the fitted model predicts what was not fitted down to the floor.
         at_floor: Whether the residual is at the floor.
         parameters: What the recording tells of each.
-        shares: What each cause explains; empty where the model has no gap, or it was not asked.
+        shares: What each cause explains; empty where the model has no gap, and where Ctrl-C came
+            before.
         hypotheses: Other readings that were tried.
         starts: Where each start ended.
         saturated: Part of the frames of the best fit in which the servo is at its force limit that
             is so most.
         fitted_arm: The Model with the fitted figures (offset and delay are not in it); not in JSON.
         rewritten: The model's file with the fitted figures; None where that was not asked.
+        ended_by: "interrupt" where Ctrl-C came once all was known but the shares; else "".
     """
 
     page_function: ClassVar[str] = "identification.identification_page:page"
@@ -306,8 +308,22 @@ class IdentificationResult(ResultOfRecording):
     saturated: float
     fitted_arm: Model = field(metadata={"json": False})
     rewritten: RewrittenFile | None = None
+    ended_by: Literal["", "interrupt"] = ""
 
     def to_dict(self) -> dict[str, Column]:
         """Return what the recording tells of each parameter as columns."""
         names = ("kind", "joint", "unit", "model", "fitted", "low", "high", "verdict")
         return columns_of(self.parameters, names)
+
+
+class InterruptedIdentification(KeyboardInterrupt):
+    """A Ctrl-C while the gap was divided among its causes: `result` is all else.
+
+    Attributes:
+        result: The fit, without shares.
+    """
+
+    def __init__(self, result: IdentificationResult) -> None:
+        """Keep what is known."""
+        super().__init__("the gap was not divided among its causes: result has the fit")
+        self.result = result

@@ -14,13 +14,27 @@ _FARTHER = 1.5  # times as far from the arm as the fit: that needs a reason
 
 
 @dataclass(frozen=True)
+class UnwrittenFigures:
+    """Figures that are determined and were not written, all for one reason.
+
+    Attributes:
+        names: What they are.
+        reason: Why they were not written.
+    """
+
+    names: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
 class WrittenPart(PageContent):
     """What was written of the model's file.
 
     Attributes:
         result: What the recording tells.
         rewritten: The file.
-        has_changes: Whether each attribute that was changed has a row.
+        has_changes: Whether each attribute that was changed has a row, and each reason why one was
+            not; else what was not written is counted.
     """
 
     template = "written_model.md.j2"
@@ -35,6 +49,26 @@ class WrittenPart(PageContent):
         if gap is None or fitted is None or not self.unchanged:
             return False
         return gap > _FARTHER * fitted
+
+    @property
+    def is_measured(self) -> bool:
+        """Tell whether it is known how far the file is from the arm."""
+        return self.rewritten.gap is not None
+
+    @property
+    def unwritten_count(self) -> int:
+        """Return of how many figures it is only counted that they were not written."""
+        return 0 if self.has_changes else len(self.rewritten.not_written)
+
+    @property
+    def unwritten(self) -> tuple[UnwrittenFigures, ...]:
+        """Return what is determined and was not written, by the reasons; empty if it is counted."""
+        if not self.has_changes:
+            return ()
+        names: dict[str, list[str]] = {}
+        for row in self.rewritten.not_written:
+            names.setdefault(row.reason, []).append(row.cause)
+        return tuple(UnwrittenFigures(tuple(each), reason) for reason, each in names.items())
 
     @property
     def unchanged(self) -> int:

@@ -3,7 +3,8 @@
 - `request`, `explanation`: the question and the answer, as records; `explain` goes from one to the
   other
 - `causes`: what differs; `run_differences`: in the start, the commands, the order of elements;
-  `option_differences`: by what `Model.replace` takes; `written`: the line of the file that says it
+  `option_differences`: by what `Model.replace` takes; `written`: the line of the file that says it;
+  `right_options`: the option of a side that does
 - `settings`: what an engine as it comes sets, and what can be left out
 - `setup`: how each side is run with some causes equalized; `order`: as a function of the user's
   sees it; `trials`: the runs, each made once

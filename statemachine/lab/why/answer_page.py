@@ -13,7 +13,7 @@ from ...show.blocks import Text
 from ...show.markdown import plain_text
 from ...show.templates import PageContent, render_blocks
 from ..compare.stillness import nothing_moved
-from .explanation import Effect, Explanation, Share
+from .explanation import Explanation, Share
 from .gap import FirstTouch
 from .values_page import CauseWording, heading_of, sides_of, texts_of, wording_of
 
@@ -36,6 +36,7 @@ class CauseSentence(PageContent):
         element: Name of the element that the cause is of.
         left, right: The values of both sides, with their units.
         place: The line of the right's file that says it; None where that is not known.
+        option: The option of the right that says it, as it is typed; "" where none does.
         part: What it takes away, as a part of the gap.
         gap: The gap, with its unit.
         alone, last: What it takes away as the only one, and after all others; None where that
@@ -49,6 +50,7 @@ class CauseSentence(PageContent):
     left: str
     right: str
     place: SourceLine | None
+    option: str
     part: float
     gap: str
     alone: float | None
@@ -88,6 +90,38 @@ class PlaceSentence(PageContent):
 
 
 @dataclass(frozen=True)
+class EffectPhrase(PageContent):
+    """What a cause takes away of the gap, by the figures that are known.
+
+    Attributes:
+        cause: The cause, whose range is known.
+    """
+
+    template = "why_effect.md.j2"
+    cause: Share
+
+    @property
+    def is_alone(self) -> bool:
+        """Tell whether it is known what the cause takes away as the only one."""
+        return self.cause.alone is not None
+
+    @property
+    def is_last(self) -> bool:
+        """Tell whether it is known what the cause takes away after all others."""
+        return self.cause.last is not None
+
+    @property
+    def is_both(self) -> bool:
+        """Tell whether both are known."""
+        return self.is_alone and self.is_last
+
+    @property
+    def least(self) -> float:
+        """Return the least part that it was seen to take away."""
+        return 0.0 if self.cause.range is None else self.cause.range[0]
+
+
+@dataclass(frozen=True)
 class AnswerSentence(PageContent):
     """What the sentence of the verdict may say.
 
@@ -97,6 +131,8 @@ class AnswerSentence(PageContent):
         gap, floor, equalized_gap: Of the explanation, with their unit.
         cause_words: The sentence on the largest cause; "" where the verdict is another.
         place_words: That on what was left out; "" where the verdict is another.
+        leading_words: What takes away most of all that is known, where the search was ended before
+            shares were; "" where nothing is known of any cause.
     """
 
     template = "why_answer.md.j2"
@@ -107,6 +143,7 @@ class AnswerSentence(PageContent):
     equalized_gap: str
     cause_words: str
     place_words: str
+    leading_words: str
 
     @property
     def first_failure(self) -> str:
@@ -117,22 +154,9 @@ class AnswerSentence(PageContent):
         return ""
 
     @property
-    def leading_cause(self) -> Effect | None:
-        """Return the cause that takes away most, alone and last.
-
-        None where no cause could be run both ways.
-        """
-        known = [each for each in self.result.ranking if None not in (each.alone, each.last)]
-        return known[0] if known else None
-
-    @property
-    def candidate(self) -> Effect | None:
-        """Return the cause that takes away most alone, of those that were tried.
-
-        None where none was tried.
-        """
-        tried = [each for each in self.result.ranking if each.alone is not None]
-        return tried[0] if tried else None
+    def unmeasured(self) -> tuple[str, ...]:
+        """Return the names of the causes of whose part nothing is known yet: one may lead."""
+        return tuple(row.name for row in self.result.shares if row.range is None and not row.note)
 
     @property
     def has_gap(self) -> bool:
@@ -227,8 +251,15 @@ def answer(result: Explanation) -> str:
             equalized_gap=amount(result, result.equalized_gap or 0.0),
             cause_words=cause,
             place_words=place,
+            leading_words=_leading(result),
         )
     )
+
+
+def _leading(result: Explanation) -> str:
+    """Return what takes away most by the figures that are known; "" where there is none."""
+    leading = result.leading()
+    return "" if leading is None else sentence_of(EffectPhrase(leading))
 
 
 def _of_cause(result: Explanation) -> CauseSentence:
@@ -240,6 +271,7 @@ def _of_cause(result: Explanation) -> CauseSentence:
         times = next(value for value in cause.values if value.quantity == "timeconst")
         left, right = texts_of(times)
     element = cause.name.rpartition(" of ")[2]
+    part = abs(cause.share or 0.0)
     return CauseSentence(
         wording=wording,
         heading=heading_of(cause),
@@ -247,7 +279,8 @@ def _of_cause(result: Explanation) -> CauseSentence:
         left=left,
         right=right,
         place=cause.place,
-        part=abs(cause.share or 0.0),
+        option=cause.option,
+        part=part,
         gap=amount(result, result.gap),
         alone=cause.alone,
         last=cause.last,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...measures import Deviation
 from ...show.templates import PageContent
 from .answer_page import sentence_of
-from .causes_page import nothing_differs, what_is_apart
+from .causes_page import nothing_differs, shown_gap, what_is_apart
 from .explanation import Explanation
 
 
@@ -29,15 +29,14 @@ class ApartSentence(PageContent):
 
     @property
     def gap(self) -> Deviation | None:
-        """Return the gap of the quantity that is explained; None where it is rounding."""
+        """Return the gap that is explained, of one joint if it is of joints; None of rounding."""
         result = self.result
-        return result.first[result.quantity] if result.gap > result.negligible else None
+        return shown_gap(result) if result.gap > result.negligible else None
 
     @property
     def divides(self) -> bool:
-        """Tell whether it is known what of the gap stays with all causes equalized."""
-        verdict = self.result.verdict
-        return verdict.divides and verdict.answer != "stopped"
+        """Tell whether the gap was divided, so that what stays of it is a part of the answer."""
+        return self.result.verdict.divides and self.result.is_complete
 
     @property
     def nothing_differs(self) -> bool:

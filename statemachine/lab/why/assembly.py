@@ -10,7 +10,7 @@ import numpy as np
 from ...engines import raw_engine_of
 from ...engines.records import DifferingQuantity, ModelDifference
 from ...interface import JointType, Model
-from ...measures import rotation_angles
+from ...measures import Deviation, rotation_angles
 from ...measures.text import milliseconds
 from ...release_names import engine_of
 from ..compare.instead import instead_of
@@ -21,7 +21,7 @@ from ..runs.provenance import provenance
 from .causes import Cause, readable_of
 from .explained_gap import ExplainedGap
 from .explanation import Explanation, FailedSet, Share
-from .gap import BALLS
+from .gap import BALLS, size_of
 from .locate import Localisation
 from .request import WhyRequest, is_one_engine
 from .run_differences import orders_of
@@ -57,6 +57,7 @@ def explanation_of(search: Search) -> Explanation:
         search.located,
     )
     motion = _motion(trials, matched)
+    joint, joint_gap = _farthest_joint(trials, gap)
     shares, impossible = _shares(search, division)
     explained, located, unexplained = _parts(gap, equalized_gap, localisations)
     return Explanation(
@@ -102,7 +103,8 @@ def explanation_of(search: Search) -> Explanation:
         renamed=matched.renamed,
         call_periods=request.periods,
         split=search.split,
-        joint=_farthest_joint(trials, gap.quantity),
+        joint=joint,
+        joint_gap=joint_gap,
         changes=trials.known_changes if gap.size > gap.negligible else (),
     )
 
@@ -110,11 +112,19 @@ def explanation_of(search: Search) -> Explanation:
 _KINDS = {"joints": JointType.HINGE, "slides": JointType.SLIDE, BALLS: JointType.BALL}
 
 
-def _farthest_joint(trials: Trials, quantity: str) -> str:
-    """Return the joint that is farthest apart, of a quantity of several as they come; else ""."""
+def _farthest_joint(trials: Trials, gap: ExplainedGap) -> tuple[str, Deviation | None]:
+    """Return the joint that is farthest apart as the sides come, and how far that is.
+
+    Of a quantity that is not of several joints it is "" and None.
+
+    Args:
+        trials: What was run.
+        gap: What is explained: by its measure the joint is the farthest.
+    """
+    quantity = gap.quantity
     left, right = (trials.curves_as_they_come(side) for side in (0, 1))
     if quantity not in _KINDS or left is None or right is None:
-        return ""
+        return "", None
     matched, labels = trials.setup.matched, trials.traces[0].header.joint_labels
     names = [
         labels[joint]
@@ -123,7 +133,11 @@ def _farthest_joint(trials: Trials, quantity: str) -> str:
     ]
     one, other = left[quantity], right[quantity]
     sizes = rotation_angles(one, other) if quantity == BALLS else np.abs(one - other)
-    return names[int(sizes.max(axis=0).argmax())]
+    time, unit = trials.ruler.time, trials.ruler.units[quantity]
+    gaps = [Deviation.of(column, time, unit) for column in sizes.T]
+    figures = [size_of(each, gap.measure) for each in gaps]
+    farthest = int(np.argmax(figures))
+    return names[farthest], gaps[farthest]
 
 
 def _motion(trials: Trials, matched: Matched) -> MotionExtent:

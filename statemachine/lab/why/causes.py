@@ -5,7 +5,7 @@ A cause is one difference, or several that are the same change of different elem
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -299,3 +299,25 @@ def _name(rows: list[ModelDifference]) -> str:
     if len(places) <= _NAMED:
         return f"{subject} of {', '.join(places)}"
     return f"{subject} of {len(places)} {_PLURALS.get(first.kind, f'{first.kind}s')}"
+
+
+def reason_of_option(cause: Cause, options: Mapping[str, str]) -> str:
+    """Return why a file cannot undo a cause that an option makes; "" where none does.
+
+    Args:
+        cause: The cause.
+        options: Of the right side, as they are typed, by the titles of the differences that they
+            make.
+    """
+    option = option_of(cause, options)
+    if not option:
+        return ""
+    return f"the right has it from the option {option}, whatever its file says"
+
+
+def option_of(cause: Cause, options: Mapping[str, str]) -> str:
+    """Return the first of some options that says a difference of a cause; "" where none does."""
+    for row in cause.differences:
+        if row.title in options:
+            return options[row.title]
+    return ""

@@ -54,8 +54,8 @@ class CausesPart(PageContent):
 
     @property
     def gap(self) -> Deviation:
-        """Return the gap of the quantity that is explained."""
-        return self.result.first[self.result.quantity]
+        """Return the gap of the quantity that is explained; of one joint if it is of joints."""
+        return shown_gap(self.result)
 
     @property
     def elsewhere(self) -> tuple[OtherGap, ...]:
@@ -157,6 +157,11 @@ class LocationNote(PageContent):
 def what_is_apart(result: Explanation) -> str:
     """Return what is up to so far apart, in words."""
     return _SINGULAR.get(result.quantity, f"quantity {result.quantity}")
+
+
+def shown_gap(result: Explanation) -> Deviation:
+    """Return how far the sides are apart as they come: the joint that is farthest, if any is."""
+    return result.first[result.quantity] if result.joint_gap is None else result.joint_gap
 
 
 def nothing_differs(result: Explanation) -> bool:

@@ -19,7 +19,8 @@ class SettingChange:
     """A quantity that the right is to have as the left has it, where no line of its file is known.
 
     Attributes:
-        name: What it is, and of what; the file and the line before it, where they are known.
+        name: What it is, and of what; before it the option of the right that says it, or the file
+            and the line, where they are known.
         left, right: Its values, with their units.
         is_lacking: Whether the right has nothing of it that a value could tell.
     """
@@ -115,7 +116,9 @@ def _settings_of(row: Share) -> list[SettingChange]:
 
 
 def _placed(row: Share, name: str) -> str:
-    """Return a name behind the file and the line that say the cause, where they are known."""
+    """Return a name behind the option, or the file and the line, that say the cause, if known."""
+    if row.option:
+        return f"option {row.option}: {name}"
     return f"{row.place.file}, line {row.place.line}: {name}" if row.place else name
 
 

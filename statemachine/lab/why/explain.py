@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ...errors import BadInputError, EndedEarlyError
-from ..compare.matching import Matched, match_alike, match_models
 from ..compare.prepared_sides import on_left
 from ..runs.reporter import QUIET, Reporter
 from .assembly import explanation_of
@@ -68,7 +67,7 @@ def _begun(request: WhyRequest, deadline: Deadline, reporter: Reporter) -> Searc
     """
     try:
         with reporter.stage("why: both sides"):
-            trials = Trials(request, _match(request), deadline)
+            trials = Trials(request, request.matched(), deadline)
             quantity = named_quantity(trials, request.quantity)
             causes = trials.setup.causes(request.finer)
             first = trials.gaps(frozenset())
@@ -81,13 +80,6 @@ def _begun(request: WhyRequest, deadline: Deadline, reporter: Reporter) -> Searc
     if not first:
         raise _ended(trials, [cause.name for cause in causes if not cause.refused])
     return Search(request, trials, deadline, first, causes, quantity, reporter)
-
-
-def _match(request: WhyRequest) -> Matched:
-    """Find what of the left is what of the right."""
-    if request.are_compiled:
-        return match_models(request.left, request.right, request.names)
-    return match_alike(request.left, request.right)
 
 
 def _ended(trials: Trials, equalizable: list[str]) -> EndedEarlyError:

@@ -51,7 +51,8 @@ class Share:
     Attributes:
         name: What it is, and of what.
         values: Each quantity that differs; see `WrittenCause`.
-        place: The one line of the right's file that says it; None where that was not found.
+        place: The one line of the right's file that says it; None where that was not found, and
+            where an option says it.
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
@@ -73,6 +74,8 @@ class Share:
         changes: What of the right's file undoes it, attribute by attribute; empty where that is not
             known.
         not_written: Why no attribute of the right's file undoes it; "" where some do.
+        option: The option of the right side that says its value, as it is typed; "" where none
+            does.
     """
 
     name: str
@@ -89,12 +92,13 @@ class Share:
     chosen: tuple[Literal["left", "right"], str] | None = None
     changes: tuple[AttributeChange, ...] = ()
     not_written: str = ""
+    option: str = ""
 
     def weight(self) -> float:
-        """Return the size that it is ranked by: of its share, or of the mean of alone and last."""
+        """Return the size that it is ranked by: of its share, or of the middle of its range."""
         if self.share is not None:
             return abs(self.share)
-        return Effect(self.name, self.alone, self.last).size()
+        return 0.0 if self.range is None else abs(sum(self.range)) / 2
 
 
 @dataclass(frozen=True)
@@ -194,8 +198,9 @@ class Explanation:
         rewritten: The right's file with the left's values; None where none was to be written.
         split: The gap divided into import, joint dynamics and contact; None where there is no gap
             to divide, one engine runs one file on both sides, or the search was ended before.
-        joint: Which joint is farthest apart as the sides come, where `quantity` is of several; else
-            "".
+        joint: Which joint is farthest apart as the sides come, by `measure`, where `quantity` is of
+            several; else "".
+        joint_gap: How far that joint alone is apart; None where `joint` is "".
         cited_case: The case of the battery that decides the cause, and which side is nearer to the
             truth in it; None where the cause has none, or where the run that was asked does not
             say the same.
@@ -250,6 +255,7 @@ class Explanation:
     rewritten: RewrittenFile | None = None
     split: GapSplit | None = None
     joint: str = ""
+    joint_gap: Deviation | None = None
     cited_case: CitedCase | None = None
     contradicted_case: CitedCase | None = None
 
@@ -259,11 +265,23 @@ class Explanation:
         return not (self.ended_by or self.method in ("not ranked", "alone and last"))
 
     @property
+    def is_written_in_vain(self) -> bool:
+        """Tell whether a file was to close a gap, and nothing could be changed in it."""
+        if self.rewritten is None or self.rewritten.written:
+            return False
+        return self.verdict.divides
+
+    @property
     def ranking(self) -> tuple[Effect, ...]:
         """Return the known effects of each cause, alone and last, the largest first."""
         effects = [Effect(row.name, row.alone, row.last) for row in self.shares]
         known = [effect for effect in effects if effect.range is not None]
         return tuple(sorted(known, key=Effect.size, reverse=True))
+
+    def leading(self) -> Share | None:
+        """Return the cause that takes away most by all that is known; None where nothing is."""
+        known = [row for row in self.shares if row.range is not None]
+        return max(known, key=Share.weight, default=None)
 
     @property
     def verdict(self) -> GapVerdict:

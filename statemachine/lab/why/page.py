@@ -25,7 +25,7 @@ from .apart_page import apart_sentence
 from .causes_page import causes
 from .changes_page import engine_as_it_comes, steps
 from .cited_case_page import cited_case_blocks
-from .explanation import Explanation
+from .explanation import Explanation, Share
 from .rewritten_page import rewritten_blocks
 from .split_page import split_blocks
 from .table_page import equalizable_shares, summary_table
@@ -33,8 +33,8 @@ from .verdict import UNEXPLAINED
 
 Conclusion = Literal["wider", "divided", "stopped", "no gap", "refused", "chance", "nothing moved"]
 Advice = Literal[
-    "settings", "write", "refused", "both", "engines", "between", "files", "chance", "details",
-    "written", "go on", "same period", "",
+    "settings", "option", "write", "refused", "both", "engines", "between", "files", "chance",
+    "details", "written", "go on", "same period", "",
 ]  # fmt: skip
 
 
@@ -86,7 +86,12 @@ class WhyPage(PageContent):
 
     @property
     def split(self) -> Sequence[Block]:
-        """Return what of the gap is import, joint dynamics and contact."""
+        """Return what of the gap is import, joint dynamics and contact.
+
+        The first screen of a search that was ended has its room for the causes.
+        """
+        if not (self.further or self.result.is_complete):
+            return []
         return split_blocks(self.result, details=bool(self.further))
 
     @property
@@ -149,6 +154,11 @@ class WhyPage(PageContent):
     def advice(self) -> Advice:
         """Return the name of the sentence before the next command."""
         return _advice(self.result)
+
+    @property
+    def option(self) -> str:
+        """Return the option of the right that makes the largest cause; "" where none does."""
+        return _option_of_largest(self.result)
 
     @property
     def next_command(self) -> str:
@@ -249,9 +259,14 @@ def page(result: Explanation, details: bool = False) -> Page:
 def _page(content: WhyPage) -> Page:
     """Return the page of a content, below its verdict."""
     result = content.result
-    headline = Headline(answer(result), end=apart_sentence(result), holds=result.verdict.holds)
+    headline = Headline(answer(result), end=apart_sentence(result), holds=_holds(result))
     title = f"{result.experiment}: why {' and '.join(result.labels)} differ"
     return Page(title, "", render_blocks(content), headline)
+
+
+def _holds(result: Explanation) -> bool:
+    """Tell whether what was asked was answered, and written if that was asked."""
+    return result.verdict.holds and not result.is_written_in_vain
 
 
 def _conclusion(result: Explanation) -> Conclusion:
@@ -299,8 +314,21 @@ def _advice_where_explained(result: Explanation) -> Advice:
         return "between"
     if engine_as_it_comes(result):
         return "settings"
-    largest = next((row for row in result.shares if row.share), None)
+    if _option_of_largest(result):
+        return "option"
+    largest = _largest_share(result)
     return "write" if largest is not None and largest.changes else "details"
+
+
+def _largest_share(result: Explanation) -> Share | None:
+    """Return the cause with the largest share; None if none takes away anything."""
+    return next((row for row in result.shares if row.share), None)
+
+
+def _option_of_largest(result: Explanation) -> str:
+    """Return the option of the right that makes the largest cause; "" where none does."""
+    largest = _largest_share(result)
+    return "" if largest is None else largest.option
 
 
 def _next_command(result: Explanation, advice: Advice) -> str:
@@ -317,6 +345,9 @@ def _next_command(result: Explanation, advice: Advice) -> str:
             flags = (*result.command.question, "--write", target)
         case "refused" | "details":
             flags = (*result.command.question, "--details")
+        case "option":
+            without = result.command.without_option_of_right(_option_of_largest(result))
+            return without.lines(*result.command.question)
         case "same period":
             return _with_same_period(result)
         case "go on":

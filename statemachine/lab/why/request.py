@@ -10,6 +10,7 @@ from ...interface import Model
 from ...processes import checked_jobs
 from ...release_names import engine_of
 from ..compare.labels import files_apart
+from ..compare.matching import Matched, match_alike, match_models
 from ..compare.perturbed import EXACT, Uncertainty
 from ..recordings import Trace
 from ..runs.call_period import CallPeriods
@@ -91,6 +92,12 @@ class WhyRequest:
     def are_compiled(self) -> bool:
         """Tell whether both sides have a compiled model, by which they are matched and edited."""
         return self.left.compiled is not None and self.right.compiled is not None
+
+    def matched(self) -> Matched:
+        """Find what of the left is what of the right."""
+        if self.are_compiled:
+            return match_models(self.left, self.right, self.names)
+        return match_alike(self.left, self.right)
 
 
 def is_one_engine(left: Model, right: Model) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...atomic_files import beside, check_place
@@ -23,7 +23,7 @@ from ...errors import BadInputError, EngineWarning, StateMachineError, one_line
 from ...installed import DEFAULT
 from ...interface import Model
 from ..compare.matching import Matched, match_models
-from .causes import Cause, causes, differences_of
+from .causes import Cause, causes, differences_of, reason_of_option
 
 _ROUNDS = 3  # what follows from a change is looked at again once it is compiled
 _SUFFIXES = (".xml", ".mjcf", ".urdf")
@@ -43,6 +43,8 @@ class RewriteRequest:
         target: The file that is written.
         load: Loads a file as the right is loaded.
         names: Joints, bodies, sites and actuators of the left that go by other names on the right.
+        options: Options of the right side, as they are typed, by the titles of the differences that
+            they make; its file cannot undo those.
     """
 
     left: Model
@@ -50,6 +52,7 @@ class RewriteRequest:
     target: Path
     load: Callable[[Path], Model]
     names: Mapping[str, str]
+    options: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ class RewrittenFile:
     """The right's file, written anew.
 
     Attributes:
-        file: The file that was written.
+        file: The file that was written; that was to be, where `written` is empty.
         of: Name of the right's file.
         written: Each attribute that was changed.
         not_written: Each difference that stays, and why.
@@ -127,8 +130,10 @@ def text_at(source: XmlSource, target: Path) -> bytes:
 def rewrite(request: RewriteRequest) -> tuple[RewrittenFile, Model]:
     """Write the right's file so that it becomes like the left, and load it.
 
+    Where nothing can be changed no file is written.
+
     Returns:
-        What was written, and the model that was compiled of it.
+        What was written, and the model that was compiled of it; the right itself where nothing was.
 
     Raises:
         StateMachineError: The right's file cannot be read.
@@ -136,6 +141,10 @@ def rewrite(request: RewriteRequest) -> tuple[RewrittenFile, Model]:
     if request.left.compiled is None or request.right.compiled is None:
         raise BadInputError("--write needs two sides that have a compiled model")
     return _Rewriter(request).run()
+
+
+class _NothingChangedError(Exception):
+    """No attribute of a file is changed, so that the file is not written."""
 
 
 @dataclass
@@ -166,9 +175,13 @@ class _Rewriter:
 
     def run(self) -> tuple[RewrittenFile, Model]:
         """Write the file."""
-        target = self._request.target
-        with beside(target) as (part,):
-            model = self._written_in_rounds(Path(part))
+        try:
+            with beside(self._request.target) as (part,):
+                model = self._written_in_rounds(Path(part))
+                if not changes_of(self._texts()):
+                    raise _NothingChangedError
+        except _NothingChangedError:
+            model = self._request.right
         return self._result(), model
 
     def _written_in_rounds(self, part: Path) -> Model:
@@ -199,7 +212,7 @@ class _Rewriter:
         matched = match_models(request.left, model, request.names)
         form = form_of_right(request.left, model, matched, self._source)
         for cause in causes(rows):
-            reason = reason_not_written(cause)
+            reason = reason_of_option(cause, request.options) or reason_not_written(cause)
             if reason:
                 self._reasons[cause.name] = reason
                 continue

@@ -26,6 +26,11 @@ class RewrittenPart(PageContent):
     most: int
 
     @property
+    def is_written(self) -> bool:
+        """Tell whether a file was written."""
+        return bool(self.rewritten.written)
+
+    @property
     def is_run(self) -> bool:
         """Tell whether the file was run."""
         return bool(self.rewritten.quantity)
@@ -37,8 +42,13 @@ class RewrittenPart(PageContent):
 
     @property
     def all_written(self) -> bool:
-        """Tell whether no difference is left in the file."""
-        return not self.rewritten.not_written
+        """Tell whether no difference is left in the file that was written."""
+        return self.is_written and not self.rewritten.not_written
+
+    @property
+    def unwritten_count(self) -> int:
+        """Return how many differences are not written."""
+        return len(self.rewritten.not_written)
 
     @property
     def changes(self) -> tuple[AttributeChange, ...]:

@@ -24,6 +24,7 @@ _SHOWN = 12  # rows; the rest is folded away
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
 _SUMMARY_HEADS = ("what", "left", "right", "part", "right's file")
+_FILE_OR_OPTION = "right's file or option"
 _HEADS = ("what", "left", "right", "part", "alone", "last")
 _WORDS = frozenset({0, 1, 2})  # columns
 _TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
@@ -60,6 +61,8 @@ def summary_table(result: Explanation, most: int) -> Table:
             share = result.explained + result.located - sum(part for _, part in parts[:most])
         shown.append(_row_of_rest(more, share))
     heads = _SUMMARY_HEADS
+    if any(row.option for row in acting):
+        heads = (*heads[:4], _FILE_OR_OPTION)
     # Where nothing stands in the file; and ranges need the room.
     if not result.is_complete or all(row[4] == NO_NUMBER for row in shown):
         heads, shown = heads[:4], [row[:4] for row in shown]
@@ -67,10 +70,12 @@ def summary_table(result: Explanation, most: int) -> Table:
 
 
 def _summary_of_cause(result: Explanation, row: Share) -> Row:
-    """Return a cause in one row, with the line of the right's file that says it."""
+    """Return a cause in one row, with the option or the line of the right's file that says it."""
     left, right = sides_of(row, most=1)
     place = NO_NUMBER
-    if row.place is not None:
+    if row.option:
+        place = row.option
+    elif row.place is not None:
         place = f"{row.place.file}:{row.place.line}"
     elif row.changes:
         place = f"{row.changes[0].file}:{row.changes[0].line}"
@@ -131,8 +136,10 @@ def without_effect(result: Explanation, rows: Sequence[Share]) -> list[Share]:
 
 
 def has_effect(row: Share) -> bool:
-    """Tell whether a cause takes away a part of the gap: in the mean, alone, or last."""
-    parts = (row.share, row.alone, row.last)
+    """Tell whether a cause takes away a part of the gap: in the mean, alone, last, in an order."""
+    parts = [row.share, row.alone, row.last]
+    if row.share is None and row.range is not None:  # the ends of an estimate are its errors
+        parts += row.range
     return max(abs(part or 0.0) for part in parts) >= _NO_PART
 
 
@@ -178,10 +185,12 @@ def _parts(result: Explanation, row: Share) -> Row:
         return TableCell(f"< {percent(noise)}", share=row.share), NO_NUMBER, NO_NUMBER
     if row.share is None and row.alone is not None and row.last is None:
         return TableCell(f"{percent(row.alone)} alone", share=None), percent(row.alone), NO_NUMBER
+    if row.share is None and row.last is not None and row.range == (row.last, row.last):
+        part = TableCell(f"{percent(row.last)} last", share=None)
+        return part, percent(row.alone), percent(row.last)
     if row.share is None and row.range is not None:
-        least, largest = row.range
-        ends = [f"{100 * round(end, 2) + 0.0:.0f}" for end in (least, largest)]
-        part = TableCell(f"{' to '.join(ends)} %", share=None)
+        ends = [f"{100 * round(end, 2) + 0.0:.0f}" for end in row.range]
+        part = TableCell(f"{' to '.join(dict.fromkeys(ends))} %", share=None)
         return part, percent(row.alone), percent(row.last)
     explains = percent(row.share)
     if row.error and math.isfinite(row.error):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -12,12 +12,13 @@ import numpy as np
 
 from ....engines.description.file_changes import UnwrittenChange
 from ....engines.records import QuantityValue
-from ....errors import BadInputError, check_name
+from ....errors import BadInputError, StateMachineError, check_name
 from ....interface import Model
 from ....models import AnyPath
 from ....processes import checked_jobs
 from ...compare.alike import in_layout_of_left
 from ...compare.bases import load_sides
+from ...compare.labels import typed_option
 from ...compare.perturbed import EXACT, Uncertainty
 from ...compare.recorded import recorded_sides
 from ...compare.sides import Request, Side, with_options
@@ -33,6 +34,7 @@ from ...why.measured_gap import measured_gap
 from ...why.ranking_page import ranking_page
 from ...why.request import WhyRequest
 from ...why.rewriting import RewriteRequest, check_target, rewrite
+from ...why.right_options import options_of_right, with_options_of_right
 from ...why.share_changes import with_changes
 
 _PLAYED = "the models were run again, with the recorded starts and commands"
@@ -93,7 +95,7 @@ class ExplainResult(ShownResult, Explanation):
 
         "left" and "right" are texts: each quantity that differs, with its value there. "least"
         and "most" are the ends of `Share.range`. "file" and "line" say where the right side's value
-        stands, None where that is not known.
+        stands, None where that is not known; "option" which option says it, "" where none does.
         """
         shares, places = self.shares, [share.place for share in self.shares]
         columns: dict[str, Column] = {"cause": [share.name for share in shares]}
@@ -105,6 +107,7 @@ class ExplainResult(ShownResult, Explanation):
         columns["right"] = [_values_of(share, "right") for share in shares]
         columns["file"] = [None if place is None else place.file for place in places]
         columns["line"] = [None if place is None else place.line for place in places]
+        columns["option"] = [share.option for share in shares]
         columns["note"] = [share.note for share in shares]
         return columns
 
@@ -137,22 +140,25 @@ def answer(request: ExplainRequest, reporter: Reporter = QUIET) -> ExplainResult
     began = time.monotonic()  # loading counts
     question, sides, bases = _question(request, reporter)
 
+    options = _options_of_right(request, question, sides)
+
     def so_far(explanation: Explanation) -> None:
         reporter.so_far(ranking_page(explanation))
 
     try:
         explanation = explain(question, reporter, so_far, began)
     except InterruptedExplanation as stop:
-        explanation = _with_changes(stop.result, question, request)
+        explanation = _with_changes(stop.result, question, request, options)
         raise InterruptedExplanation(_result(explanation, request, bases)) from None
-    explanation = _with_changes(explanation, question, request)
+    explanation = _with_changes(explanation, question, request, options)
     with reporter.stage("why: the case that decides it"):
         try:
             explanation = with_cited_case(explanation, question)
         except KeyboardInterrupt:
             raise InterruptedExplanation(_result(explanation, request, bases)) from None
     if request.write is not None:
-        explanation = _with_file(explanation, question, sides, Path(request.write))
+        target = Path(request.write)
+        explanation = _with_file(explanation, question, sides, target, options)
     return _result(explanation, request, bases)
 
 
@@ -199,11 +205,41 @@ def _question(
 
 
 def _with_changes(
-    explanation: Explanation, question: WhyRequest, request: ExplainRequest
+    explanation: Explanation,
+    question: WhyRequest,
+    request: ExplainRequest,
+    options: Mapping[str, str],
 ) -> Explanation:
-    """Return an explanation with what to change of the right's file."""
+    """Return an explanation with what to change of the right's file, or of its options."""
     names = request.run.names
-    return with_changes(explanation, question.left, question.right, names, request.finer)
+    explanation = with_changes(explanation, question.left, question.right, names, request.finer)
+    return with_options_of_right(explanation, question, options, request.finer)
+
+
+def _options_of_right(
+    request: ExplainRequest, question: WhyRequest, sides: Sequence[Side]
+) -> dict[str, str]:
+    """Return which option of the right, as it was typed, makes a difference, by its title.
+
+    Args:
+        request: What was asked.
+        question: The same, of both sides as loaded.
+        sides: The left and the right, with the options that only they have.
+    """
+    if not request.run.sides or sides[1].loaded is not None:
+        return {}
+    right = sides[1]
+    models: dict[str, Model] = {}
+    for name in request.run.sides[1].options:
+        if name not in right.options:  # the left has it, too
+            continue
+        options = {key: value for key, value in right.options.items() if key != name}
+        try:
+            loaded = load_sides((sides[0], replace(right, options=options)), {}, request.run.names)
+        except StateMachineError:  # it cannot be loaded without the option
+            continue
+        models[typed_option(name, right.options[name])] = loaded.models[1]
+    return options_of_right(question, models, request.finer)
 
 
 def _result(explanation: Explanation, request: ExplainRequest, bases: Bases) -> ExplainResult:
@@ -237,15 +273,22 @@ def _words_of(request: ExplainRequest) -> list[str]:
 
 
 def _with_file(
-    explanation: Explanation, question: WhyRequest, sides: Sequence[Side], target: Path
+    explanation: Explanation,
+    question: WhyRequest,
+    sides: Sequence[Side],
+    target: Path,
+    options: Mapping[str, str],
 ) -> Explanation:
     """Write the right's file with the left's values, and run it.
+
+    Where nothing can be changed nothing is written, and nothing run.
 
     Args:
         explanation: What both sides differ in.
         question: What was asked.
         sides: The left and the right, as they are loaded.
         target: The file that is written.
+        options: Which option of the right makes a difference, by its title.
 
     Returns:
         The explanation, with what was written.
@@ -256,9 +299,18 @@ def _with_file(
         right = replace(sides[1], model=str(path), loaded=None)
         return load_sides((sides[0], right), {}, names).models[1]
 
-    written, model = rewrite(RewriteRequest(question.left, question.right, target, load, names))
-    quantity = explanation.quantity
-    gap = measured_gap(question, model, quantity, explanation.measure)
+    written, model = rewrite(
+        RewriteRequest(question.left, question.right, target, load, names, options)
+    )
+    if written.written:
+        quantity = explanation.quantity
+        written = replace(
+            written,
+            gap=measured_gap(question, model, quantity, explanation.measure),
+            before=explanation.gap,
+            quantity=quantity,
+            unit=explanation.unit,
+        )
     further = [
         UnwrittenChange(row.name, row.not_written)
         for row in explanation.shares
@@ -268,12 +320,5 @@ def _with_file(
     not_written = sorted(
         (*written.not_written, *further), key=lambda row: order.get(row.cause, len(order))
     )
-    rewritten = replace(
-        written,
-        not_written=tuple(not_written),
-        gap=gap,
-        before=explanation.gap,
-        quantity=quantity,
-        unit=explanation.unit,
-    )
+    rewritten = replace(written, not_written=tuple(not_written))
     return replace(explanation, rewritten=rewritten)
