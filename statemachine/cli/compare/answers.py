@@ -164,10 +164,19 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     with stop_is_said():
         result = answer(request, reporter)
     page = comparison.page(result, options.details)
+    shown = result.figures()
     if files.html is not None:
+        made_by = page_command(request, asked, files.html, options.why)
         try:
-            made_by = page_command(request, asked, files.html)
-            report_page = compare_report.whole_page(result, asked, made_by, reporter)
+            if options.why:
+                parts = compare_report.report_parts(result, asked, made_by, reporter)
+                report_page = compare_report.report_page(result, parts)
+                if parts.explanation is not None:
+                    shown, page = parts.explanation, why.page(parts.explanation, options.details)
+                elif parts.why_not:
+                    print_error(parts.why_not, 0)
+            else:
+                report_page = compare_report.whole_page(result, asked, made_by, reporter)
         except InterruptedExplanation as stop:
             print_error(f"stopped: {files.html} was not written", 0)
             show(why.page(stop.result, options.details), stop.result, options.json)
@@ -179,7 +188,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     if options.json:
         for line in (*result.run.unmatched, *result.run.notes):
             print_error(line, 0)
-    code = show(page, result.figures(), options.json)
+    code = show(page, shown, options.json)
     _write_pictures(files, result, renderer)
     return code
 
