@@ -265,6 +265,15 @@ def test_what_is_farthest_beyond_its_tolerance_leads(
     assert leading(compare(still, other)).name == lead
 
 
+def test_what_differs_at_the_end_leads_before_what_settles(still: Trace) -> None:
+    other = moved(moved(still, TURN, 0.9, rows=5), RAIL, 0.02, rows=slice(5, None))
+    comparison = compare(still, other)
+    finding = finding_of(comparison, None)
+    assert named(comparison)["turn"].tolerances() > finding.lead.tolerances()
+    worst = worst_of(comparison, finding, None).agreements[0]
+    assert (worst, worst.name, worst.verdict) == (finding.lead, "rail", "differs")
+
+
 def test_the_worst_come_by_verdict_then_by_tolerances_with_contacts_last(still: Trace) -> None:
     left = touching(still, (4, (FLOOR, BALL), ONE, 0.0))
     other = moved(moved(still, TURN, 0.5, rows=5), RAIL, 0.5, rows=slice(5, None))
@@ -273,6 +282,7 @@ def test_the_worst_come_by_verdict_then_by_tolerances_with_contacts_last(still: 
     worst = worst_of(comparison, finding, None, most=50)
     ranks = {"differs": 0, "settles": 1, "agrees": 2}
     assert worst.agreements[0] == finding.lead
+    assert finding.lead.verdict == "differs"
     rest = worst.agreements[1:]
     assert [ranks[a.verdict] for a in rest] == sorted(ranks[a.verdict] for a in rest)
     for verdict in ranks:
