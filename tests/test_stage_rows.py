@@ -17,7 +17,7 @@ from statemachine.lab.questions.events import events_of, events_table
 from statemachine.lab.questions.finding import VerdictCounts, finding_of, leading
 from statemachine.lab.questions.plot import COMMAND, of_comparison, of_trace
 from statemachine.lab.questions.stage.both_runs import BothRuns
-from statemachine.lab.questions.stage.lanes import lanes_of
+from statemachine.lab.questions.stage.lanes import lanes_of, round_times
 from statemachine.lab.questions.stage.quantity_chart import GAP, charts_of
 from statemachine.lab.questions.stage.quantity_row import data_table, quantity_row
 from statemachine.lab.questions.stage.scene import moments_of
@@ -435,3 +435,16 @@ def test_of_many_moments_every_other_is_shown_with_those_that_have_to_be(still: 
 def test_the_moments_end_with_the_shorter_run(still: Trace) -> None:
     times, _ = moments_of(still, cut(still, 15))
     assert times == pytest.approx(STEP * np.arange(15))
+
+
+@pytest.mark.parametrize(
+    ("until", "times"),
+    [
+        (3.966, [0, 1, 2, 3]),
+        (2.0, [0, 0.5, 1, 1.5, 2]),
+        (0.5, [0, 0.1, 0.2, 0.3, 0.4, 0.5]),
+        (0.002, [0, 0.0005, 0.001, 0.0015, 0.002]),
+    ],
+)
+def test_the_axis_of_time_has_round_moments(until: float, times: list[float]) -> None:
+    assert round_times(until) == pytest.approx(times)
