@@ -344,6 +344,13 @@ def test_a_joint_that_one_side_has_alone_is_named(
     assert "joint ball" in with_ball[0].unmatched[0]
 
 
+def test_a_contact_of_a_body_that_one_side_lacks_is_no_difference() -> None:
+    _, found = ran("hold", Side("so101/scene"), Side("so101/scene_box"))
+    assert [touch.pair for touch in found.touches] == ["gripper on floor", "box on floor"]
+    assert not [each.name for each in found.agreements if "box" in each.name]
+    assert found.outcome == "agrees"
+
+
 def test_what_both_sides_have_is_compared_and_no_energy_with_that_of_one(
     with_ball: tuple[SidesRun, Comparison],
 ) -> None:

@@ -181,6 +181,7 @@ def test_what_is_out_of_reach_is_not_framed() -> None:
     side = motion(places, *(part_of(body, (0.1, 0.1, 0.1)) for body in (1, 2, 3)))
     assert camera_for([side], 1.0, reach=0.5).distance < 2
     assert camera_for([side], 1.0).distance > 20
+    assert camera_for([side], 1.0, reach=0.5, at=0).distance > 20
     # Where nothing is within reach, all is framed.
     assert camera_for([side], 1.0, reach=0.0).distance > 20
 

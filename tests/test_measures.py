@@ -149,7 +149,8 @@ def test_a_signed_number_has_no_sign_at_zero(value: float | None, text: str) -> 
         (0.9995, "> 99.9 %"),
         (1.0, "100.0 %"),
         (9.99, "999.0 %"),
-        (10.0, "1000 %"),
+        (10.0, "10 times"),
+        (594.49, "594 times"),
         (-0.5, "-50.0 %"),
     ],
 )
@@ -594,3 +595,19 @@ def test_pairs_have_the_names_of_the_left() -> None:
         "c on d": 4,
         "x on y": 5,
     }
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.999, "m", "999 mm"),
+        (1.0, "m", "1.00 m"),
+        (-2.68, "m", "-2.68 m"),
+        (2.0, "s", "2.00 s"),
+        (0.005, "s", "5.00 ms"),
+    ],
+)
+def test_a_long_way_and_a_long_time_are_in_metres_and_seconds(
+    value: float, unit: str, text: str
+) -> None:
+    assert words.quantity(value, unit) == text

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from statemachine.cli import main
 from statemachine.cli.compare.options import add
 from statemachine.cli.compare.requests import explain_request_of, request_of
 from statemachine.lab.compare import Request, Side
@@ -62,6 +64,12 @@ def typed_anew(
     return type_anew
 
 
+def test_the_page_of_why_is_made_again_with_why(run: Request, tmp_path: Path) -> None:
+    causes = ExplainRequest(run, measure="end")
+    options = parsed(page_command(CompareRequest(run), causes, tmp_path / "p.html", insists=True))
+    assert (options.why, options.measure, options.html) == (True, "end", "p.html")
+
+
 def compare_request(options: argparse.Namespace) -> CompareRequest:
     """Return the request of a command for a gap."""
     request = request_of(options)
@@ -112,3 +120,14 @@ def test_a_call_of_python_has_the_tolerances_and_the_uncertainty(run: Request) -
     asked = CompareRequest(Request((what,), sides=run.sides), {"joint": 0.01}, None)
     command = page_command(asked, None, Path("page.html"))
     assert "tolerances={'joint': 0.01}, chaos=False" in command
+
+
+def test_why_with_a_page_is_answered_in_the_terminal_and_on_the_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "why.html"
+    sides = ("so101/scene", "so101/scene", "gravity=0,0,-9", "--seconds", "0.2", "--no-chaos")
+    code = main(["compare", "hold", *sides, "--why", "--html", str(target), "--json"])
+    (cause,) = json.loads(capsys.readouterr().out)["shares"]
+    assert (code, cause["name"], cause["share"]) == (0, "gravity", pytest.approx(1.0))
+    assert "localised" in target.read_text("utf-8")

@@ -9,7 +9,7 @@ import pytest
 
 from statemachine import load
 from statemachine.backends import BackendChoice
-from statemachine.errors import BadInputError, MissingEngineError
+from statemachine.errors import BadInputError, EngineWarning, MissingEngineError
 from statemachine.interface import Model
 from statemachine.lab.policy.command import Command, usual_commands
 from statemachine.lab.policy.contract import Contract
@@ -136,6 +136,15 @@ def test_a_public_policy_holds(tmp_path: Path, backend: str) -> None:
     policy = shared(SHARED / "policies" / "go1" / "policy.onnx")
     file = written(tmp_path / "go1.yaml", GO1_CONTRACT)
     assert answer(PolicyRequest(policy, file, policy.with_name("scene.xml"), (backend,))).holds
+
+
+def test_a_policy_that_starts_inside_the_floor_is_told_so(tmp_path: Path) -> None:
+    need_engine("mujoco")
+    policy = shared(SHARED / "policies" / "go1" / "policy.onnx")
+    file = written(tmp_path / "go1.yaml", GO1_CONTRACT)
+    scene, straight = policy.with_name("scene.xml"), (Command(0.5),)
+    with pytest.warns(EngineWarning, match="FR_calf on floor by 16.5 mm"):
+        answer(PolicyRequest(policy, file, scene, commands=straight, seconds=0.1))
 
 
 # -- what is said -----------------------------------------------------------------

@@ -8,10 +8,13 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from statemachine.cli.long_work import LongWorkReporter
 from statemachine.processes.parallel import unwinding
 
 from .support.requirements import ROOT
@@ -206,3 +209,40 @@ def _lives(number: int) -> bool:
             return False
         return not Path("/proc").is_dir()
     return state != "Z"
+
+
+def _stage_with_a_lost_interrupt() -> None:
+    with LongWorkReporter().stage("a run") as progress:
+        owner = _Owner()
+        weakref.finalize(owner, signal.raise_signal, signal.SIGINT)
+        del owner
+        progress(0.5)
+        pytest.fail("the interrupt was lost")
+
+
+@pytest.mark.usefixtures("python_takes_signals")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_interrupt_that_a_finalizer_swallows_ends_the_stage_all_the_same() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        _stage_with_a_lost_interrupt()
+
+
+@pytest.mark.usefixtures("python_takes_signals")
+def test_an_interrupt_that_was_taken_ends_no_later_stage() -> None:
+    with pytest.raises(KeyboardInterrupt), LongWorkReporter().stage("a run"):
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with LongWorkReporter().stage("another run") as progress:
+        progress(1.0)
+
+
+class _Owner:
+    """What goes, with what is called then."""
+
+
+@pytest.fixture
+def python_takes_signals() -> Iterator[None]:
+    """Let a Ctrl-C raise, as in a program that nobody watches."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -1093,3 +1093,22 @@ def test_any_page_can_be_drawn() -> None:
     )
     assert not page.holds
     assert_in(markdown(page, lambda _: ""), "## More", "<details><summary>Deep</summary>")
+
+
+@pytest.mark.slow
+def test_on_a_phone_a_verdict_is_in_sight_and_no_short_name_is_divided(tmp_path: Path) -> None:
+    verdict = TableCell("differs", verdict="differs")
+    row = ("gripperframe rotation", *["12.34 mm"] * 6, verdict)
+    title = "What is said of a table, in a title that is longer than a phone is wide"
+    table = Table(("what", *["largest"] * 6, "verdict"), [row], title=title, words=frozenset({7}))
+    file = tmp_path / "wide.html"
+    write_report(file, html_of(Page("A table", "made here", [table])))
+    with looking(file, width=390, height=844) as tab:
+        assert tab.locator(".wide").evaluate("(e) => e.scrollWidth > e.clientWidth")
+        for seen in (".badge", ".wide caption span"):
+            box = tab.locator(seen).bounding_box()
+            assert box["x"] + box["width"] <= 390
+        pieces = "(e) => e.getClientRects().length"
+        name = tab.locator(".wide tbody th")
+        name.evaluate("(e) => { e.innerHTML = '<span>gripperframe</span> rotation' }")
+        assert name.locator("span").evaluate(pieces) == 1

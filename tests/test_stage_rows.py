@@ -17,7 +17,7 @@ from statemachine.lab.questions.events import events_of, events_table
 from statemachine.lab.questions.finding import VerdictCounts, finding_of, leading
 from statemachine.lab.questions.plot import COMMAND, of_comparison, of_trace
 from statemachine.lab.questions.stage.both_runs import BothRuns
-from statemachine.lab.questions.stage.lanes import lanes_of
+from statemachine.lab.questions.stage.lanes import lanes_of, round_times
 from statemachine.lab.questions.stage.quantity_chart import GAP, charts_of
 from statemachine.lab.questions.stage.quantity_row import data_table, quantity_row
 from statemachine.lab.questions.stage.scene import moments_of
@@ -265,6 +265,15 @@ def test_what_is_farthest_beyond_its_tolerance_leads(
     assert leading(compare(still, other)).name == lead
 
 
+def test_what_differs_at_the_end_leads_before_what_settles(still: Trace) -> None:
+    other = moved(moved(still, TURN, 0.9, rows=5), RAIL, 0.02, rows=slice(5, None))
+    comparison = compare(still, other)
+    finding = finding_of(comparison, None)
+    assert named(comparison)["turn"].tolerances() > finding.lead.tolerances()
+    worst = worst_of(comparison, finding, None).agreements[0]
+    assert (worst, worst.name, worst.verdict) == (finding.lead, "rail", "differs")
+
+
 def test_the_worst_come_by_verdict_then_by_tolerances_with_contacts_last(still: Trace) -> None:
     left = touching(still, (4, (FLOOR, BALL), ONE, 0.0))
     other = moved(moved(still, TURN, 0.5, rows=5), RAIL, 0.5, rows=slice(5, None))
@@ -273,6 +282,7 @@ def test_the_worst_come_by_verdict_then_by_tolerances_with_contacts_last(still: 
     worst = worst_of(comparison, finding, None, most=50)
     ranks = {"differs": 0, "settles": 1, "agrees": 2}
     assert worst.agreements[0] == finding.lead
+    assert finding.lead.verdict == "differs"
     rest = worst.agreements[1:]
     assert [ranks[a.verdict] for a in rest] == sorted(ranks[a.verdict] for a in rest)
     for verdict in ranks:
@@ -425,3 +435,16 @@ def test_of_many_moments_every_other_is_shown_with_those_that_have_to_be(still: 
 def test_the_moments_end_with_the_shorter_run(still: Trace) -> None:
     times, _ = moments_of(still, cut(still, 15))
     assert times == pytest.approx(STEP * np.arange(15))
+
+
+@pytest.mark.parametrize(
+    ("until", "times"),
+    [
+        (3.966, [0, 1, 2, 3]),
+        (2.0, [0, 0.5, 1, 1.5, 2]),
+        (0.5, [0, 0.1, 0.2, 0.3, 0.4, 0.5]),
+        (0.002, [0, 0.0005, 0.001, 0.0015, 0.002]),
+    ],
+)
+def test_the_axis_of_time_has_round_moments(until: float, times: list[float]) -> None:
+    assert round_times(until) == pytest.approx(times)

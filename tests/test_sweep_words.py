@@ -131,7 +131,7 @@ def test_a_share_leads_that_is_printed_as_more_than_nothing(
 
 def test_the_extremes_are_told_with_their_unit() -> None:
     shown = content(effects_of(0.5))
-    assert (shown.smallest, shown.largest) == ("-1000 mm", "3000 mm")
+    assert (shown.smallest, shown.largest) == ("-1.00 m", "3.00 m")
 
 
 def test_parameters_that_are_not_shown_are_counted_without_the_row_of_the_rest() -> None:
@@ -188,8 +188,8 @@ def test_a_row_has_the_share_its_error_and_both_extremes() -> None:
     effects = effects_of(0.5, None, errors=(0.125,), units={"a": "s"})
     table = blocks(page(effects, details=True), Table)[0]
     assert [list(row) for row in table.rows] == [
-        ["a", "0.50", "0.12", "-1000 mm at 0.5 s", "3000 mm at 2 s"],
-        ["b", "–", "–", "-1000 mm at 0.5", "3000 mm at 2"],
+        ["a", "0.50", "0.12", "-1.00 m at 0.5 s", "3.00 m at 2 s"],
+        ["b", "–", "–", "-1.00 m at 0.5", "3.00 m at 2"],
     ]
 
 
@@ -206,8 +206,8 @@ def test_the_rest_has_a_row_where_two_shares_are_known(
 def test_the_runs_with_the_extremes_are_told_with_settings_and_seed() -> None:
     table = blocks(page(effects_of(0.5, 0.2), details=True), Table)[1]
     assert [list(row) for row in table.rows] == [
-        ["smallest", "-1000 mm", "a = 0.5 and b = 0.5", "7"],
-        ["largest", "3000 mm", "a = 2 and b = 2", "5"],
+        ["smallest", "-1.00 m", "a = 0.5 and b = 0.5", "7"],
+        ["largest", "3.00 m", "a = 2 and b = 2", "5"],
     ]
 
 

@@ -364,6 +364,7 @@ def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
     says = {
         "box.csv": r"\.npz or \.parquet",
         "empt.npz": r"there is no trace .*Did you mean empty.npz",
+        "hold.npz": r"statemachine trace record hold -o .*hold.npz",
         "folder.npz": "is a folder",
     }
     for name, content in (("empty", b""), ("text", b"hello"), ("half", good[: len(good) // 2])):

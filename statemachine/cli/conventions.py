@@ -6,7 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..errors import BadInputError
-from .common import TerminalReporter, add_backend, add_json, show
+from .common import add_backend, add_json, show
+from .long_work import LongWorkReporter
 
 if TYPE_CHECKING:
     from ..lab.probes.conventions.request import CallsRequest, ConventionsRequest
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
 
     request = request_of(options)
     if isinstance(request, CallsRequest):
-        phrases = answer_calls(request, TerminalReporter())
+        phrases = answer_calls(request, LongWorkReporter())
         return show(report.calls_page(phrases), phrases, options.json)
-    result = answer(request, TerminalReporter())
+    result = answer(request, LongWorkReporter())
     return show(report.page(result), result, options.json)

@@ -9,7 +9,6 @@ from ..installed import DEFAULT
 from ..typed_numbers import typed_int
 from .common import (
     EACH_BACKEND,
-    TerminalReporter,
     add_backend,
     add_json,
     add_menagerie,
@@ -17,6 +16,7 @@ from .common import (
     add_seed,
     show,
 )
+from .long_work import LongWorkReporter
 
 if TYPE_CHECKING:
     from ..lab.validate.fingertip_request import FingertipRequest
@@ -68,5 +68,5 @@ def run(options: argparse.Namespace) -> int:
     from ..lab.validate.certificate import page
     from ..lab.validate.fingertip_request import answer
 
-    results = answer(request_of(options), TerminalReporter())
+    results = answer(request_of(options), LongWorkReporter())
     return show(page(results), results, options.json)

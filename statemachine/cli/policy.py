@@ -9,13 +9,13 @@ from ..installed import DEFAULT
 from ..typed_numbers import typed_float
 from .common import (
     CONTRACT_BACKENDS,
-    TerminalReporter,
     add_backend,
     add_json,
     add_menagerie,
     number_list,
     show,
 )
+from .long_work import LongWorkReporter
 
 if TYPE_CHECKING:
     from ..lab.policy.request import PolicyRequest
@@ -108,7 +108,7 @@ def run(options: argparse.Namespace) -> int:
     from ..lab.policy.page import page
     from ..lab.policy.request import answer
 
-    result = answer(request, TerminalReporter())
+    result = answer(request, LongWorkReporter())
     return show(page(result, options.details), result, options.json)
 
 
@@ -117,7 +117,7 @@ def _show_faults(request: PolicyRequest, options: argparse.Namespace) -> int:
     from ..lab.policy.diagnosis import diagnose
     from ..lab.policy.diagnosis_page import page
 
-    result = diagnose(request, TerminalReporter())
+    result = diagnose(request, LongWorkReporter())
     return show(page(result, options.details), result, options.json)
 
 
@@ -126,5 +126,5 @@ def _show_contracts(request: PolicyRequest, options: argparse.Namespace) -> int:
     from ..lab.policy.contracts_page import page
     from ..lab.policy.two_contracts import compare_contracts
 
-    result = compare_contracts(request, options.against, TerminalReporter())
+    result = compare_contracts(request, options.against, LongWorkReporter())
     return show(page(result), result, options.json)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from ..typed_numbers import typed_float, typed_int
 from .common import (
     SAYS_NO,
-    TerminalReporter,
     add_json,
     add_seed,
     add_trust,
     file_name,
     show,
 )
+from .long_work import LongWorkReporter
 from .resuming import resumable
 
 if TYPE_CHECKING:
@@ -86,6 +86,6 @@ def run(options: argparse.Namespace) -> int:
 
     request = request_of(options)
     with resumable(request.table, "examined"):
-        survey = answer(request, TerminalReporter())
+        survey = answer(request, LongWorkReporter())
     show(page(survey), survey, options.json)
     return SAYS_NO if survey.wrong else 0

@@ -12,7 +12,6 @@ from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
 from .common import (
     SAYS_NO,
-    TerminalReporter,
     add_backend,
     add_jobs,
     add_json,
@@ -24,6 +23,7 @@ from .common import (
 )
 from .experiments import experiments
 from .help_all import shorten_help
+from .long_work import LongWorkReporter
 from .resuming import resumable
 
 if TYPE_CHECKING:
@@ -344,7 +344,7 @@ def _run_sweep(options: argparse.Namespace) -> int:
 
     request = request_of(options)
     with _resumable(options):
-        summary = answer(request, TerminalReporter())
+        summary = answer(request, LongWorkReporter())
     show(summary_page(summary), summary, options.json)
     return SAYS_NO if summary.failed else 0
 
@@ -356,7 +356,7 @@ def _run_and_report(options: argparse.Namespace) -> int:
 
     request = effects_request_of(options)
     with _resumable(options):
-        result = answer_effects(request, TerminalReporter())
+        result = answer_effects(request, LongWorkReporter())
     show(page(result.report, options.details), result, options.json)
     return SAYS_NO if result.summary.failed else 0
 

@@ -12,7 +12,6 @@ from .common import (
     ONE_BACKEND,
     PROGRAM,
     SAYS_NO,
-    TerminalReporter,
     add_backend,
     add_json,
     add_menagerie,
@@ -26,6 +25,7 @@ from .common import (
     word_of_one_backend,
 )
 from .experiments import EXPERIMENTS, experiments
+from .long_work import LongWorkReporter
 
 if TYPE_CHECKING:
     from ..lab.recordings import Trace
@@ -200,7 +200,7 @@ def run_record(options: argparse.Namespace) -> int:
 
     request = record_request_of(options)
     target = _target(options.output or request.file_name)
-    return _write(answer_record(request, TerminalReporter()), target)
+    return _write(answer_record(request, LongWorkReporter()), target)
 
 
 def run_play(options: argparse.Namespace) -> int:
@@ -209,7 +209,7 @@ def run_play(options: argparse.Namespace) -> int:
 
     request = play_request_of(options)
     target = _target(options.output or request.file_name)
-    return _write(answer_play(request, TerminalReporter()), target)
+    return _write(answer_play(request, LongWorkReporter()), target)
 
 
 def run_show(options: argparse.Namespace) -> int:
@@ -237,7 +237,7 @@ def run_plot(options: argparse.Namespace) -> int:
     from ..lab.questions.run_files import RunFiles, write_figure
     from ..lab.recordings import read
 
-    reporter = TerminalReporter()
+    reporter = LongWorkReporter()
     target = Path(options.output or f"{Path(options.file).stem}.svg")
     trace = read(options.file)
     RunFiles(plot=target).check(reporter)
@@ -250,7 +250,7 @@ def run_film(options: argparse.Namespace) -> int:
     from ..lab.questions.run_files import RunFiles, ShownModels, find_renderer, write_film
     from ..lab.recordings import read
 
-    reporter = TerminalReporter()
+    reporter = LongWorkReporter()
     target = Path(options.output or f"{Path(options.file).stem}.webp")
     trace = read(options.file)
     RunFiles(film=target).check(reporter)

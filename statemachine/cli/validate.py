@@ -11,13 +11,13 @@ from ..installed import DEFAULT
 from ..typed_numbers import typed_float
 from .common import (
     EACH_BACKEND,
-    TerminalReporter,
     add_backend,
     add_jobs,
     add_json,
     file_name,
     show,
 )
+from .long_work import LongWorkReporter
 
 if TYPE_CHECKING:
     from ..lab.validate.battery import ValidateRequest
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
     for file in (options.junit, options.plot):
         if file is not None:
             check_place(file)
-    reporter = TerminalReporter()
+    reporter = LongWorkReporter()
     result = answer(request, reporter)
     if options.junit is not None:
         replace_text(options.junit, junit_of(result))

@@ -28,12 +28,17 @@ def unit_suffix(unit: str) -> str:
 
 
 def quantity(value: float | None, unit: str) -> str:
-    """Format a value [SI unit] with three significant digits, in the unit that is read."""
+    """Format a value [SI unit] with three significant digits, in the unit that is read.
+
+    From 1000 mm or ms on that is m or s.
+    """
     if value is None:
         return NO_NUMBER
     if math.isnan(value):
         return "none"
     factor, name = display_unit(unit)
+    if unit in ("m", "s") and abs(value) >= 1.0:
+        factor, name = 1.0, unit_suffix(unit)
     return f"{figure(value * factor)}{name}"
 
 
@@ -143,7 +148,10 @@ def duration(seconds: float) -> str:
 
 
 def percent(part: float | None) -> str:
-    """Format a fraction of a whole as a percentage; of a small one only that it is small."""
+    """Format a fraction of a whole as a percentage; of a small one only that it is small.
+
+    What is ten times the whole or more is a number of times.
+    """
     if part is None:
         return NO_NUMBER
     value = 100 * part
@@ -151,7 +159,9 @@ def percent(part: float | None) -> str:
         return "< 0.1 %"
     if 99.95 <= value < 100:
         return "> 99.9 %"
-    return f"{value:.1f} %" if 0 < abs(value) < 1000 else f"{value:z.0f} %"
+    if abs(value) >= 1000:
+        return f"{part:.0f} times"
+    return f"{value:.1f} %" if value else "0 %"
 
 
 def count(number: int, thing: str, zero: str = "0") -> str:

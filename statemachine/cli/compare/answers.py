@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import EndedEarlyError
-from ..common import INTERRUPTED, TerminalReporter, print_error, show
+from ..common import INTERRUPTED, print_error, show
+from ..long_work import LongWorkReporter
 from .options import check_options
 from .recordings import names_recording, run_recording
 from .requests import explain_request_of, request_of
@@ -70,7 +71,7 @@ def _run_models(options: argparse.Namespace, request: ModelsRequest) -> int:
     from ...lab.questions.requests.models import answer
 
     with stop_is_said():
-        result = answer(request, TerminalReporter())
+        result = answer(request, LongWorkReporter())
     return show(result.page(options.details), result, options.json)
 
 
@@ -80,7 +81,7 @@ def _run_one_step(options: argparse.Namespace, request: OneStepRequest) -> int:
     from ...lab.questions.requests.one_step import answer
 
     with stop_is_said():
-        result = answer(request, TerminalReporter())
+        result = answer(request, LongWorkReporter())
     return show(one_step.page(result, options.details), result, options.json)
 
 
@@ -90,7 +91,7 @@ def _run_converge(options: argparse.Namespace, request: ConvergeRequest) -> int:
     from ...lab.questions.requests.converge import answer
 
     with stop_is_said():
-        result = answer(request, TerminalReporter())
+        result = answer(request, LongWorkReporter())
     return show(convergence.page(result, options.details), result, options.json)
 
 
@@ -100,7 +101,7 @@ def _run_engines(options: argparse.Namespace, request: EnginesRequest) -> int:
     from ...lab.questions.requests.engines import answer
 
     with stop_is_said():
-        result = answer(request, TerminalReporter())
+        result = answer(request, LongWorkReporter())
     return show(engines.page(result, options.details), result, options.json)
 
 
@@ -111,9 +112,9 @@ def _run_versions(options: argparse.Namespace, request: VersionsRequest) -> int:
     from ...lab.questions.run_files import write_tests
     from ...show.charts import write_pictures
 
-    _files_of(options).check(TerminalReporter())
+    _files_of(options).check(LongWorkReporter())
     with stop_is_said():
-        result = answer(request, TerminalReporter())
+        result = answer(request, LongWorkReporter())
     if options.junit is not None:
         write_tests(options.junit, result.comparisons)
     page = versions.page(result, options.details)
@@ -135,7 +136,7 @@ def _run_explain(options: argparse.Namespace, request: ExplainRequest) -> int:
     interrupted = False
     try:
         with stop_is_said():
-            result = answer(request, TerminalReporter())
+            result = answer(request, LongWorkReporter())
     except InterruptedExplanation as stop:
         result, interrupted = stop.result, True
     except EndedEarlyError:
@@ -154,7 +155,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     from ...lab.why import InterruptedExplanation
     from ...lab.why import page as why
 
-    reporter = TerminalReporter()
+    reporter = LongWorkReporter()
     files = _files_of(options)
     files.check(reporter)
     renderer = None if files.film is None else find_renderer(reporter)
@@ -164,10 +165,19 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     with stop_is_said():
         result = answer(request, reporter)
     page = comparison.page(result, options.details)
+    shown = result.figures()
     if files.html is not None:
+        made_by = page_command(request, asked, files.html, options.why)
         try:
-            made_by = page_command(request, asked, files.html)
-            report_page = compare_report.whole_page(result, asked, made_by, reporter)
+            if options.why:
+                parts = compare_report.report_parts(result, asked, made_by, reporter)
+                report_page = compare_report.report_page(result, parts)
+                if parts.explanation is not None:
+                    shown, page = parts.explanation, why.page(parts.explanation, options.details)
+                elif parts.why_not:
+                    print_error(parts.why_not, 0)
+            else:
+                report_page = compare_report.whole_page(result, asked, made_by, reporter)
         except InterruptedExplanation as stop:
             end_line_of_terminal()
             print_error(f"stopped: {files.html} was not written", 0)
@@ -180,7 +190,7 @@ def _run_compare(options: argparse.Namespace, request: CompareRequest) -> int:
     if options.json:
         for line in (*result.run.unmatched, *result.run.notes):
             print_error(line, 0)
-    code = show(page, result.figures(), options.json)
+    code = show(page, shown, options.json)
     _write_pictures(files, result, renderer)
     return code
 
@@ -197,7 +207,7 @@ def _write_pictures(files: RunFiles, result: CompareResult, renderer: Renderer |
     """Write the figure and the film that are asked for."""
     from ...lab.questions.run_files import ShownModels, write_figure, write_film
 
-    reporter, traces = TerminalReporter(), result.run.traces
+    reporter, traces = LongWorkReporter(), result.run.traces
     if files.plot is not None:
         write_figure(files.plot, traces, result.comparison, result.floor, reporter)
     if files.film is not None and renderer is not None:

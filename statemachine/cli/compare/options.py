@@ -254,6 +254,7 @@ def check_options(options: argparse.Namespace) -> None:
     _need(options, ("write",), ("why", "models"))
     _exclude(options, "write", ("html",))
     _need(options, ("no_why",), ("html",))
+    _exclude(options, "no_why", ("why",))
     _need(options, ("frame",), ("models",))
     refuse_options(options, ("calibration",), "{} goes with a recording of an arm, lerobot:DIR#3")
     _exclude(options, "uncertainty", ("no_chaos",))

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from ...errors import BadInputError
 from ...installed import DEFAULT
 from ...measures.text import command
-from ..common import INTERRUPTED, PROGRAM, TerminalReporter, is_given, print_error, show
+from ..common import INTERRUPTED, PROGRAM, is_given, print_error, show
+from ..long_work import LongWorkReporter
 from .options import refuse_options
 from .requests import pairs_of
 from .stopping import stop_is_said
@@ -108,7 +109,7 @@ def run_recording(options: argparse.Namespace) -> int:
     from ...lab.identification.arm_report import check_page, write_arm_page
     from ...lab.identification.results import InterruptedIdentification
 
-    request, reporter = recording_request_of(options), TerminalReporter()
+    request, reporter = recording_request_of(options), LongWorkReporter()
     page_file = None if options.html is None else Path(options.html)
     if page_file is not None:
         check_page(page_file, reporter)
@@ -130,7 +131,7 @@ def run_recording(options: argparse.Namespace) -> int:
 
 
 def _result_of(
-    request: RecordingRequest, why: bool, reporter: TerminalReporter
+    request: RecordingRequest, why: bool, reporter: LongWorkReporter
 ) -> RecordingResult | IdentificationResult:
     """Compute what is asked."""
     if why:

@@ -24,7 +24,16 @@ from .labels import labels_of, notes_on
 from .motion import LeastMotion, MotionExtent, least_motions, motion_of, with_efforts
 from .outcomes import RunOutcome, is_of_policy, outcomes_of
 from .quantity_agreement import Agreement, Verdict, first_touch, missed_touch, of_outcome
-from .series import Series, Touch, at_the_end, default_tip, joint_columns, series, touches
+from .series import (
+    Series,
+    Touch,
+    at_the_end,
+    default_tip,
+    joint_columns,
+    may_touch_on_both,
+    series,
+    touches,
+)
 
 _BETWEEN = 1.5  # of the longer timestep: farther apart, and both sides have moments between
 
@@ -108,7 +117,8 @@ class Comparison:
             fixed, the sides differ, whatever else agrees.
         outcomes: What came of both runs of a robot that floats: did it fall, how far did it get,
             how well did its servos track; of a policy how fast, too. Each is one of the agreements.
-        touches: One for each pair of bodies that touches on either side.
+        touches: One for each pair of bodies that touches on either side, also of a body that one
+            side alone has, of which no quantity is compared.
         curves: The quantities over time; first touches have none.
     """
 
@@ -228,6 +238,8 @@ def compare(
     outcomes = outcomes_of(left, right, until, tolerances)
     agreements += [of_outcome(outcome, until, labels.short) for outcome in outcomes]
     for touch in pairs:
+        if not may_touch_on_both(touch.pair, left.header, right.header):
+            continue
         missed = missed_touch(touch, left, right, labels.short)
         agreements.append(first_touch(touch, missed, until, allowed))
     not_finite = [

@@ -123,12 +123,17 @@ def _energy_changes(sides: Sides) -> list[Array]:
 
 
 def _normal_forces_of_pairs(time: Array, sides: Sides) -> list[Series]:
-    """Compare the normal force of each pair of bodies that touches on either side."""
+    """Compare the normal force of each pair of bodies that touches on either side, and may on both.
+
+    See `may_touch_on_both`.
+    """
     (left, left_rows), (right, right_rows) = sides
     left_forces = normal_forces(left)
     right_forces = with_left_pair_names(left_forces, normal_forces(right))
     curves = []
     for pair in dict.fromkeys([*left_forces, *right_forces]):
+        if not may_touch_on_both(pair, left.header, right.header):
+            continue
         left_force = left_forces.get(pair, np.zeros(len(left)))
         right_force = right_forces.get(pair, np.zeros(len(right)))
         curve = _curve(
@@ -308,6 +313,32 @@ def touches(left: Trace, right: Trace) -> tuple[Touch, ...]:
         Touch(pair, left_contacts.get(pair, never), right_contacts.get(pair, never))
         for pair in left_contacts | right_contacts
     )
+
+
+def may_touch_on_both(pair: str, left: Header, right: Header) -> bool:
+    """Tell whether both sides have the bodies of a contact, as far as joints tell.
+
+    A body that a joint moves which one side alone has is not there on the other side. One without
+    such a joint may be part of another body there, or go by another name.
+
+    Args:
+        pair: The bodies, as in "box on floor".
+        left: What the left is of.
+        right: What the right is of, with the left's names.
+    """
+    bodies = {*pair.split(" on ")}
+    return not (bodies & _own_bodies(left, right) or bodies & _own_bodies(right, left))
+
+
+def _own_bodies(header: Header, other: Header) -> set[str]:
+    """Return the bodies that a joint moves which the other side lacks, as it lacks them."""
+    lacking = zip(header.joint_labels, header.jnt_bodyid, strict=False)
+    moved = {body for joint, body in lacking if joint not in other.joint_labels}
+    labels = header.body_labels
+    for body, parent in enumerate(header.body_parentid):  # a parent has the smaller number
+        if parent in moved:
+            moved.add(body)
+    return {labels[body] for body in moved} - {*other.body_labels}
 
 
 def _contacts(trace: Trace, until: float) -> dict[str, PairContacts]:

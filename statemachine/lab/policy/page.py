@@ -167,6 +167,11 @@ class PolicyPage(PageContent):
         return [engine.backend for engine in self.result.engines]
 
     @property
+    def is_on_several(self) -> bool:
+        """Tell whether it ran on several engines."""
+        return len(self.result.engines) > 1
+
+    @property
     def seconds(self) -> float:
         """Return how long each run is [s]."""
         return self.result.request.seconds

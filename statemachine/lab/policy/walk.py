@@ -13,7 +13,7 @@ from ...errors import BadInputError, DivergedError
 from ...interface import Array, Data, make_data, reset
 from ..runs.drive import Progress, drive, no_progress, number_of_steps, progress_of_stage
 from ..runs.floating import fallen_moments
-from ..runs.robot import home_keyframe
+from ..runs.robot import home_keyframe, warn_of_start
 from ..runs.walking import START, headings, lateral_way, mean_speeds
 from .command import Command
 from .contract import AXES, Contract
@@ -108,6 +108,8 @@ def walked(
 ) -> RecordedWalk:
     """Run a policy from a reset, until the time is over or the robot has fallen.
 
+    An EngineWarning tells what is wrong with the state that it starts in.
+
     Args:
         policy: On the model that is run.
         command: The speeds that are asked for.
@@ -135,6 +137,7 @@ def walked(
     base = slice(policy.binding.base_qpos, policy.binding.base_qpos + 7)
     with closing(make_data(model)) as data:
         set_start(data, policy, keyframe)
+        warn_of_start(model, data)
         try:
             for number, _ in enumerate(drive(model, data, controller, steps)):
                 if number % each_call:

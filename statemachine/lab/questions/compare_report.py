@@ -30,7 +30,7 @@ from .events import events_of
 from .finding import Finding, finding_about, leading
 from .policy_outcomes import policy_outcomes_blocks
 from .requests import causes
-from .requests.causes import ExplainRequest
+from .requests.causes import ExplainRequest, ExplainResult
 from .requests.gap import CompareResult
 from .stage.both_runs import BothRuns
 from .stage.quantity_chart import charts_of
@@ -54,7 +54,7 @@ class ReportParts:
         command: What makes the page again; "" where that is not said.
     """
 
-    explanation: Explanation | None = None
+    explanation: ExplainResult | None = None
     why_not: str = ""
     models: Page | None = None
     command: str = ""
@@ -103,17 +103,41 @@ def whole_page(
 
     Args:
         result: How far apart two runs are.
-        ask_why: What is asked of causes; None for nothing.
+        ask_why: What is asked of causes; None for nothing. Of recorded runs none are looked for.
         typed: The command that makes it again.
         reporter: Told how the search for causes gets on.
     """
-    comparison = result.comparison
+    is_recorded = any(trace.header.recorded for trace in traces_of(result.comparison))
+    if ask_why is None or not is_recorded or not _can_be_explained(result.comparison):
+        return report_page(result, report_parts(result, ask_why, typed, reporter))
+    parts = report_parts(result, None, typed, reporter)
+    return report_page(result, replace(parts, why_not=_RECORDED))
+
+
+def report_parts(
+    result: CompareResult, ask_why: ExplainRequest | None, typed: str, reporter: Reporter = QUIET
+) -> ReportParts:
+    """Return what a page shows beside a comparison: causes, of recorded runs too, and models.
+
+    Args:
+        result: How far apart two runs are.
+        ask_why: What is asked of causes; None for nothing.
+        typed: The command that makes the page again.
+        reporter: Told how the search for causes gets on.
+    """
     explanation, why_not = None, ""
-    if ask_why is not None and comparison.outcome not in ("ended", "nothing moved"):
-        explanation, why_not = _explained(ask_why, comparison, reporter)
-    models_page = _models_page(result.request.run, traces_of(comparison))
-    parts = ReportParts(explanation, why_not, models_page, typed)
-    return report_page(result, parts)
+    if ask_why is not None and _can_be_explained(result.comparison):
+        try:
+            explanation = causes.answer(ask_why, reporter)
+        except StateMachineError as error:
+            why_not = f"What causes it could not be found: {error}."
+    models_page = _models_page(result.request.run, traces_of(result.comparison))
+    return ReportParts(explanation, why_not, models_page, typed)
+
+
+def _can_be_explained(comparison: Comparison) -> bool:
+    """Tell whether there is a gap of whole runs, in which something moved."""
+    return comparison.outcome not in ("ended", "nothing moved")
 
 
 def report_page(result: CompareResult, parts: ReportParts) -> Page:
@@ -173,18 +197,6 @@ def _is_of(agreement: Agreement, name: str, kind: str | None) -> bool:
     if kind is not None:
         return agreement.kind == kind
     return agreement.name in (name, f"{name}, position")
-
-
-def _explained(
-    request: ExplainRequest, comparison: Comparison, reporter: Reporter
-) -> tuple[Explanation | None, str]:
-    """Return what explains a gap, or None and why nothing does."""
-    if any(trace.header.recorded for trace in traces_of(comparison)):
-        return None, _RECORDED
-    try:
-        return causes.answer(request, reporter), ""
-    except StateMachineError as error:
-        return None, f"What causes it could not be found: {error}."
 
 
 def _models_page(run: Request, traces: Sequence[Trace]) -> Page | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...measures.text import milliseconds
+from ...measures.text import milliseconds, sentence
 from ...show.blocks import Block, Page, Table
 from ...show.first_screen import first_that_fits
 from ...show.templates import PageContent, render_blocks
@@ -14,6 +14,7 @@ from ..compare import Comparison
 from ..compare.base_frame_page import base_frame_blocks
 from ..compare.call_periods_page import call_periods_blocks
 from ..compare.known_changes_page import ShownChange, known_changes_blocks
+from ..compare.labels import lines_on_unmatched
 from ..compare.matched import Matched
 from ..compare.series import SETTLED
 from ..compare.written_state_page import written_state_blocks
@@ -113,6 +114,16 @@ class ComparePage(PageContent):
         """Return whether the base of each side floats, and what of it was taken over."""
         run = self.result.run
         return self.result.comparison.bases if run.bases is None else run.bases
+
+    @property
+    def unmatched_joints(self) -> list[str]:
+        """Return a sentence for each side that has joints which the other lacks."""
+        run = self.result.run
+        if run.matched is None:
+            return []
+        labels = long_labels(self.result.comparison)
+        joints = [{"joint": only.get("joint", ())} for only in run.matched.only_beside_bases]
+        return [sentence(line) for line in lines_on_unmatched(joints, labels)]
 
     @property
     def missing(self) -> list[str]:

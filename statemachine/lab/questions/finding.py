@@ -146,8 +146,8 @@ class Finding:
         outcome: What came of it.
         is_same: Whether every figure is the same on both sides.
         counts: How many quantities have which verdict.
-        lead: The quantity that is farthest beyond its tolerance; see `leading`. Where all agree,
-            the one that comes nearest to its tolerance.
+        lead: The quantity that is farthest beyond its tolerance, of those that differ at the end if
+            any does; see `leading`. Where all agree, the one that comes nearest to its tolerance.
         is_changing: Whether its difference still changes at the end.
         noticed: Position of the fingertip, of the base, or of a free body: the one that is farthest
             apart. None where it is the lead, or where there is none.
@@ -257,11 +257,12 @@ def finding_about(
 
 
 def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreement:
-    """Return the quantity farthest beyond its tolerance: of a robot that floats its base.
+    """Return the quantity that is farthest beyond its tolerance.
 
-    Else a coordinate, of which --why speaks; else one of the motion, as the fingertip; else any.
-    What is not a number comes last. Where some gaps may be chance, it is one of those that are
-    beyond the chaos floor.
+    It is one of the motion that differs at the end; where none does, one that settles; where all
+    of the motion agrees, another quantity. Of these it is one of the base of a robot that floats;
+    else a coordinate, of which --why speaks; else another one. What is not a number comes last.
+    Where some gaps may be chance, it is one of those that are beyond the chaos floor.
     """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
     chances: tuple[Chance, ...] = ("beyond", "cannot be told") if floor else ()
@@ -270,13 +271,17 @@ def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreemen
         if clear:
             beyond = clear
             break
-    of_base = [a for a in beyond if QUANTITIES[a.kind].of_base]
-    coordinates = [a for a in beyond if QUANTITIES[a.kind].is_coordinate]
-    motion = [a for a in beyond if QUANTITIES[a.kind].moves]
-    for candidates in (of_base, coordinates, motion, beyond):
-        if candidates:
-            return max(candidates, key=_finite_tolerances)
-    return max(comparison.agreements, key=_finite_tolerances)
+    if not beyond:
+        return max(comparison.agreements, key=_finite_tolerances)
+    for verdict in ("differs", "settles"):
+        motion = [a for a in beyond if a.verdict == verdict and QUANTITIES[a.kind].moves]
+        of_base = [a for a in motion if QUANTITIES[a.kind].of_base]
+        coordinates = [a for a in motion if QUANTITIES[a.kind].is_coordinate]
+        for candidates in (of_base, coordinates, motion):
+            if candidates:
+                return max(candidates, key=_finite_tolerances)
+    differing = [a for a in beyond if a.verdict == "differs"]
+    return max(differing if differing else beyond, key=_finite_tolerances)
 
 
 def _finite_tolerances(agreement: Agreement) -> float:

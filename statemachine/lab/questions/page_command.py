@@ -10,23 +10,29 @@ from ...measures import QUANTITIES
 from ..compare.perturbed import Uncertainty
 from ..compare.python_call import python_call
 from ..compare.typed_command import typed_command
-from .requests.causes import ExplainRequest
+from .requests.causes import ExplainRequest, words_of_why
 from .requests.gap import CompareRequest
 
 # How a size in an SI unit is typed: its factor, and the unit.
 _TYPED_UNITS = {"rad": (math.degrees(1.0), "deg"), "m": (1000.0, "mm")}
 
 
-def page_command(request: CompareRequest, causes: ExplainRequest | None, file: Path) -> str:
+def page_command(
+    request: CompareRequest, causes: ExplainRequest | None, file: Path, insists: bool = False
+) -> str:
     """Return what makes a page again: a command, in lines, or a call of Python.
 
     Args:
         request: How far apart two runs are.
         causes: What is asked of causes; None where they are not looked for.
         file: The page.
+        insists: Whether causes are the answer in the terminal, too: --why is typed.
     """
     if request.run.is_typed:
-        words = [*_words_of(request), *_words_of_causes(causes), "--html", file.name]
+        words_of_causes = _words_of_causes(causes)
+        if causes is not None and insists:
+            words_of_causes = words_of_why(causes)
+        words = [*_words_of(request), *words_of_causes, "--html", file.name]
         return typed_command(request.run, folders=False).lines(*words)
     arguments: list[str] = []
     if request.tolerances:

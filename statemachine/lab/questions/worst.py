@@ -73,9 +73,10 @@ class WorstQuantities:
 def worst_of(
     comparison: Comparison, finding: Finding, floor: ChaosFloor | None, most: int = WORST
 ) -> WorstQuantities:
-    """Return the quantities that are farthest apart: the lead, then by verdict and tolerances.
+    """Return the quantities that are farthest apart: by verdict, then by tolerances.
 
-    Of one verdict those that rounding alone may make come last, and contacts before them.
+    Of one verdict the lead comes first. Those that rounding alone may make come last, and contacts
+    before them.
 
     Args:
         comparison: Of the two runs.
@@ -85,10 +86,10 @@ def worst_of(
     """
     chances = {} if floor is None else {band.name: band.chance for band in floor.bands}
 
-    def rank(agreement: Agreement) -> tuple[bool, int, bool, bool, float]:
+    def rank(agreement: Agreement) -> tuple[int, bool, bool, bool, float]:
         return (
-            agreement != finding.lead,
             _RANKS[agreement.verdict],
+            agreement != finding.lead,
             chances.get(agreement.name) == "inside",
             agreement.kind in CONTACTS,
             -agreement.tolerances(),

@@ -24,8 +24,10 @@ from ...errors import (
     did_you_mean,
 )
 from ...interface import MOCAP, JointType
+from ...measures.text import command
 from ...models import AnyPath, kind_of_path, resolve
 from ..runs.provenance import model_digest
+from ..runs.scenarios import SCENARIOS
 from .formats import read_npz, read_parquet, write_npz, write_parquet
 from .header import COLUMNS, Header
 from .trace import Trace
@@ -150,7 +152,11 @@ def _missing_trace_error(path: Path) -> TraceError:
         message = f"{path} is {kind}, not a trace"
     elif path.parent.is_dir():
         names = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
-        message += did_you_mean(path.name, names, 0.6)
+        if path.stem in SCENARIOS and path.suffix in SUFFIXES:
+            words = ("statemachine", "trace", "record", path.stem, "-o", str(path))
+            message += f"; to record it, type {command(words)}"
+        else:
+            message += did_you_mean(path.name, names, 0.6)
     return TraceError(message)
 
 

@@ -8,7 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...installed import DEFAULT
-from ...measures.text import NO_NUMBER, command, figure, milliseconds, quantity, significant
+from ...measures.text import (
+    NO_NUMBER,
+    command,
+    display_unit,
+    figure,
+    milliseconds,
+    quantity,
+    significant,
+)
 from ...program import NAME
 from ...show.blocks import Page, Table
 from ...show.junit import TestSuite, junit_text
@@ -270,7 +278,8 @@ def error_text(error: float | None, unit: str) -> str:
         return "no event"
     if unit == "" and abs(error) >= 1e-4:
         return f"{figure(100.0 * error)} %"
-    return quantity(error, unit)
+    factor, name = display_unit(unit)  # one unit for a column, however large
+    return "none" if math.isnan(error) else f"{figure(error * factor)}{name}"
 
 
 def order_text(row: CaseResult) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -142,7 +142,9 @@ def poses_through(model: Model, qpos: Array) -> tuple[Array, Array]:
     return xpos, xquat
 
 
-def camera_for(sides: Sequence[Motion], aspect: float, reach: float = np.inf) -> Camera:
+def camera_for(
+    sides: Sequence[Motion], aspect: float, reach: float = np.inf, at: int | None = None
+) -> Camera:
     """Return a camera that has all bodies in its picture at every moment, on all sides.
 
     It stands where the bodies lie widest beside one another, on the mean of all moments.
@@ -151,6 +153,7 @@ def camera_for(sides: Sequence[Motion], aspect: float, reach: float = np.inf) ->
         sides: What is to be seen.
         aspect: Width of the picture by its height.
         reach: What is farther from the median of all along an axis may be outside [m].
+        at: A moment at which nothing may be outside, by its row; None for none.
     """
 
     def width(azimuth: float) -> float:
@@ -162,7 +165,11 @@ def camera_for(sides: Sequence[Motion], aspect: float, reach: float = np.inf) ->
     azimuth = next(a for a, width in widths.items() if width >= 0.9 * max(widths.values()))
     points = np.concatenate([side.corners() for side in sides])
     near = points[(np.abs(points - np.median(points, axis=0)) <= reach).all(axis=1)]
-    return framed(near if len(near) else points, aspect, azimuth, _ELEVATION)
+    framed_points = [near if len(near) else points]
+    if at is not None:
+        now = [replace(s, xpos=s.xpos[at : at + 1], xquat=s.xquat[at : at + 1]) for s in sides]
+        framed_points += [side.corners() for side in now]
+    return framed(np.concatenate(framed_points), aspect, azimuth, _ELEVATION)
 
 
 Pixels = NDArray[np.uint8]

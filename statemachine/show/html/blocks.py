@@ -27,6 +27,7 @@ from .markup import Html, joined, prose, tag
 # Draws an interactive block: what it shows is known where its kind is defined.
 DrawInteractive = Callable[[Interactive], Html]
 
+_LONG_WORD = 14  # letters; a longer one of a row's name is divided where a window is narrow
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
 _MARKS = {"✓": "right", "✗": "wrong"}  # the style of a cell that has this sign and nothing else
 _DIGEST = 64  # characters of a SHA-256
@@ -121,17 +122,19 @@ def headline_as_html(headline: Headline) -> Html:
 
 def table(block: Table) -> Html:
     """Return a table whose first column names its rows, as wide as it needs to be."""
-    looks = ["word" if k in block.words else None for k in range(len(block.headers))]
+    looks = _looks(block)
     heads = zip(("word", *looks[1:]), block.headers, strict=True)
     top = tag("tr", *(tag("th", text, scope="col", class_=look) for look, text in heads))
     signed = _signed_columns(block)
     rows = []
     for number, row in enumerate(block.rows):
-        cells = [tag("th", _content(row[0], 0 in signed), scope="row", id=_name_of(row[0]))]
+        named = _content(row[0], 0 in signed)
+        long = "long" if max(map(len, row[0].split()), default=0) > _LONG_WORD else None
+        cells = [tag("th", named, scope="row", id=_name_of(row[0]), class_=long)]
         for k in range(1, len(row)):
             cells.append(tag("td", _content(row[k], k in signed), class_=_look(row[k], looks[k])))
         rows.append(tag("tr", *cells, class_="most" if number in block.emphasis else None))
-    inside = tag("caption", block.title), tag("thead", top), tag("tbody", *rows)
+    inside = tag("caption", tag("span", block.title)), tag("thead", top), tag("tbody", *rows)
     return tag(
         "div",
         tag("table", *inside),
@@ -140,6 +143,17 @@ def table(block: Table) -> Html:
         role="region",
         aria_label=block.title,
     )
+
+
+def _looks(block: Table) -> list[str | None]:
+    """Return the style of each column: words, and a last one of verdicts, which stays in sight."""
+    looks: list[str | None] = [
+        "word" if k in block.words else None for k in range(len(block.headers))
+    ]
+    ends = [row[-1] for row in block.rows]
+    if ends and all(isinstance(cell, TableCell) and cell.verdict for cell in ends):
+        looks[-1] = "word stays"
+    return looks
 
 
 def _name_of(text: str) -> str | None:

@@ -248,17 +248,20 @@ def _result(explanation: Explanation, request: ExplainRequest, bases: Bases) -> 
     notes = [*run.notes_on_parts]
     if run.is_traces:
         notes.append(_PLAYED)
+    words = words_of_why(request)
+    if run.is_typed and request.uncertainty is None:
+        words.append("--no-chaos")
     explanation = replace(
         explanation,
         notes=(*notes, *explanation.notes),
-        command=typed_command(run, _words_of(request)),
+        command=typed_command(run, words),
         bases=bases,
     )
     facts = vars(explanation)
     return ExplainResult(**facts, request=request)
 
 
-def _words_of(request: ExplainRequest) -> list[str]:
+def words_of_why(request: ExplainRequest) -> list[str]:
     """Return the words that ask this question, without the time that it was given."""
     words = ["--why"]
     if request.quantity is not None:
@@ -267,8 +270,6 @@ def _words_of(request: ExplainRequest) -> list[str]:
         words += ["--measure", request.measure]
     if request.run.is_typed and request.finer:
         words.append("--finer")
-    if request.run.is_typed and request.uncertainty is None:
-        words.append("--no-chaos")
     return words
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-
-import numpy as np
 
 from ....measures.text import short_time
 from ....show.html.markup import Html, joined, tag
@@ -12,7 +11,8 @@ from ..compared_names import short_labels
 from .both_runs import BothRuns
 from .quantity_chart import QuantityChart, spans
 
-_TICKS = 6  # of the axis of time
+_TICKS = 6  # intervals of the axis of time, at most
+_WHOLE = 1 - 1e-9  # of a number of steps: a hair less than a whole number is one
 _SEEN = 1 / 400  # of the axis: a narrower gap between two bars is not seen
 
 
@@ -68,10 +68,18 @@ def _left(time: float, until: float) -> str:
 
 def _time_axis(until: float) -> Html:
     """Return the axis of time under the lanes."""
-    *ticks, last = np.linspace(0.0, until, _TICKS).tolist()
+    *ticks, last = round_times(until)
     times = [tag("span", f"{time:.3g}", style=_left(time, until)) for time in ticks]
-    times.append(tag("span", f"{last:.3g}", tag("small", "s"), style="left:100%"))
+    times.append(tag("span", f"{last:.3g}", tag("small", "s"), style=_left(last, until)))
     return _lane("", [tag("div", *times, class_="times", aria_hidden="true")], "axis")
+
+
+def round_times(until: float) -> list[float]:
+    """Return round moments from 0 to a time [s], 1, 2 or 5 times a power of ten apart."""
+    smallest = until / _TICKS
+    power = 10.0 ** math.floor(math.log10(smallest))
+    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= smallest * _WHOLE)
+    return [step * number for number in range(math.floor(until / step / _WHOLE) + 1)]
 
 
 def _spoken(name: str, of_quantity: Sequence[Sequence[float]]) -> str:

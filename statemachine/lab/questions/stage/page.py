@@ -156,6 +156,7 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
         "tip": tip,
         "now": spoken_time,
         "arrows": arrows,
+        "no_contacts": Html("") if runs.comparison.touches else Html(" hidden"),
         "last": len(times) - 1,
         "start": start,
         "share": f"{share:.6f}",

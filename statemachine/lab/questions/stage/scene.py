@@ -28,7 +28,8 @@ Look = Drawing | str
 _SMOOTH = 1 / 60  # seconds between two pictures that look like motion
 _BYTES = 450_000  # of the poses of both sides; each takes 14
 _FAR = 8.0  # extents of the model beyond which nothing is drawn
-_NEAR = 2.0  # extents beyond which nothing counts for where the camera stands
+# Extents beyond which nothing counts for where the camera stands, but when the page opens.
+_NEAR = 2.0
 _WAY = 2000  # points of the way of a site
 _DASH = 0.0015  # m between these
 _TRIANGLES = 24_000  # of all shapes
@@ -179,7 +180,7 @@ def scene_of(
             few=few if any(of_side.more for of_side in contacts) else 0,
         )
     )
-    camera = camera_for(motions, _ASPECT, _NEAR * extent)
+    camera = camera_for(motions, _ASPECT, _NEAR * extent, start)
     data = {
         "moving": _moving(*traces),
         **box.as_data(),
