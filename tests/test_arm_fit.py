@@ -69,6 +69,12 @@ def fits(objective) -> Fits:
 # The fit.
 
 
+def test_costs_are_the_same_however_many_are_simulated_together(objective, parameters):
+    vectors = np.random.default_rng(0).normal(0.0, 0.1, (50, len(parameters)))
+    vectors = np.clip(vectors, parameters.low, parameters.high)
+    assert objective.costs(vectors)[47:] == pytest.approx(objective.costs(vectors[47:]), rel=1e-9)
+
+
 def test_gains_and_delay_are_found(fits, true):
     assert fits.best.vector[:6] == pytest.approx(true[:6], abs=0.15)
     assert fits.best.vector[-2] == pytest.approx(true[-2], abs=0.002)

@@ -9,7 +9,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.interface import Array
-from statemachine.lab.identification.clock import UNCERTAIN_RATE, moved_by_clock
+from statemachine.lab.identification.considered import UNCERTAIN_RATE, considered_shifts
 from statemachine.lab.identification.fit import Fit, fit
 from statemachine.lab.identification.linear_refit import LinearRefit
 from statemachine.lab.identification.load_friction import load_friction_profile
@@ -190,7 +190,7 @@ def test_what_a_clock_moves_is_what_a_fit_to_another_rate_moves(
     free = best.objective.free
     moved = (other.vector - best.vector)[free]
     deviations = 1.0 / np.sqrt(np.diag(best.information))
-    assert moved_by_clock(best) == pytest.approx(moved, abs=0.3 * float(deviations.max()))
+    assert considered_shifts(best)[0] == pytest.approx(moved, abs=0.3 * float(deviations.max()))
 
 
 def test_a_faster_clock_shows_less_viscous_friction_of_light_joints(
@@ -199,14 +199,23 @@ def test_a_faster_clock_shows_less_viscous_friction_of_light_joints(
     """The speed of a wrist is faster by the rate, and weight and inertia hardly matter there."""
     best = best_at(motion, true, 1.0)
     kinds = [best.objective.parameters.each[number].kind for number in best.objective.free]
-    viscous = moved_by_clock(best)[[kind == "viscous" for kind in kinds]]
+    viscous = considered_shifts(best)[0][[kind == "viscous" for kind in kinds]]
     assert viscous[-3:] == pytest.approx(-UNCERTAIN_RATE, abs=0.5 * UNCERTAIN_RATE)
 
 
-def test_intervals_are_as_wide_as_an_uncertain_clock_makes_them(clean: Fits) -> None:
-    shift = np.linspace(0.0, 0.1, len(clean.best.objective.free))
-    widened = replace(clean, clock_shift=shift).deviations
-    assert widened == pytest.approx(np.hypot(clean.deviations, shift))
+def test_intervals_are_as_wide_as_what_is_uncertain_makes_them(clean: Fits) -> None:
+    shifts = np.linspace(0.0, 0.1, len(clean.best.objective.free)) * np.array([[3.0], [4.0]])
+    widened = replace(clean, considered=shifts).deviations
+    assert widened == pytest.approx(np.hypot(clean.deviations, 5.0 / 3.0 * shifts[0]))
+
+
+def test_a_payload_elsewhere_moves_what_a_payload_does(motion: ArmSimulation, true: Array) -> None:
+    """Of one of 100 g, further out by what is uncertain; without a payload nothing moves."""
+    heavy = true.copy()
+    heavy[motion.parameters.of_kind("payload")] = 0.1
+    best, without = best_at(motion, heavy, 1.0), best_at(motion, true, 1.0)
+    assert np.abs(considered_shifts(best)[1:]).max() > 1e-3
+    assert np.abs(considered_shifts(without)[1:]).max() < 1e-6
 
 
 # Noise.

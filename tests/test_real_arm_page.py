@@ -12,7 +12,7 @@ import statemachine as sm
 from examples import record_chirps
 from statemachine.interface import Array
 from statemachine.lab.identification import verdicts
-from statemachine.lab.identification.clock import UNCERTAIN_RATE
+from statemachine.lab.identification.considered import UNCERTAIN_RATE
 from statemachine.lab.identification.parameters import ArmParameters
 from statemachine.lab.identification.results import FEWEST_STARTS
 from statemachine.lab.recordings.arm_recording import ArmRecording

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import degrees, fixed
 from ...show.blocks import Table
 from ...show.templates import PageContent
-from .clock import UNCERTAIN_RATE
+from .considered import UNCERTAIN_PLACE, UNCERTAIN_RATE
 from .hypotheses import EVIDENCE
 from .parameter_table import determined_table, share_table, undetermined_table
 from .parameter_texts import name_of_parameter, size_text
@@ -82,6 +82,11 @@ class IdentificationDetails(PageContent):
     def uncertain_rate(self) -> float:
         """Return how uncertain the rate of frames is taken to be, as a part of it."""
         return UNCERTAIN_RATE
+
+    @property
+    def uncertain_place(self) -> float:
+        """Return how uncertain the place of a payload is taken to be [m]."""
+        return UNCERTAIN_PLACE
 
     @property
     def has_hypotheses(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...interface import Array
 from ..runs.drive import Progress, no_progress
-from .clock import moved_by_clock
+from .considered import considered_shifts
 from .fit import Fit, Objective, fit, fit_near, starting_points
 from .residuals import Residuals, root_mean_square
 
@@ -31,13 +31,14 @@ class Fits:
         each: At least one; `cost` of each is by the noise that the best one leaves.
         residuals: Of the best one.
         beside: Fisher informations (free, free) of arms with joints that are weaker.
-        clock_shift: (free,) by how much parameters move if the clock is off by what is uncertain.
+        considered: (S, free) by how much parameters move for what is uncertain and no recording
+            tells; None for nothing.
     """
 
     each: tuple[Fit, ...]
     residuals: Residuals
     beside: tuple[Array, ...] = ()
-    clock_shift: Array | float = 0.0
+    considered: Array | None = None
 
     @property
     def best(self) -> Fit:
@@ -69,12 +70,15 @@ class Fits:
 
         By the noise of each joint; where more than noise is left, by so much more. Of the best fit
         or of an arm beside it, whichever tells less; or by what is left in each frame, where that
-        is more. And by the clock, which no recording tells.
+        is more. And by what is uncertain and no recording tells.
         """
         prior = self.best.objective.prior_deviations
         more = self._more_than_noise
         by_noise = least_certain([each / more**2 for each in self.informations], prior)
-        return np.hypot(np.maximum(by_noise, self._deviations_by_frame), self.clock_shift)
+        deviations = np.maximum(by_noise, self._deviations_by_frame)
+        if self.considered is None:
+            return deviations
+        return np.hypot(deviations, np.linalg.norm(self.considered, axis=0))
 
     @property
     def _deviations_by_frame(self) -> Array:
@@ -184,9 +188,9 @@ def fits_from_starts(
     in_order = sorted([best, *others], key=_cost)
     residuals = Residuals.of(in_order[0].errors, recording)
     beside = informations_beside(in_order[0])
-    clock_shift = moved_by_clock(in_order[0])
+    considered = considered_shifts(in_order[0])
     progress(1.0)
-    return Fits(tuple(in_order), residuals, beside, clock_shift)
+    return Fits(tuple(in_order), residuals, beside, considered)
 
 
 def gone_on(end: Fit, best: Fit) -> Fit:
