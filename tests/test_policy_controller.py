@@ -11,12 +11,15 @@ from statemachine import load
 from statemachine.errors import BadInputError
 from statemachine.interface import Array, Model
 from statemachine.lab.policy.command import Command
+from statemachine.lab.policy.request import PolicyRequest, answer
 from statemachine.lab.policy.walk import set_start, walked
 
 from .support.backends import BOTH
 from .support.policies import (
     SIZE,
     constant_network,
+    content,
+    contract_file,
     linear_network,
     motors,
     node,
@@ -234,10 +237,12 @@ def test_an_observation_beyond_single_precision_is_refused_with_its_time(
         run(policy, 1, command=(1e300, 0.0, 0.0))
 
 
-def test_a_run_that_is_over_before_the_second_call_is_refused(tmp_path: Path, model: Model) -> None:
-    policy = on_model(tmp_path, model, constant_network(tmp_path, [0.0, 0.0]))
+def test_a_run_that_is_over_before_the_second_call_is_refused(tmp_path: Path) -> None:
+    need_engine("mujoco")
+    network, file = constant_network(tmp_path, [0.0, 0.0]), contract_file(tmp_path, content())
+    asked = PolicyRequest(network, file, robot(tmp_path), seconds=0.03)
     with pytest.raises(BadInputError, match=r"in 0\.03 s .* each 0\.02 s"):
-        walked(policy, Command(0.5), 0.03)
+        answer(asked)
 
 
 def test_two_calls_are_enough_to_tell_a_speed(tmp_path: Path, model: Model) -> None:

@@ -29,7 +29,7 @@ from .contract_file import read_contract
 from .floor import check_floor
 from .network import Network, NetworkFacts
 from .on_model import PolicyOnModel
-from .walk import Walk, all_walked
+from .walk import Walk, all_walked, check_length
 
 R = TypeVar("R")  # what is computed on an engine
 SECONDS = 10.0  # of a run
@@ -131,6 +131,7 @@ def answer(request: PolicyRequest, reporter: Reporter = QUIET) -> PolicyResult:
         StateMachineError: The model cannot be loaded.
     """
     contract = read_contract(request.contract)
+    check_length(contract, request.seconds)
     network = opened_network(request, contract)
     commands = request.commands or usual_commands(contract)
 

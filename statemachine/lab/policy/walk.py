@@ -99,6 +99,20 @@ class RecordedWalk:
     calls: Sequence[PolicyCall]
 
 
+def check_length(contract: Contract, seconds: float) -> None:
+    """Refuse a run that is over before the second call of its policy: it tells no speed.
+
+    Raises:
+        BadInputError: It is.
+    """
+    policy_dt = contract.timing.policy_dt
+    if seconds < 2.0 * policy_dt:  # the first call is at the beginning
+        raise BadInputError(
+            f"in {seconds:g} s a policy is not called twice that is called each {policy_dt:g} s: "
+            "let it run longer"
+        )
+
+
 def walked(
     policy: PolicyOnModel,
     command: Command,
@@ -119,15 +133,8 @@ def walked(
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: The network gives what is no action, or the time is over before its second
-            call, so that no speed is known.
+        BadInputError: The network gives what is no action.
     """
-    policy_dt = policy.contract.timing.policy_dt
-    if seconds < 2.0 * policy_dt:  # the first call is at the beginning
-        raise BadInputError(
-            f"in {seconds:g} s a policy is not called twice that is called each {policy_dt:g} s: "
-            "let it run longer"
-        )
     model, contract = policy.driven.model, policy.contract
     controller = PolicyController(policy, command.vector)
     steps = number_of_steps(model, seconds)
