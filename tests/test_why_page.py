@@ -279,8 +279,8 @@ def test_a_cause_that_acts_with_others_says_what_it_takes_away_alone(
     alone: float, last: float, interacts: bool
 ) -> None:
     cause = CauseSentence(
-        wording="values", heading="damping", element="elbow", left="1", right="2", place=None, option="",
-        part=0.953, gap="30.1 mm", alone=alone, last=last,
+        wording="values", heading="damping", element="elbow", left="1", right="2", place=None,
+        option="", part=0.953, gap="30.1 mm", alone=alone, last=last,
     )  # fmt: skip
     assert cause.interacts == interacts
     assert (f"{percent(alone)} alone" in sentence_of(cause)) == interacts
