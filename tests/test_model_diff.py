@@ -560,7 +560,7 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_what_the_engines_make_of_a_urdf() -> None:
     path = models_dir() / "so101" / "so101.urdf"
-    found = _differ(compare(path, path, engines=("mujoco", "pybullet")))
+    found = _differ(compare(path, path, engines=("mujoco", "pybullet:engine")))
     said = {(d.subject, d.quantity): (d.left, d.right) for d in found}
     assert (
         said.items()
@@ -573,7 +573,7 @@ def test_what_the_engines_make_of_a_urdf() -> None:
     assert said["contact", "friction"][1] == (0.5, 0.0, 0.0)
     # Without URDF_USE_INERTIA_FROM_FILE inertias come from the shapes; masses do not.
     assert {"inertia", "mass"} & {subject for subject, _ in said} == {"inertia"}
-    result = compare(path, path, engines=(None, "pybullet"))
+    result = compare(path, path, engines=(None, "pybullet:engine"))
     assert result.posed.distance < 1e-12
     assert {d.subject for d in _differ(result)} >= {"inertia", "contact", "settings"}
 

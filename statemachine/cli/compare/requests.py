@@ -254,14 +254,17 @@ def _models_request_of(options: argparse.Namespace) -> ModelsRequest:
     words = [*options.what, *options.models]
     sides = [side for word in words for side in parse_sides([word], options.menagerie)]
     # The file itself, unless an engine is named.
-    engines = [None if s.model == word else s.engine for s, word in zip(sides, words, strict=True)]
+    engines = [
+        None if side.model == word else str(side.chosen_backend())
+        for side, word in zip(sides, words, strict=True)
+    ]
     if options.backend and any(engines):
         raise BadInputError("--backend and FILE@ENGINE say the same: give one of them")
     if any(side.options for side in sides):
         raise BadInputError("--models compares what the files say, without options of a run")
     models = [side.model for side in sides]
     if options.backend:
-        engines = [backend.name for backend in chosen_backends(options.backend)]
+        engines = [str(backend) for backend in chosen_backends(options.backend)]
         if len(models) == 1:
             models *= 2
     if len(models) != 2 or len(engines) != 2:

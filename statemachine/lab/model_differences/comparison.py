@@ -33,6 +33,7 @@ from .only_read import enter_only_read
 from .reading import FileAsked, read_both
 from .records import DifferenceChange, FileSide, ModelsComparison
 from .starts import enter_starts
+from .supplied import with_supplied
 from .visuals import enter_visuals
 
 
@@ -51,7 +52,8 @@ def compare(
     Args:
         left: A name or a file.
         right: The other.
-        engines: For each the engine that it is asked of; None for the file itself.
+        engines: For each the engine that it is asked of; None for the file itself. What a backend
+            supplies in a run does not matter, but of "pybullet:engine".
         frames: Frames of `left` that go by other names in `right`.
         rename: Joints, links and frames of `left` that go by other names in `right`.
         digits: Numbers that agree to so many count as equal, 1 to 17.
@@ -63,8 +65,8 @@ def compare(
         MissingEngineError, ModelError, ModelFileError, UnsupportedError: As `read`.
     """
     sides = (
-        FileAsked(left, engines[0], menagerie),
-        FileAsked(right, engines[1], menagerie),
+        FileAsked.typed(left, engines[0], menagerie),
+        FileAsked.typed(right, engines[1], menagerie),
     )
     frames_by_name = {} if frames is None else dict(frames)
     renamed = {} if rename is None else dict(rename)
@@ -86,6 +88,7 @@ def compare(
     enter_declared(listing, readings, matched, locator)
     enter_only_read(listing, matched, locator)
     enter_visuals(listing, readings, trees, locator)
+    listing.differences = with_supplied(listing.differences, sides, readings, names)
     differences, faults = listing.ordered(), tuple(faults_of(readings))
     declared = [reading.declared for reading in readings]
     agreeing = agreements(trees, declared, listing.tolerance)

@@ -12,7 +12,6 @@ from ...show.blocks import Page, Table
 from ...show.first_screen import MOST_ROWS, first_that_fits, with_answer
 from ...show.templates import PageContent, render
 from ..compare.matched import RenamedPair
-from ..compare.typed_command import TypedCommand
 from .changes_page import (
     ElementChange,
     UnwrittenGroup,
@@ -21,6 +20,7 @@ from .changes_page import (
     unwritten_groups,
 )
 from .faults_page import faults_table, reasons_of
+from .next_question import next_command_of
 from .records import FileSide, ListedDifference, ModelsComparison, QuantityAgreement
 from .subject_page import (
     DIFFERENCE_TEXTS,
@@ -34,6 +34,7 @@ from .subject_page import (
     subject_table,
     worst_table,
 )
+from .supplied import not_supplied
 from .visuals import gross_visuals
 
 _SIDE_COLUMNS = (
@@ -102,7 +103,12 @@ class ModelsPage(PageContent):
     @property
     def record(self) -> list[str]:
         """Return the subjects of what does not act, each with its number of differences."""
-        return _counts([row for row in self.result.differences if not row.matters])
+        return _counts([row for row in not_supplied(self.result) if not row.matters])
+
+    @property
+    def supplied(self) -> list[str]:
+        """Return the subjects of what a backend supplies in a run, each with its number."""
+        return _counts([row for row in self.result.differences if row.supplied])
 
     @property
     def largest(self) -> AlikeDifferences | None:
@@ -191,7 +197,7 @@ class ModelsPage(PageContent):
     @property
     def lack(self) -> LackOfArmature | None:
         """Return what the lack of armature on one side does to a joint, if it lacks there."""
-        return lack_of_armature(self.result.differences)
+        return lack_of_armature(not_supplied(self.result))
 
     @property
     def records(self) -> Table:
@@ -209,7 +215,7 @@ class ModelsPage(PageContent):
         """Return what no attribute undoes; without a file to change, what cannot be equalized."""
         if self.result.changes:
             return unwritten_groups(self.result.changes)
-        return refused_groups(self.result.differences)
+        return refused_groups(not_supplied(self.result))
 
     @property
     def pairs(self) -> Table:
@@ -279,7 +285,7 @@ def _page(
         worst=worst_table(worst, files),
         more=more,
         tables=tables,
-        next_command=_next_command(result),
+        next_command=next_command_of(result),
         details=details,
     )
     return render(content)
@@ -289,27 +295,6 @@ def weightiest(result: ModelsComparison) -> list[AlikeDifferences]:
     """Return the differences that act on a motion, the weightiest first, whatever their subject."""
     groups = group_alike([row for row in result.differences if row.matters])
     return sorted(groups, key=lambda group: -round(group.first.share, 6))
-
-
-def _next_command(result: ModelsComparison) -> str:
-    """Return the command that tells what each difference explains; "" where none can be equalized.
-
-    Its experiment runs on any robot that has such a file.
-    """
-    if not any(row.cause and not row.refused for row in result.differences):
-        return ""
-    if not (result.left.joints and result.right.joints):  # no experiment runs on it
-        return ""
-    experiment = "waves" if result.has_actuators else "gravity"
-    words = ["statemachine", "compare", experiment]
-    for side, label in zip(("left", "right"), result.labels, strict=True):
-        faults = [fault for fault in result.faults if fault.side == side]
-        words.append(label)
-        if any(fault.unit == "kg m²" for fault in faults):
-            words.append("balance_inertia=on")
-        if any(fault.used is None for fault in faults):
-            words.append("meshes=off")
-    return TypedCommand(tuple(words)).lines("--why")
 
 
 def _files(result: ModelsComparison) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...backends import check_backend, load
+from ...backends import check_backend, load, parse_backend
 from ...engines import raw_engine_of, raw_engines_with
 from ...engines.description.reading import Comparable, ModelReading
 from ...errors import UnsupportedError
@@ -28,11 +28,26 @@ class FileAsked:
         file: A name or a file.
         engine: The engine that is asked what it makes of the file; None for the file itself.
         menagerie: A folder to look the name up in.
+        as_it_comes: Whether a run of it is meant as the engine's own users meet it.
     """
 
     file: str | os.PathLike[str]
     engine: str | None = None
     menagerie: str | os.PathLike[str] | None = None
+    as_it_comes: bool = False
+
+    @classmethod
+    def typed(
+        cls,
+        file: str | os.PathLike[str],
+        engine: str | None,
+        menagerie: str | os.PathLike[str] | None,
+    ) -> FileAsked:
+        """Return a side by its engine as one types it: "pybullet", "pybullet:engine", None."""
+        if engine is None:
+            return cls(file, None, menagerie)
+        choice = parse_backend(engine)
+        return cls(file, choice.name, menagerie, choice.defaults == "engine")
 
     @property
     def path(self) -> Path:
@@ -42,7 +57,10 @@ class FileAsked:
     @property
     def label(self) -> str:
         """Return the file as one types it for a run: "a.xml", "a.xml@pybullet"."""
-        return f"{self.file}@{self.engine}" if self.engine else str(self.file)
+        if not self.engine:
+            return str(self.file)
+        defaults = ":engine" if self.as_it_comes else ""
+        return f"{self.file}@{self.engine}{defaults}"
 
     @property
     def is_urdf(self) -> bool:

@@ -56,6 +56,7 @@ class ListedDifference:
             "" where only the text of a file tells of it.
         refused: Why the right cannot be brought to the left in it; "" where it can, or where only
             the text of a file tells of it.
+        supplied: Whether it does not matter since the backend supplies it in a run.
     """
 
     subject: str
@@ -73,6 +74,7 @@ class ListedDifference:
     right_line: SourceLine | None
     cause: str
     refused: str
+    supplied: bool = False
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -32,7 +32,8 @@ class ModelsRequest:
 
     Attributes:
         models: A name or a path of each, URDF or MJCF, as `load` takes it.
-        engines: For each the engine that it is asked of; None for the file itself.
+        engines: For each the engine that it is asked of; None for the file itself. Of "pybullet"
+            what its backend supplies in a run does not matter; of "pybullet:engine" it does.
         frames: Frames of the left that go by other names on the right.
         names: Joints, links and frames of the left that go by other names on the right.
         seed: Of the poses at which both are compared, at least 0.
