@@ -84,12 +84,20 @@ def _yaml_of(path: Path) -> Mapping[str, object]:
     except (OSError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise BadInputError(f"{path} cannot be read: {one_line(error)}") from error
     except yaml.YAMLError as error:
-        raise BadInputError(f"{path.name} is no YAML: {one_line(error)}") from error
+        raise BadInputError(f"{path.name} is no YAML: {_said_of(error)}") from error
     if not isinstance(content, Mapping):
         raise BadInputError(f"{path.name} is no contract: a table is expected")
     if _has_too_many_entries(content):
         raise BadInputError(f"{path.name} is too large for a contract: its aliases repeat too much")
     return cast("Mapping[str, object]", content)
+
+
+def _said_of(error: Exception) -> str:
+    """Return what a YAML error says: where it is known, the line, the column and what is there."""
+    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+    if mark is None or problem is None:
+        return one_line(error)
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
 
 
 def _has_too_many_entries(content: object) -> bool:
