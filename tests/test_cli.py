@@ -347,3 +347,7 @@ def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path
 def test_help_shows_few_options_and_help_all_every_one(here: Cli, command: str) -> None:
     few, every = here(command, "--help").stdout, here(command, "--help-all").stdout
     assert few.count("\n  --") <= 12 < every.count("\n  --")
+
+
+def test_a_lesson_is_called_by_its_number_on_the_path(here: Cli) -> None:
+    assert here("lesson", "3", "--code").stdout == here("lesson", "state", "--code").stdout

@@ -101,6 +101,11 @@ def test_a_line_breaks_no_name_and_parts_no_figure_from_its_unit(
     assert_in(out, "shoulder_lift_joint", "x\n12 mm\n", "  3 kg mm²\n", "name_very_  ")
 
 
+def test_a_line_parts_no_range_of_a_side(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal.show(Page("t", "o", [Text("x" * 77 + " -2 2 on the right")]))
+    assert "x\n-2 2 on the right\n" in capsys.readouterr().out
+
+
 def test_what_follows_a_heading_is_folded_under_its_words() -> None:
     asked = Question("Which?", ("x", "y"), 1, "So it is.")
     page = Page("t", "o", [asked, Printed({"a": "1\n"}), Text("p"), Heading("More*"), Text("q")])

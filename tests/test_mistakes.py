@@ -350,3 +350,8 @@ def test_a_mistake_is_one_line(
     there = files_of(folder)
     one_line(here(*(word.replace("ROOT", str(ROOT)) for word in shlex.split(command))), says)
     assert files_of(folder) == there
+
+
+@pytest.mark.parametrize("command", ["sweep hold --html x.html", "robots models --html x.html"])
+def test_what_is_like_no_option_is_not_guessed(here: Cli, command: str) -> None:
+    assert here(*command.split()).stderr.endswith("unrecognized arguments: --html x.html\n")

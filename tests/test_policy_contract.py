@@ -355,3 +355,10 @@ def test_a_velocity_takes_neither(tmp_path: Path) -> None:
 def test_a_contract_is_no_reader_of_figures_of_provenance(tmp_path: Path) -> None:
     file = contract_file(tmp_path, {**content(), "provenance": {"timing.policy_dt": "file"}})
     assert read_contract(file).unread == ()
+
+
+def test_a_file_that_is_no_yaml_is_told_by_its_line(tmp_path: Path) -> None:
+    file = written(tmp_path / "contract.yaml", "a: 1\n b: [2\n")
+    with pytest.raises(BadInputError, match=r"line 2, column 3: mapping values") as refused:
+        read_contract(file)
+    assert "unicode string" not in str(refused.value)

@@ -34,7 +34,7 @@ from statemachine.lab.robots import (
     find,
     gaps,
 )
-from statemachine.lab.robots.page import page
+from statemachine.lab.robots.page import page, unique_ends
 from statemachine.lab.robots.table import read_table, write_table
 from statemachine.lab.runs.provenance import model_files
 from statemachine.lab.runs.scenarios import scenario
@@ -541,3 +541,14 @@ def test_a_file_that_the_engine_alone_cannot_open_is_no_contradiction(tmp_path: 
     survey = examine_all(find([written_all(tmp_path, {"m.obj": mesh, "r.urdf": arm})]), quick=True)
     assert survey.models[0].backends["mujoco"].equals_engine is None
     assert not survey.wrong
+
+
+def test_a_model_is_called_by_the_end_of_its_path_that_is_its_own() -> None:
+    files = ["a/assets/hopper.xml", "b/assets/hopper.xml", "b/assets/ant.xml", "ant.xml"]
+    ends = unique_ends(files)
+    assert ends == {
+        "a/assets/hopper.xml": "a/assets/hopper.xml",
+        "b/assets/hopper.xml": "b/assets/hopper.xml",
+        "b/assets/ant.xml": "assets/ant.xml",
+        "ant.xml": "ant.xml",
+    }

@@ -20,7 +20,6 @@ from statemachine.lab.validate.cases import CASES
 from statemachine.lab.validate.page import (
     ValidatePage,
     badness,
-    error_text,
     junit_of,
     order_text,
     page,
@@ -34,6 +33,7 @@ from statemachine.lab.validate.run import (
     simulated_time,
     zero_crossings,
 )
+from statemachine.lab.validate.shown_error import error_text
 from statemachine.lab.validate.variants import Variant
 from statemachine.lab.validate.verdict import (
     LEAST_ORDER,

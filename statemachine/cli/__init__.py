@@ -79,7 +79,7 @@ class _Parser(argparse.ArgumentParser):
                 message += f": {flag} {metavar}"
         if message.startswith("unrecognized arguments: -"):
             word = message.split()[2].partition("=")[0]
-            known = self._option_string_actions
+            known = {name.lstrip("-"): name for name in self._option_string_actions}
             from ..course.lessons import LESSONS
             from ..measures.text import listed
 
@@ -88,7 +88,7 @@ class _Parser(argparse.ArgumentParser):
                 message += f"; it is an option of {PROGRAM} lesson {listed(others)}"
             else:
                 plain = word == "--model" and "; type the model without it"
-                message += plain or did_you_mean(word, known, 0.6)
+                message += plain or did_you_mean(word.lstrip("-"), known, 0.6, known.__getitem__)
         elif message.startswith("unrecognized arguments: "):
             option = "--model" in self._option_string_actions
             message += "; a model is --model FILE" if option else "; this takes no more words"

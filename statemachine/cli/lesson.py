@@ -48,8 +48,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
-        question = lesson.question
-        _add_lesson(named.add_parser(lesson.name, help=question, description=question), lesson)
+        says, also = lesson.question, [f"{PATH.index(lesson) + 1}"] if lesson.on_path else []
+        _add_lesson(
+            named.add_parser(lesson.name, aliases=also, help=says, description=says), lesson
+        )
 
 
 def _add_shared(parser: argparse.ArgumentParser) -> None:

@@ -84,10 +84,11 @@ _SPELLINGS = {
 ASCII = str.maketrans(_SPELLINGS)
 # What would make a terminal do something instead of showing it (a student's text may hold it).
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
-# A blank between a figure and its unit or sign.
+# A blank between a figure and its unit, its sign or the other end of its range.
 _INSIDE = re.compile(
     r"(?<=\d) (?=(?:%|deg|[mµu]?s|[cm]?m[²³]?|k?N|J|W|V|kg|rad|Hz|[kMG]?B)(?!\w))"
     r"|(?<=\d kg) (?=m)|(?<=[<>±]) (?=\d)"
+    r"|(?<=\d) (?=[-−]?[\d.]+ on the (?:left|right)\b)"  # the last two of a row, as of a range
 )
 NO_BREAK = "\ue000"  # of no language, and as wide as a blank
 

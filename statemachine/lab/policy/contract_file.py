@@ -88,7 +88,7 @@ def _yaml_of(path: Path) -> Mapping[str, object]:
     except (OSError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise BadInputError(f"{path} cannot be read: {one_line(error)}") from error
     except yaml.YAMLError as error:
-        raise BadInputError(f"{path.name} is no YAML: {one_line(error)}") from error
+        raise BadInputError(f"{path.name} is no YAML: {_said_of(error)}") from error
     if not isinstance(content, Mapping):
         raise BadInputError(f"{path.name} is no contract: a table is expected")
     if _has_too_many_entries(content):
@@ -121,6 +121,14 @@ def _loader_of(yaml: Any, file: str) -> Any:
             return super().construct_mapping(node, deep)
 
     return UniqueKeyLoader
+
+
+def _said_of(error: Exception) -> str:
+    """Return what a YAML error says: where it is known, the line, the column and what is there."""
+    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+    if mark is None or problem is None:
+        return one_line(error)
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
 
 
 def _has_too_many_entries(content: object) -> bool:

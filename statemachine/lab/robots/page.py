@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 from ...measures.text import NO_NUMBER, count, figure, grouped, rough
 from ...show.blocks import Page, Table
@@ -50,6 +52,7 @@ class RobotsPage(PageContent):
     Attributes:
         survey: What was found.
         models: Table with a row for each model.
+        gaps: Table of the gaps of each, where there are several engines beside the default one.
         engines: Table with a row for each engine.
         grades: Table of what the witness read how often.
         refusals: Of each backend but the default one.
@@ -58,6 +61,7 @@ class RobotsPage(PageContent):
     template = "robots.md.j2"
     survey: Survey
     models: Table
+    gaps: Table
     engines: Table
     grades: Table
     refusals: Sequence[_Refusals]
@@ -154,9 +158,11 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
     """
     if survey.is_of_one_model:
         return _page_of_one(survey, survey.models[0])
+    models, gaps = _tables(survey, widest)
     content = RobotsPage(
         survey,
-        models=_table(survey, widest),
+        models=models,
+        gaps=gaps,
         engines=_engines_table(survey),
         grades=_grades_table(survey),
         refusals=[_Refusals(other, _refused_features(survey, other)) for other in survey.others],
@@ -170,26 +176,52 @@ def _grades_table(survey: Survey) -> Table:
     return Table(("reading", "models"), rows)
 
 
-def _table(survey: Survey, widest: int) -> Table:
-    """Return a row for each model."""
+def _tables(survey: Survey, widest: int) -> tuple[Table, Table]:
+    """Return a row for each model, and the gaps, in a table of their own where engines are several.
+
+    A model is called by as much of the end of its path as tells it apart.
+    """
+    called = unique_ends([row.file for row in survey.models])
 
     def shortened(row: ExaminedModel) -> str:
         # The end of a long name tells more than its beginning.
-        return row.file if len(row.file) <= widest else f"…{row.file[1 - widest :]}"
+        name = called[row.file]
+        return name if len(name) <= widest else f"…{name[1 - widest :]}"
 
     columns: dict[str, Callable[[ExaminedModel], str]] = {
         "model": shortened,
         "bits": partial(_bits, survey),
     }
+    gaps: dict[str, Callable[[ExaminedModel], str]] = {}
     for other in survey.others:
         of = f"{other}, " if len(survey.others) > 1 else ""
-        columns[f"{of}no contacts"] = partial(_gap, other=other, contacts=False)
-        columns[f"{of}contacts"] = partial(_gap, other=other, contacts=True)
+        gaps[f"{of}no contacts"] = partial(_gap, other=other, contacts=False)
+        gaps[f"{of}contacts"] = partial(_gap, other=other, contacts=True)
+    if len(survey.others) == 1:
+        columns |= gaps
     columns["witness"] = _witness
     if survey.ran_experiments:
         columns |= {"runs": _runs, "cost": _costs}
     words = {"model", "bits", "witness", "runs"}
-    return Table.of(survey.models, columns, words=words, wide={"cost"})
+    table = Table.of(survey.models, columns, words=words, wide={"cost"})
+    if len(survey.others) < 2:
+        return table, Table((), [])
+    return table, Table.of(survey.models, {"model": shortened, **gaps}, words={"model"})
+
+
+def unique_ends(files: Sequence[str]) -> dict[str, str]:
+    """Return by path the shortest end of it, in whole parts, that no other path has."""
+    ends: dict[str, str] = {}
+    counts = Counter(end for file in dict.fromkeys(files) for end in _ends(file))
+    for file in files:
+        ends[file] = next((end for end in _ends(file) if counts[end] == 1), file)
+    return ends
+
+
+def _ends(file: str) -> list[str]:
+    """Return all ends of a path, in whole parts, the shortest first."""
+    parts = Path(file).parts
+    return ["/".join(parts[-k:]) for k in range(1, len(parts) + 1)]
 
 
 def _runs(row: ExaminedModel) -> str:

@@ -11,8 +11,6 @@ from ...installed import DEFAULT
 from ...measures.text import (
     NO_NUMBER,
     command,
-    display_unit,
-    figure,
     milliseconds,
     quantity,
     significant,
@@ -24,6 +22,7 @@ from ...show.pictures import Traces
 from ...show.templates import PageContent, render
 from .battery import CaseResult, ValidateResult
 from .case import Verdict
+from .shown_error import error_text
 
 NO_PICTURE = "no run has an error to draw"
 _LINES = 9  # of a terminal's page that both tables share
@@ -263,23 +262,6 @@ def _worst(results: Sequence[CaseResult], most: int) -> Table:
 def error_of_row(row: CaseResult, error: float | None) -> str:
     """Return an error of a case as it is read."""
     return error_text(error, row.error_unit)
-
-
-def error_text(error: float | None, unit: str) -> str:
-    """Return an error as it is read; a relative one in per cent where it is large enough.
-
-    Args:
-        error: [unit]; None where there is none.
-        unit: SI; "" of a relative error.
-    """
-    if error is None:
-        return NO_NUMBER
-    if math.isinf(error):
-        return "no event"
-    if unit == "" and abs(error) >= 1e-4:
-        return f"{figure(100.0 * error)} %"
-    factor, name = display_unit(unit)  # one unit for a column, however large
-    return "none" if math.isnan(error) else f"{figure(error * factor)}{name}"
 
 
 def order_text(row: CaseResult) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...measures.text import quantity
 from ...show.blocks import Block
 from ...show.templates import PageContent, render_blocks
-from ..validate.page import error_text
+from ..validate.shown_error import error_text
 from .cited_case import CitedCase, SideInCase
 from .explanation import Explanation
 

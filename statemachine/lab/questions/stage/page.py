@@ -138,6 +138,7 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
         tip = _TOOL
     elif not site:
         tip = "a site"
+    no_contacts = Html("" if runs.comparison.touches else " hidden")
     if scene.strongest:
         arrows = non_breaking(ARROWS.format(force=figure(scene.strongest)))
     if scene.data is None:
@@ -156,7 +157,7 @@ def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict
         "tip": tip,
         "now": spoken_time,
         "arrows": arrows,
-        "no_contacts": Html("") if runs.comparison.touches else Html(" hidden"),
+        "no_contacts": no_contacts,
         "last": len(times) - 1,
         "start": start,
         "share": f"{share:.6f}",
