@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from statemachine.lab.why import Explanation
-from statemachine.lab.why.answer_page import AnswerSentence
+from statemachine.lab.why.answer_page import unmeasured
 from statemachine.lab.why.table_page import summary_table
 from statemachine.measures.text import percent
 
@@ -46,7 +46,7 @@ def test_a_cause_leads_by_the_figure_that_is_known_where_the_other_is_not(
 
 def test_no_cause_leads_while_nothing_is_known_of_another(ranked: Explanation) -> None:
     found = _with_figures(ranked, (None, None), (0.2, 0.25))
-    assert AnswerSentence(found, "", "", "", "", "", "", "").unmeasured == (found.shares[0].name,)
+    assert unmeasured(found) == (found.shares[0].name,)
 
 
 def test_the_two_ends_of_a_range_that_are_one_figure_are_shown_once(ranked: Explanation) -> None:

@@ -122,6 +122,20 @@ class EffectPhrase(PageContent):
 
 
 @dataclass(frozen=True)
+class RankedPhrase(PageContent):
+    """Which cause leads once each was tried, before shares are known.
+
+    Attributes:
+        unmeasured: The causes of whose part nothing is known yet: one may lead.
+        leading_words: What takes away most of all that is known; "" where nothing is.
+    """
+
+    template = "why_ranked.md.j2"
+    unmeasured: tuple[str, ...]
+    leading_words: str
+
+
+@dataclass(frozen=True)
 class AnswerSentence(PageContent):
     """What the sentence of the verdict may say.
 
@@ -133,6 +147,8 @@ class AnswerSentence(PageContent):
         place_words: That on what was left out; "" where the verdict is another.
         leading_words: What takes away most of all that is known, where the search was ended before
             shares were; "" where nothing is known of any cause.
+        ranked_words: The same, once each cause was tried: it leads only if something is known of
+            each.
     """
 
     template = "why_answer.md.j2"
@@ -144,6 +160,7 @@ class AnswerSentence(PageContent):
     cause_words: str
     place_words: str
     leading_words: str
+    ranked_words: str
 
     @property
     def first_failure(self) -> str:
@@ -152,11 +169,6 @@ class AnswerSentence(PageContent):
             if row.failure is not None:
                 return row.failure.failure.reason
         return ""
-
-    @property
-    def unmeasured(self) -> tuple[str, ...]:
-        """Return the names of the causes of whose part nothing is known yet: one may lead."""
-        return tuple(row.name for row in self.result.shares if row.range is None and not row.note)
 
     @property
     def has_gap(self) -> bool:
@@ -233,6 +245,7 @@ def missing(parts: Sequence[tuple[str, str]]) -> list[str]:
 def answer(result: Explanation) -> str:
     """Say what the gap comes from, in a sentence without its end."""
     cause, place, still = "", "", ""
+    equalized_gap = amount(result, result.equalized_gap or 0.0)
     match result.verdict.answer:
         case "nothing moved":
             still = nothing_moved(result.motion, result.instead)
@@ -248,10 +261,11 @@ def answer(result: Explanation) -> str:
             nothing_moved=still,
             gap=amount(result, result.gap),
             floor=amount(result, result.floor),
-            equalized_gap=amount(result, result.equalized_gap or 0.0),
+            equalized_gap=equalized_gap,
             cause_words=cause,
             place_words=place,
             leading_words=_leading(result),
+            ranked_words=_ranked(result),
         )
     )
 
@@ -260,6 +274,17 @@ def _leading(result: Explanation) -> str:
     """Return what takes away most by the figures that are known; "" where there is none."""
     leading = result.leading()
     return "" if leading is None else sentence_of(EffectPhrase(leading))
+
+
+def _ranked(result: Explanation) -> str:
+    """Return which cause leads, if any does; "" where there is no cause."""
+    names, leading = unmeasured(result), _leading(result)
+    return sentence_of(RankedPhrase(names, leading)) if names or leading else ""
+
+
+def unmeasured(result: Explanation) -> tuple[str, ...]:
+    """Return the names of the causes of whose part nothing is known yet: one may lead."""
+    return tuple(row.name for row in result.shares if row.range is None and not row.note)
 
 
 def _of_cause(result: Explanation) -> CauseSentence:
