@@ -68,7 +68,7 @@ def test_an_option_of_the_left_can_be_written_into_the_right_file(arm: str, tmp_
 def test_what_an_option_makes_is_not_written_and_no_file_is(arm: str, tmp_path: Path) -> None:
     target = tmp_path / "fixed.xml"
     result = explained(Side(arm), Side(arm, options={"kp": 12}), target)
-    assert result.is_written_in_vain
+    assert result.nothing_written
     assert not target.exists()
     assert not result.page().holds
 

@@ -183,8 +183,8 @@ def _shares(sweep: SweepEffects, rows: int) -> Table:
             "parameter": lambda effect: effect.parameter,
             "share": lambda effect: _share(effect.share),
             "±": lambda effect: _share(effect.error),
-            "lowest mean": lowest,
-            "highest mean": highest,
+            "min mean": lowest,
+            "max mean": highest,
         },
     )
     if len(sweep.known_effects) < 2 or rows == 1:

@@ -265,7 +265,7 @@ class Explanation:
         return not (self.ended_by or self.method in ("not ranked", "alone and last"))
 
     @property
-    def is_written_in_vain(self) -> bool:
+    def nothing_written(self) -> bool:
         """Tell whether a file was to close a gap, and nothing could be changed in it."""
         if self.rewritten is None or self.rewritten.written:
             return False

@@ -266,7 +266,7 @@ def _page(content: WhyPage) -> Page:
 
 def _holds(result: Explanation) -> bool:
     """Tell whether what was asked was answered, and written if that was asked."""
-    return result.verdict.holds and not result.is_written_in_vain
+    return result.verdict.holds and not result.nothing_written
 
 
 def _conclusion(result: Explanation) -> Conclusion:
