@@ -15,7 +15,7 @@ import pytest
 from tools.benchmarks import __main__ as bench
 from tools.benchmarks.interleave import NULL, Ratio
 from tools.reference.figures import DEFAULT, differences, flatten, largest_number, tolerance_of
-from tools.reference.groups import GROUPS, QUICK, absent, changes, kept, write
+from tools.reference.groups import GROUPS, ON_REQUEST, QUICK, absent, changes, kept, write
 
 from .support.claims import refused
 from .support.processes import of_python
@@ -24,7 +24,11 @@ from .support.requirements import REQUIRED, ROOT
 
 @pytest.mark.parametrize(
     "group",
-    [pytest.param(group, marks=[pytest.mark.slow] * (group not in QUICK)) for group in GROUPS],
+    [
+        pytest.param(group, marks=[] if group in QUICK else pytest.mark.slow)
+        for group in GROUPS
+        if group not in ON_REQUEST
+    ],
 )
 def test_the_figures_are_those_of_the_reference(group: str) -> None:
     if absent(group):

@@ -16,8 +16,8 @@ def noting_interrupts() -> Iterator[Callable[[], None]]:
     """Note each Ctrl-C beside raising it, and give a function that raises one that was lost.
 
     A KeyboardInterrupt is lost where Python ignores what is raised, as in a `weakref.finalize` or
-    a `__del__`, and where NumPy swallows it in a comparison. In another thread than the main one,
-    and where somebody else takes the signal, nothing is noted.
+    another finalizer, and where NumPy swallows it in a comparison. In another thread than the main
+    one, and where somebody else takes the signal, nothing is noted.
 
     Raises:
         KeyboardInterrupt: One came inside, and the end was reached all the same.

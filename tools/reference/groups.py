@@ -32,6 +32,8 @@ from .figures import Figures, curve, differences, of_output
 KEPT = HERE / "figures"
 # In `make test`.
 QUICK = ("pair damping", "worlds")
+# In `make reference` alone: robots and scenes that are asked the same as others, and take long.
+ON_REQUEST = ("arm with a box", "reacher", "floating ant", "cheetah", "manipulator")
 _BACKENDS = ("mujoco", "pybullet")
 _WITHOUT_MARKS = {"lesson summary", "lesson time"}
 
