@@ -28,14 +28,12 @@ def considered_shifts(best: Fit) -> Array:
     """Return by how much parameters (S, free) move for each that is off by its deviation."""
     simulation, vector = best.objective.simulation, best.vector
     refit = LinearRefit.of(best)
-    as_it_is = simulation.angles(vector)
     others = [_faster(simulation)]
     for place in UNCERTAIN_PLACE * np.eye(3):
         others.append(_with_payload_at(simulation, vector, place))
     shifts: list[Array] = []
     for other in others:
-        change = other.angles(vector) - as_it_is
-        shifts.append(refit.end(change[simulation.first_frame :]).shift)
+        shifts.append(refit.end(refit.change_with(other)).shift)
     return np.array(shifts)
 
 

@@ -60,6 +60,11 @@ class Objective:
         """Return the standard deviations of what is fitted before the fit."""
         return self.parameters.deviations[self.free]
 
+    @property
+    def prior_precision(self) -> Array:
+        """Return the inverse (free, free) of the covariance of what is fitted before the fit."""
+        return np.diag(1.0 / np.square(self.prior_deviations))
+
     def vector(self, values: Array) -> Array:
         """Return the whole vector (P,) for the values of what is fitted."""
         vector = self.fixed.copy()

@@ -14,6 +14,7 @@ from ...interface import Array
 from .blas_threads import one_blas_thread
 from .fit import Fit
 from .residuals import root_mean_square
+from .simulation import ArmSimulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,11 @@ class LinearRefit:
         """Return half the sum of squares where the angles stay as they are."""
         left = self.left(self.residuals)
         return 0.5 * float(left @ left)
+
+    def change_with(self, other: ArmSimulation) -> Array:
+        """Return by how much the angles (rows, n) change with another simulation [rad]."""
+        fit = self.fit
+        return fit.objective.errors(other.angles(fit.vector)) - fit.errors
 
     def end(self, change: Array) -> RefitEnd:
         """Return where the fit ends if the angles change.

@@ -15,10 +15,9 @@ _PARTS = np.array((0.0, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0
 
 def load_friction_profile(refit: LinearRefit) -> SizeProfile:
     """Return the profile by the part of its force that each servo loses."""
-    simulation, vector = refit.fit.objective.simulation, refit.fit.vector
-    without = simulation.angles(vector)
+    simulation = refit.fit.objective.simulation
     ends: list[RefitEnd] = []
     for part in _PARTS.tolist():
-        angles = replace(simulation, load_friction=part).angles(vector)
-        ends.append(refit.end((angles - without)[simulation.first_frame :]))
+        loaded = replace(simulation, load_friction=part)
+        ends.append(refit.end(refit.change_with(loaded)))
     return SizeProfile(_PARTS, tuple(ends), float(_PARTS[1]))

@@ -88,11 +88,10 @@ class Fits:
         is read late: noise that is the same everywhere would make intervals too narrow (K.-Y. Liang
         and S. Zeger, Longitudinal data analysis using generalized linear models, 1986).
         """
-        best = self.best
-        free = len(best.objective.free)
-        precision = np.diag(1.0 / np.square(best.objective.prior_deviations))
-        left = (best.errors / best.objective.deviation)[:, :, None]
-        slopes = best.jacobian[:-free].reshape(*best.errors.shape, free)
+        best, objective = self.best, self.best.objective
+        precision = objective.prior_precision
+        left = (best.errors / objective.deviation)[:, :, None]
+        slopes = objective.without_prior(best.jacobian).reshape(*best.errors.shape, -1)
         of_frames = (left * slopes).sum(axis=1)
         inverse = np.linalg.inv(best.information + precision)
         covariance = inverse @ (of_frames.T @ of_frames + precision) @ inverse
@@ -101,7 +100,7 @@ class Fits:
     @property
     def covariance(self) -> Array:
         """Return the covariance (free, free) of the best fit, with the prior."""
-        precision = np.diag(1.0 / np.square(self.best.objective.prior_deviations))
+        precision = self.best.objective.prior_precision
         information = self.best.information / self._more_than_noise**2 + precision
         return np.asarray(np.linalg.inv(information), np.float64)
 

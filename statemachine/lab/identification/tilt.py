@@ -44,14 +44,12 @@ def tilted_gravity(gravity: Array, tilt: Array) -> Array:
 
 def likeliest_tilt(refit: LinearRefit) -> Tilt:
     """Return the tilt that fits best, to first order."""
-    simulation, vector = refit.fit.objective.simulation, refit.fit.vector
+    simulation = refit.fit.objective.simulation
     level = np.array(simulation.parameters.model.gravity)
-    as_it_is = simulation.angles(vector)
     slopes: list[Array] = []
     for tilt in _STEP * np.eye(2):
         tilted = replace(simulation, gravity=tilted_gravity(level, tilt))
-        change = (tilted.angles(vector) - as_it_is)[simulation.first_frame :]
-        slopes.append(change / _STEP)
+        slopes.append(refit.change_with(tilted) / _STEP)
     left = np.stack([refit.left(refit.by_noise(slope)) for slope in slopes], axis=1)
     normal = left.T @ left + np.eye(2) / _PRIOR**2
     angles = -np.asarray(np.linalg.solve(normal, left.T @ refit.residuals), np.float64)

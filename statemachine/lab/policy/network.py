@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...errors import BadInputError, one_line
+from ...git_lfs import check_is_no_pointer
 from ...installed import require_extra
 from ...interface import Array
 from ...models import AnyPath, check_is_file
@@ -20,7 +21,6 @@ from .contract_file import EXTRA
 SUFFIX: Final = ".onnx"
 _FATAL_ONLY = 4  # of onnxruntime's levels of severity: its errors are exceptions, too
 _ACTIONS = ("tensor(float)", "tensor(double)", "tensor(float16)")
-_LFS_POINTER = b"version https://git-lfs"
 # What onnxruntime says before the reason: its code, the file again, a line of its own source.
 _BEFORE_REASON = re.compile(
     r"^\[ONNXRuntimeError\] : \d+ : \w+ : |Load model from .*? failed:\s*"
@@ -75,11 +75,7 @@ class Network:
             raise BadInputError(f"there is no policy {path}") from None
         except OSError as error:
             raise BadInputError(f"{path} cannot be read: {one_line(error)}") from error
-        if content.startswith(_LFS_POINTER):
-            raise BadInputError(
-                f"{path} is a pointer of git-lfs in place of the file: type `git lfs pull` in its "
-                "folder"
-            )
+        check_is_no_pointer(path, content)
         self._session = _session_of(path, runtime)
         inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
         _check(path, inputs, outputs)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import BadInputError, printable, shown
+from ...git_lfs import START_LENGTH, check_is_no_pointer
 from ...installed import require_extra
 from ...interface import Array, Ints
 from ...models import check_is_file
 
-_LFS_POINTER = b"version https://git-lfs"
 MOST_ROWS = 10_000_000  # of a file: 90 hours at 30 frames per second
 
 
@@ -82,13 +82,11 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Columns:
     try:
         check_is_file(path)
         with path.open("rb") as start:
-            is_pointer = start.read(len(_LFS_POINTER)) == _LFS_POINTER
+            check_is_no_pointer(path, start.read(START_LENGTH))
     except FileNotFoundError:
         raise BadInputError(f"there is no file {path}, which the data set's meta/ names") from None
     except OSError as error:
         raise BadInputError(f"{path} cannot be read: {error.strerror}") from None
-    if is_pointer:
-        raise _pointer_error(path)
     require_extra("pyarrow.parquet", "a recording of LeRobot", "pyarrow", "recordings")
     try:
         columns = _columns_of(path, names)
@@ -145,8 +143,7 @@ def read_text(path: Path) -> str:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise BadInputError(f"{path} cannot be read: {printable(error)}") from None
-    if text.startswith(_LFS_POINTER.decode()):
-        raise _pointer_error(path)
+    check_is_no_pointer(path, text[:START_LENGTH].encode())
     return text
 
 
@@ -163,9 +160,3 @@ def parse_object(text: str, path: Path) -> dict[str, object]:
     if not isinstance(value, dict):
         raise BadInputError(f"{path} holds {shown(value)}, not an object of JSON")
     return cast("dict[str, object]", value)
-
-
-def _pointer_error(path: Path) -> BadInputError:
-    return BadInputError(
-        f"{path} is a pointer of git-lfs in place of the file: type `git lfs pull` in its folder"
-    )

@@ -29,9 +29,9 @@ PUBLIC = (
 )  # fmt: skip
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
-    *PUBLIC, "_models", "atomic_files", "engine_wheels", "engines", "freshness", "gym", "installed",
-    "installing", "measures", "model_files", "processes", "program", "release_names", "releases",
-    "robot_packages", "show", "typed_numbers", "witness",
+    *PUBLIC, "_models", "atomic_files", "engine_wheels", "engines", "freshness", "git_lfs", "gym",
+    "installed", "installing", "measures", "model_files", "processes", "program", "release_names",
+    "releases", "robot_packages", "show", "typed_numbers", "witness",
 )  # fmt: skip
 
 _PROCESS, _PROGRAM = "it starts another process", "it starts another program"
